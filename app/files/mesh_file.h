@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+#include "physics/model/triangle_mesh.h"
+
+namespace medulla {
+
+// Metres per unit of the file: m, cm, mm or inch. Throws std::runtime_error naming the known units.
+double metresPerUnit(const std::string& unit);
+
+// Reads a triangle mesh. OBJ and OFF by a reader of our own (vertex order kept, double precision, indices checked,
+// polygons fanned); every other format through assimp. Vertices are scaled to metres.
+// Throws std::runtime_error "FILE:LINE: ..." on missing, unreadable or malformed files, NaN, infinity, bad indices.
+TriangleMesh readMesh(const std::string& path, double metresPerFileUnit = 1);
+
+}  // namespace medulla

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "haptics/tool_input.h"
+#include "physics/dynamics/frame.h"
+#include "physics/dynamics/loads.h"
+#include "physics/model/soft_body_model.h"
+
+// The haptic side of a run (paper 4 and 5): proxies of all tools against the blended surfaces of all bodies, at the
+// servo rate. The servo reads two dynamics frames and never changes them; the dynamics reads what the servo hands over
+// at the end of a dynamics frame.
+namespace medulla {
+
+// A surface that a tool can touch: a soft body's triangles grouped by filling sphere.
+struct TouchableBody {
+  std::shared_ptr<const SoftBodyModel> model;
+};
+
+struct ToolState {
+  Eigen::Vector3d device = Eigen::Vector3d::Zero();  // m
+  Eigen::Vector3d proxy = Eigen::Vector3d::Zero();   // m, centre of the proxy sphere
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   // N, on the hand: stiffness (proxy - device) + damping, clamped
+  bool inContact = false;
+  bool holding = false;
+  bool clamped = false;  // force_max was reached
+};
+
+class Servo {
+ public:
+  // One bucket scene per filling sphere of every body. `rest` is the first frame.
+  Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools, double tickDuration,
+        const DynamicsFrame& rest, const std::vector<ToolSample>& start);
+  ~Servo();
+  Servo(Servo&&) noexcept;
+  Servo& operator=(Servo&&) noexcept;
+
+  // Dynamics side, after each dynamics frame: the two frames to blend from now on, and the buckets refitted around
+  // both. Keeps references' contents by copy.
+  void commit(const DynamicsFrame& from, const DynamicsFrame& to);
+
+  // One servo tick at the blend alpha (0..1] for one sample per tool. Never allocates, never locks.
+  void tick(double alpha, const std::vector<ToolSample>& inputs);
+
+  const std::vector<ToolState>& tools() const;
+
+  // The springs that stand for the tools' contacts and grips during the next dynamics frame of `frameDuration` s.
+  // `out` is cleared and filled.
+  void handOver(double frameDuration, Loads& out) const;
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
+
+}  // namespace medulla

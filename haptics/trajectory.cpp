@@ -1,0 +1,1 @@
+#include "haptics/tool_input.h"

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+// Loads from outside that the dynamics evaluates in its own substeps. A frozen force held for a 20 ms frame loses
+// contact at usual coupling stiffness; a spring does not.
+namespace medulla {
+
+// The virtual coupling between a tool and the point of the surface that it touches. The surface point is
+// x = sum weights x_nodes; force on it: stiffness (anchor - x) + damping (anchorVelocity - x'), spread to the nodes by
+// the same weights (paper 4). A pushing spring never pulls: its component along `outward` is dropped when positive.
+struct ToolSpring {
+  int tool = 0;  // whose reaction this is
+  int body = 0;
+  std::array<int, 3> nodes{};
+  std::array<double, 3> weights{};            // barycentric, sum 1
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // m, world, at the end of the frame
+  Eigen::Vector3d anchorVelocity = Eigen::Vector3d::Zero();  // m/s; inside the frame the anchor moves with it
+  Eigen::Vector3d outward = Eigen::Vector3d::UnitZ();  // unit surface normal at the contact
+  double stiffness = 0;                       // N/m
+  double damping = 0;                         // N s/m
+};
+
+// A grabbed node: the same spring on one node, pulling and pushing.
+struct HeldNode {
+  int tool = 0;
+  int body = 0;
+  int node = 0;
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();
+  Eigen::Vector3d anchorVelocity = Eigen::Vector3d::Zero();
+  double stiffness = 0;
+  double damping = 0;
+};
+
+struct Loads {
+  std::vector<ToolSpring> toolSprings;
+  std::vector<HeldNode> heldNodes;
+};
+
+}  // namespace medulla

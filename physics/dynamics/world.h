@@ -1,0 +1,97 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "physics/dynamics/frame.h"
+#include "physics/dynamics/loads.h"
+#include "physics/model/soft_body_model.h"
+
+namespace medulla {
+
+// What a body is made of. Stiffnesses of links and springs follow from it and from the mesh's own sections.
+struct Tissue {
+  double young = 5e3;      // Pa, > 0; more is stiffer and needs smaller substeps
+  double poisson = 0.45;   // 0 <= nu < 0.5
+  double density = 1040;   // kg/m3, > 0
+  double damping = 0.1;    // ratio to critical of the body's lowest bending mode, >= 0; 0 swings for ever
+};
+
+// Dimensionless steering of the three ways a link deforms (paper 2.2); 1 keeps the material's value.
+struct LinkFactors {
+  double elongation = 1, flexion = 1, torsion = 1;  // > 0
+};
+
+enum class SurfaceMode {
+  full,  // every node is a mass of its own (paper 2.3)
+  skin,  // nodes follow the skeleton without mass: tools then load the skeleton through the attachments
+};
+
+enum class FixedFreedom { translation, all };
+struct FixedSphere {
+  int sphere = 0;
+  FixedFreedom freedom = FixedFreedom::all;
+};
+
+struct BodyDescription {
+  std::string name;
+  std::shared_ptr<const SoftBodyModel> model;
+  Tissue tissue;
+  LinkFactors factors;
+  SurfaceMode surface = SurfaceMode::full;
+  Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
+  std::vector<FixedSphere> fixed;
+};
+
+struct WorldSettings {
+  Eigen::Vector3d gravity{0, -9.81, 0};  // m/s2
+  double frameDuration = 0.02;           // s, one dynamics frame
+  int substeps = 0;                      // per dynamics frame; 0: as many as the stability estimate asks for
+};
+
+// Sums over one dynamics frame, for logs and tests.
+struct FrameReport {
+  std::vector<Eigen::Vector3d> toolImpulse;  // N s that each tool gave to the bodies (index: tool)
+};
+
+struct Energies {
+  double kinetic = 0, elastic = 0, gravity = 0;  // J
+};
+
+struct WorldData;  // arrays laid out for the step; physics/dynamics/world_data.h
+
+class World {
+ public:
+  // Throws std::runtime_error naming the body where a description cannot be simulated (range of a tissue value, a fixed
+  // sphere that does not exist, a body without spheres).
+  World(const WorldSettings& settings, std::vector<BodyDescription> bodies);
+  ~World();
+  World(World&&) noexcept;
+  World& operator=(World&&) noexcept;
+
+  const std::vector<BodyDescription>& bodies() const;
+  int substepsPerFrame() const;
+  double substep() const;      // s
+  double stableSubstep() const;  // s, the estimate of the largest stable step
+  double time() const;         // s
+
+  // One dynamics frame: substeps under gravity and `loads`. Throws std::runtime_error naming body, time and cause when
+  // the state stops being finite.
+  FrameReport advance(const Loads& loads);
+
+  void readFrame(DynamicsFrame& out) const;  // resized once and reused
+  Energies energies() const;
+  double volumeRatio(int body) const;  // enclosed by the nodes, over rest
+  std::uint64_t stateHash() const;     // FNV-1a over every state variable's bits
+
+  WorldData& data() { return *data_; }  // for tests and benchmarks: states that no scene can reach
+  const WorldData& data() const { return *data_; }
+
+ private:
+  std::unique_ptr<WorldData> data_;
+};
+
+}  // namespace medulla

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "physics/model/mesh_repair.h"
+#include "physics/model/soft_body_model.h"
+
+namespace medulla {
+
+enum class BuildMethod {
+  skeleton,  // the paper's raw result: Li's edge collapse, nodes become spheres (2.1)
+  cover,     // inscribed medial balls chosen by set cover
+};
+
+struct BuildSettings {
+  BuildMethod method = BuildMethod::cover;
+  int spheres = 7;  // 1..10000; cover only: the skeleton's node count follows from the mesh
+  double surfaceMassFraction = 0.2;  // of the body's mass, carried by the surface nodes, 0..0.4; more allows larger substeps
+  int renderLevels = 2;  // 0..4 Loop subdivisions of the physics mesh for the drawn surface
+};
+
+// How good the model is. Lengths in % of the bounding box's diagonal.
+struct BuildReport {
+  int triangles = 0, skeletonNodes = 0, skeletonLinks = 0, spheres = 0, links = 0;
+  double gapMax = 0, gapMean = 0;      // surface to the nearest ball
+  double gapConesMax = 0;              // surface to the nearest ball or link cone
+  double cover = 0, coverCones = 0;    // % of the volume inside balls; inside balls and cones
+  double massError = 0, centreError = 0, inertiaError = 0;  // %, model against mesh (centre: of the diagonal)
+  int components = 0, centresOutside = 0, attachmentsCrossing = 0;
+  double attachmentMax = 0;
+  int degreeMax = 0;
+  double seconds = 0;
+};
+
+// Builds a model (paper 2). `fine`, if given, is the detailed shape that the drawn surface follows. `progress`, if
+// given, is called now and then with 0..1. Deterministic to the byte, `seconds` apart.
+// Throws std::runtime_error on settings out of range and on meshes that hold no ball.
+SoftBodyModel buildModel(const RepairedMesh& mesh, const TriangleMesh* fine, const BuildSettings& settings,
+                         BuildReport& report, const std::function<void(double)>& progress = {});
+
+}  // namespace medulla

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+
+// Draws one picture from plain arrays. Knows looks, light and pixels; knows nothing of bodies and physics.
+namespace medulla {
+
+// A surface as it is at rest; given once. Textures, colour variation and ambient occlusion are baked from it.
+struct SurfaceShape {
+  std::string look;  // a name of lookNames()
+  std::vector<glm::vec3> restPositions;  // m, world at the start of the run
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
+};
+
+// The same surface in one picture. Static surfaces leave `positions` empty and are drawn as at rest.
+struct SurfaceState {
+  std::vector<glm::vec3> positions;  // m, world
+};
+
+struct Camera {
+  glm::vec3 position{0, 0, 1}, target{0, 0, 0}, up{0, 1, 0};
+  float fovDegrees = 60;  // vertical
+};
+
+// The endoscope's light sits beside the lens; offset in the camera's frame (right, up, back), m.
+struct Light {
+  glm::vec3 offset{0.012f, 0.012f, 0};
+  float intensity = 1;  // 1 exposes a surface at `referenceDistance` fully
+  float referenceDistance = 0.15f;
+};
+
+struct Instrument {
+  glm::vec3 tip{0};
+  glm::quat worldFromTool{1, 0, 0, 0};  // shaft along +z away from the tip, jaws open in its yz plane
+  float jawAngle = 0.3f;                // rad, of each jaw from the axis
+  bool touching = false;                // tissue blanches and dimples around the tip
+};
+
+// Model view, after the paper's figures 2 and 11, and proxy and device.
+struct Ball {
+  glm::vec3 centre{0};
+  float radius = 0;
+  glm::vec4 colour{1};  // linear RGB, alpha < 1 is seen through
+};
+struct Segment {
+  glm::vec3 a{0}, b{0};
+  float radius = 0.0005f;  // m
+  glm::vec4 colour{1};
+};
+
+enum class ViewKind { tissue, model, both };
+
+struct Picture {
+  ViewKind view = ViewKind::tissue;
+  Camera camera;
+  Light light;
+  bool endoscopeMask = true;  // round picture with a soft rim
+  std::vector<SurfaceState> surfaces;  // index: order of addSurface
+  std::vector<Instrument> instruments;
+  std::vector<Ball> balls;
+  std::vector<Segment> segments;
+};
+
+struct RendererSettings {
+  int width = 1280, height = 720;  // 16..8192, even
+  std::string context = "auto";    // auto | osmesa | egl
+  bool shadows = true, antialias = true;
+};
+
+class Renderer {
+ public:
+  explicit Renderer(const RendererSettings& settings);  // throws std::runtime_error when no context can be made
+  ~Renderer();
+  Renderer(Renderer&&) noexcept;
+  int addSurface(SurfaceShape shape);  // throws std::runtime_error on an unknown look, naming the known ones
+  void render(const Picture& picture, Image& out);
+  std::string description() const;  // GL_RENDERER and GL_VERSION: golden images record it
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
+
+std::vector<std::string> lookNames();
+
+}  // namespace medulla
