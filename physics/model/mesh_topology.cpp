@@ -1,0 +1,172 @@
+#include "physics/model/mesh_topology.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace medulla {
+
+namespace {
+
+// One side of a triangle, keyed so that sorting brings the triangles of one edge together, in order of triangle.
+struct Side {
+  int low, high, triangle, corner;
+  bool operator<(const Side& o) const {
+    if (low != o.low) return low < o.low;
+    if (high != o.high) return high < o.high;
+    return triangle != o.triangle ? triangle < o.triangle : corner < o.corner;
+  }
+};
+
+std::vector<Side> sortedSides(const TriangleMesh& mesh) {
+  std::vector<Side> sides;
+  sides.reserve(3 * mesh.triangles.size());
+  for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const int a = mesh.triangles[t][k], b = mesh.triangles[t][(k + 1) % 3];
+      sides.push_back({std::min(a, b), std::max(a, b), t, k});
+    }
+  }
+  std::sort(sides.begin(), sides.end());
+  return sides;
+}
+
+// Counting sort of (list, item) pairs: items keep their order within a list.
+IndexLists gather(int lists, const std::vector<std::array<int, 2>>& pairs) {
+  IndexLists out;
+  out.first.assign(lists + 1, 0);
+  out.item.resize(pairs.size());
+  for (const auto& pair : pairs) ++out.first[pair[0] + 1];
+  for (int i = 0; i < lists; ++i) out.first[i + 1] += out.first[i];
+  std::vector<int> next(out.first.begin(), out.first.end() - 1);
+  for (const auto& pair : pairs) out.item[next[pair[0]]++] = pair[1];
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::array<int, 2>> uniqueEdges(const TriangleMesh& mesh) {
+  std::vector<std::array<int, 2>> edges;
+  edges.reserve(3 * mesh.triangles.size());
+  for (const auto& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) edges.push_back({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
+  }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
+IndexLists trianglesOfVertices(const TriangleMesh& mesh) {
+  std::vector<std::array<int, 2>> pairs;
+  pairs.reserve(3 * mesh.triangles.size());
+  for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
+    for (const int v : mesh.triangles[t]) pairs.push_back({v, t});
+  }
+  return gather(static_cast<int>(mesh.vertices.size()), pairs);
+}
+
+IndexLists neighboursOfVertices(const TriangleMesh& mesh) {
+  std::vector<std::array<int, 2>> pairs;
+  for (const auto& edge : uniqueEdges(mesh)) {
+    pairs.push_back(edge);
+    pairs.push_back({edge[1], edge[0]});
+  }
+  std::sort(pairs.begin(), pairs.end());
+  return gather(static_cast<int>(mesh.vertices.size()), pairs);
+}
+
+std::vector<std::array<int, 3>> adjacentTriangles(const TriangleMesh& mesh) {
+  std::vector<std::array<int, 3>> adjacent(mesh.triangles.size(), {-1, -1, -1});
+  const std::vector<Side> sides = sortedSides(mesh);
+  for (std::size_t i = 0; i < sides.size();) {
+    std::size_t end = i + 1;
+    while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high) ++end;
+    if (end - i == 2) {
+      adjacent[sides[i].triangle][sides[i].corner] = sides[i + 1].triangle;
+      adjacent[sides[i + 1].triangle][sides[i + 1].corner] = sides[i].triangle;
+    }
+    i = end;
+  }
+  return adjacent;
+}
+
+double surfaceArea(const TriangleMesh& mesh) {
+  double area = 0;
+  for (const auto& t : mesh.triangles) area += areaVector(mesh, t).norm();
+  return area;
+}
+
+std::vector<double> vertexAreas(const TriangleMesh& mesh) {
+  std::vector<double> areas(mesh.vertices.size(), 0);
+  for (const auto& t : mesh.triangles) {
+    const double third = areaVector(mesh, t).norm() / 3;
+    for (const int v : t) areas[v] += third;
+  }
+  return areas;
+}
+
+std::vector<Eigen::Vector3d> vertexNormals(const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3d> normals(mesh.vertices.size(), Eigen::Vector3d::Zero());
+  for (const auto& t : mesh.triangles) {
+    const Eigen::Vector3d area = areaVector(mesh, t);
+    for (const int v : t) normals[v] += area;
+  }
+  for (auto& normal : normals) normal.normalize();  // Eigen leaves a zero vector alone
+  return normals;
+}
+
+double enclosedVolume(const TriangleMesh& mesh) {
+  // About the first vertex: far from the origin the terms would cancel badly.
+  double volume = 0;
+  for (const auto& t : mesh.triangles) {
+    volume += areaVector(mesh, t).dot(mesh.vertices[t[0]] - mesh.vertices[0]) / 3;
+  }
+  return volume;
+}
+
+double boundsDiagonal(const TriangleMesh& mesh) {
+  if (mesh.vertices.empty()) return 0;
+  Eigen::Vector3d low = mesh.vertices[0], high = low;
+  for (const auto& v : mesh.vertices) {
+    low = low.cwiseMin(v);
+    high = high.cwiseMax(v);
+  }
+  return (high - low).norm();
+}
+
+std::vector<int> componentOfTriangles(const TriangleMesh& mesh, int& components) {
+  // Edges of three and more triangles connect too, which adjacentTriangles would not tell: union-find over the sides.
+  std::vector<int> parent(mesh.triangles.size());
+  for (std::size_t t = 0; t < parent.size(); ++t) parent[t] = static_cast<int>(t);
+  const auto root = [&parent](int t) {
+    while (parent[t] != t) t = parent[t] = parent[parent[t]];
+    return t;
+  };
+  const std::vector<Side> sides = sortedSides(mesh);
+  for (std::size_t i = 1; i < sides.size(); ++i) {
+    if (sides[i].low != sides[i - 1].low || sides[i].high != sides[i - 1].high) continue;
+    const int a = root(sides[i - 1].triangle), b = root(sides[i].triangle);
+    parent[std::max(a, b)] = std::min(a, b);
+  }
+  components = 0;
+  std::vector<int> component(parent.size());
+  for (int t = 0; t < static_cast<int>(parent.size()); ++t) {
+    const int r = root(t);
+    component[t] = r == t ? components++ : component[r];
+  }
+  return component;
+}
+
+double windingNumber(const TriangleMesh& mesh, const Eigen::Vector3d& point) {
+  double solidAngle = 0;
+  for (const auto& t : mesh.triangles) {
+    const Eigen::Vector3d a = mesh.vertices[t[0]] - point, b = mesh.vertices[t[1]] - point,
+                          c = mesh.vertices[t[2]] - point;
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    solidAngle += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return solidAngle / (4 * std::numbers::pi);
+}
+
+}  // namespace medulla

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "physics/model/triangle_mesh.h"
+
+// Questions about a triangle surface that more than one stage of model building asks. Pure functions; indices must be
+// in range. Lengths in the unit of the mesh (metres).
+namespace medulla {
+
+// Lists of differing lengths in one array: list i is item[first[i]] .. item[first[i + 1] - 1].
+struct IndexLists {
+  std::vector<int> first;  // number of lists + 1
+  std::vector<int> item;
+};
+
+// Every edge once: lower vertex first, sorted.
+std::vector<std::array<int, 2>> uniqueEdges(const TriangleMesh& mesh);
+
+// Triangles around each vertex, ascending.
+IndexLists trianglesOfVertices(const TriangleMesh& mesh);
+
+// Vertices that share an edge with each vertex, ascending.
+IndexLists neighboursOfVertices(const TriangleMesh& mesh);
+
+// The triangle across each triangle's edges: entry k of a triangle lies across its edge (corner k, corner k + 1).
+// -1 where that edge does not belong to exactly two triangles.
+std::vector<std::array<int, 3>> adjacentTriangles(const TriangleMesh& mesh);
+
+// Half the cross product of two edges: length = area, direction = normal by the winding.
+inline Eigen::Vector3d areaVector(const TriangleMesh& mesh, const std::array<int, 3>& triangle) {
+  const Eigen::Vector3d& a = mesh.vertices[triangle[0]];
+  return 0.5 * (mesh.vertices[triangle[1]] - a).cross(mesh.vertices[triangle[2]] - a);
+}
+
+// m2; the whole surface.
+double surfaceArea(const TriangleMesh& mesh);
+
+// m2 per vertex: a third of the triangles around it.
+std::vector<double> vertexAreas(const TriangleMesh& mesh);
+
+// Unit normal per vertex, area weighted; zero where the triangles around it cancel or have no area.
+std::vector<Eigen::Vector3d> vertexNormals(const TriangleMesh& mesh);
+
+// m3 by the divergence theorem: positive when a closed surface is wound outward, cavities subtract.
+double enclosedVolume(const TriangleMesh& mesh);
+
+// m; diagonal of the axis-aligned bounding box, 0 without vertices.
+double boundsDiagonal(const TriangleMesh& mesh);
+
+// Component of every triangle, connected through shared edges, numbered by its first triangle; count in `components`.
+std::vector<int> componentOfTriangles(const TriangleMesh& mesh, int& components);
+
+// Signed turns of the surface around a point (Van Oosterom and Strackee 1983): 1 inside a closed outward surface, 0
+// outside or in a cavity. O(triangles).
+double windingNumber(const TriangleMesh& mesh, const Eigen::Vector3d& point);
+
+}  // namespace medulla
