@@ -1,7 +1,59 @@
 #!/usr/bin/env bash
-# Placeholder until the tests exist: builds everything and runs them.
 set -euo pipefail
-cd "$(dirname "$0")"
-cmake -S . -B build -G Ninja > /dev/null
-cmake --build build
-ctest --test-dir build --output-on-failure
+source "$(dirname "$(realpath "$0")")/scripts/setup.sh"
+
+usage() {
+  cat << END
+usage: test.sh [--sanitize | --lint]
+
+Installs the Debian packages that are missing, builds what has changed into build/ and runs every test.
+  --sanitize  the same with address and undefined-behaviour sanitizers, in build-sanitize/
+  --lint      no tests: warnings of g++ and clang++ as errors, clang-format, clang-tidy
+One test after a build: build/medulla_tests --gtest_filter='Proxy.*'
+END
+}
+
+# runTests PRESET
+runTests() {
+  build "$1" all
+  (cd "$root" && ctest --preset "$1" -j "$(nproc)")
+}
+
+# Every check runs, so that one call shows all there is to mend. clang-tidy runs as part of the clang++ build: in parallel,
+# and only over what changed.
+lint() {
+  local sources failed=()
+  build lint-gcc all -k 0 || failed+=("g++")
+  if [[ $root/.clang-tidy -nt $root/build-lint-clang/build.ninja ]]; then rm -rf "$root/build-lint-clang"; fi
+  build lint-clang all -k 0 || failed+=("clang++ or clang-tidy")
+  cd "$root"
+  mapfile -t sources < <(find . -path "./build*" -prune -o -name '*.cpp' -o -name '*.h' | sort)
+  clang-format --dry-run -Werror "${sources[@]}" || failed+=("clang-format")
+  if ((${#failed[@]})); then
+    printf 'lint failed: %s\n' "${failed[@]}"
+    return 1
+  fi
+  echo "lint: g++, clang++, clang-tidy and clang-format find nothing in ${#sources[@]} files"
+}
+
+case ${1-} in
+  -h | --help) usage && exit ;;
+  --lint | --sanitize | '') ;;
+  *) usage >&2 && exit 2 ;;
+esac
+if (($# > 1)); then usage >&2 && exit 2; fi
+
+case ${1-} in
+  --lint)
+    installPackages build lint
+    lint
+    ;;
+  --sanitize)
+    installPackages build
+    runTests sanitize
+    ;;
+  *)
+    installPackages build
+    runTests default
+    ;;
+esac
