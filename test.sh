@@ -27,7 +27,7 @@ lint() {
   if [[ $root/.clang-tidy -nt $root/build-lint-clang/build.ninja ]]; then rm -rf "$root/build-lint-clang"; fi
   build lint-clang all -k 0 || failed+=("clang++ or clang-tidy")
   cd "$root"
-  mapfile -t sources < <(find . -path "./build*" -prune -o -name '*.cpp' -o -name '*.h' | sort)
+  mapfile -t sources < <(find . -path './build*' -prune -o -name '*.cpp' -print -o -name '*.h' -print)
   clang-format --dry-run -Werror "${sources[@]}" || failed+=("clang-format")
   if ((${#failed[@]})); then
     printf 'lint failed: %s\n' "${failed[@]}"

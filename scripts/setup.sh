@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Sourced by demo.sh and test.sh: installs missing packages and builds. It reports on standard error, because standard
 # output belongs to results.
 
@@ -8,7 +9,7 @@ say() { echo "$*" >&2; }
 # showProgress LABEL: reads the status lines of ninja ("[3/40] ...") and of apt ("pmstatus:...:7.5:...") and shows how
 # far the work is: a bar on a terminal, a line every ten seconds otherwise. Other lines pass (warnings, errors).
 showProgress() {
-  local label=$1 line bar left elapsed count=0 total=0 start=$SECONDS last=$SECONDS shown=
+  local label=$1 line bar left elapsed count=0 total=0 start=$SECONDS last=$SECONDS shown=''
   while IFS= read -r line; do
     case $line in "ninja: no work to do." | *"Re-checking globbed directories"*) continue ;; esac
     if [[ $line =~ ^\[([0-9]+)/([0-9]+)\] ]]; then
@@ -18,11 +19,11 @@ showProgress() {
       [[ ${BASH_REMATCH[1]} == dl ]] || count=$((count + 100))
     else
       [[ -z $shown ]] || printf '\r\033[K' >&2
-      shown=
+      shown=''
       say "$line"
       continue
     fi
-    left= elapsed=$((SECONDS - start))
+    left='' elapsed=$((SECONDS - start))
     if ((elapsed > 5 && count > 0)); then left=", about $((elapsed * (total - count) / count)) s left"; fi
     if [[ -t 2 ]]; then
       printf -v bar '%*s' $((30 * count / total)) ''
