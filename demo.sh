@@ -24,4 +24,7 @@ installPackages build
 build default medulla
 name=${scene##*/}
 mkdir -p "$root/out"
-exec "$root/build/medulla" render "$scene" -o "$root/out/${name%.xml}.mp4"
+results=$("$root/build/medulla" render "$scene" -o "$root/out/${name%.xml}.mp4")
+while read -r name value; do
+  case $name in file | pictures_per_second | realtime | hash) printf '%-20s %s\n' "$name" "$value" ;; esac
+done <<< "$results"

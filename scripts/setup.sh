@@ -83,11 +83,11 @@ build() {
   [[ $preset == default ]] || folder=$root/build-$preset
   shift 2
   if [[ ! $folder/build.ninja -nt $root/CMakePresets.json ]]; then
-    say "configuring ${folder##*/}"
+    say "configuring ${folder##*/}/"
     mkdir -p "$folder"
     log=$folder/configure.log
     (cd "$root" && cmake --preset "$preset" > "$log" 2>&1) || { cat "$log" >&2 && return 1; }
   fi
   NINJA_STATUS='[%f/%t] ' cmake --build "$folder" -j "$(nproc)" --target "$target" -- "$@" 2>&1 |
-    showProgress "building ${folder##*/}"
+    showProgress "building ${folder##*/}/"
 }
