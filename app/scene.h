@@ -26,6 +26,7 @@ struct SceneBody {
 struct SceneStatic {
   int line = 0;
   std::string meshPath, look;
+  std::string unit = "m";  // of the mesh file; a name that metresPerUnit() knows
   Eigen::Isometry3d worldFromMesh = Eigen::Isometry3d::Identity();
 };
 
@@ -36,34 +37,39 @@ struct SceneTool {
 };
 
 struct CameraKey {
-  double time = 0;  // s
+  double time = 0;  // s, >= 0
   Eigen::Vector3d position{0, 0, 1}, target{0, 0, 0};
-  double fovDegrees = 60;
+  double fovDegrees = 60;  // vertical, > 0, < 180
+  int line = 0;
 };
 
 struct Scene {
   std::string path, name;
-  double servoRate = 1200, dynamicsRate = 50;  // Hz; the first a multiple of the second
-  double duration = 1;                         // s
-  Eigen::Vector3d gravity{0, -9.81, 0};
+  double servoRate = 1200, dynamicsRate = 50;  // Hz, up to 20000 and 20 to 1200; the first a multiple of the second
+  double duration = 1;                         // s, > 0, <= 86400
+  Eigen::Vector3d gravity{0, -9.81, 0};        // m/s2
+  int substeps = 0;                            // per dynamics frame; 0: as many as the stability estimate asks for
   std::vector<SceneBody> bodies;
   std::vector<SceneStatic> statics;
   std::vector<SceneTool> tools;
-  std::vector<CameraKey> camera;  // at least one, increasing time
-  double lightIntensity = 1;
+  std::vector<CameraKey> camera;  // at least one, strictly increasing time, the first at 0
+  double lightIntensity = 1;             // >= 0
+  double lightReferenceDistance = 0.15;  // m, > 0; where intensity 1 exposes a surface fully
   Eigen::Vector3d lightOffset{0.012, 0.012, 0};  // m, in the camera's frame
-  int width = 1280, height = 720;
-  double fps = 30;
-  std::vector<double> goldenTimes;  // s
+  int width = 1280, height = 720;   // 16 to 8192, even
+  double fps = 30;                  // 1 to 240
+  std::vector<double> goldenTimes;  // s, strictly increasing, within 0 to duration
 };
 
 // `--set PATH=VALUE`: replaces one attribute before the scene is interpreted, e.g. body.gallbladder.surface=skin,
-// dynamics.gravity="0 0 0". Later ones win.
+// dynamics.gravity="0 0 0". PATH is element[.name].attribute, children behind their parent
+// (body.gallbladder.links.torsion). Later ones win. An overridden duration drops the golden times beyond it.
 struct SceneOverride {
   std::string path, value;
 };
 
-// Throws std::runtime_error "FILE:LINE: what is wrong, what was expected".
+// Throws std::runtime_error "FILE:LINE: what is wrong, what was expected", with "--set PATH" in the place of FILE:LINE
+// where an override is at fault. Files that the scene names are not opened.
 Scene readScene(const std::string& path, const std::vector<SceneOverride>& overrides = {});
 
 }  // namespace medulla

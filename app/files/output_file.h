@@ -5,8 +5,10 @@
 namespace medulla {
 
 // A text file that appears under its name only when whole: it is collected beside the target under a name of its own
-// and renamed by commit(). Destroyed before that, it leaves nothing and an earlier file stays as it was.
-// Both throw std::runtime_error with the path and the system's reason.
+// (TARGET.PID-N.part) and renamed by commit(). Destroyed before that, it leaves nothing and an earlier file stays as it
+// was; ^C becomes an exception (app/interrupt.h), so that it comes to that too.
+// The constructor throws std::runtime_error at once where the target cannot be written (no such folder, not permitted, a
+// folder or device of that name), write() and commit() where the system fails (disk full), with path and reason.
 class OutputFile {
  public:
   explicit OutputFile(std::string path);
@@ -14,9 +16,11 @@ class OutputFile {
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
   void write(const std::string& text);
-  void commit();
+  void commit();  // once, last
 
  private:
+  void flush();
+
   std::string path_, temporaryPath_;
   int descriptor_ = -1;
   std::string buffer_;

@@ -1,0 +1,330 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "app/files/scene_rules.h"
+#include "app/files/xml_element.h"
+#include "app/scene.h"
+
+namespace medulla {
+
+namespace {
+
+// Attributes that an override can reach, with their paths: every one that the rules know, present or not.
+struct Target {
+  std::string path;
+  XmlElement* element;
+  std::string attribute;
+};
+
+void listTargets(XmlElement& element, const std::string& prefix, std::vector<Target>& out) {
+  const XmlRule& rule = ruleOf(sceneRules(), element.name);
+  for (const std::string& a : rule.required) out.push_back({prefix + a, &element, a});
+  for (const std::string& a : rule.optional) out.push_back({prefix + a, &element, a});
+  for (XmlElement& child : element.children) {
+    const bool known = std::any_of(rule.children.begin(), rule.children.end(),
+                                   [&](const XmlRule::Child& c) { return c.name == child.name; });
+    if (!known) continue;  // refused later, at its own line
+    const XmlAttribute* name = child.find("name");
+    listTargets(child, prefix + child.name + "." + (name ? name->value + "." : ""), out);
+  }
+}
+
+// So that light.intensity can be overridden where the scene leaves <light> to its defaults.
+void addOptionalSingles(XmlElement& element) {
+  const XmlRule& rule = ruleOf(sceneRules(), element.name);
+  for (const XmlRule::Child& child : rule.children) {
+    const bool present = std::any_of(element.children.begin(), element.children.end(),
+                                     [&](const XmlElement& e) { return e.name == child.name; });
+    if (present || child.least > 0 || child.most != 1) continue;
+    XmlElement added;
+    added.name = child.name;
+    added.where = element.where;
+    added.line = element.line;
+    element.children.push_back(added);
+  }
+  for (XmlElement& child : element.children) {
+    if (child.name == "body") addOptionalSingles(child);
+  }
+}
+
+void applyOverride(XmlElement& root, const SceneOverride& override) {
+  const std::string where = "--set " + override.path;
+  std::vector<Target> targets;
+  listTargets(root, "", targets);
+  const auto matches = [&](const Target& t) { return t.path == override.path; };
+  const auto found = std::find_if(targets.begin(), targets.end(), matches);
+  if (found == targets.end()) {
+    std::vector<std::string> known;
+    for (const Target& t : targets) known.push_back(t.path);
+    throw std::runtime_error(where + ": the scene has nothing of this name; did you mean " +
+                             nearestName(override.path, known) + "?");
+  }
+  if (std::count_if(targets.begin(), targets.end(), matches) > 1) {
+    throw std::runtime_error(where + ": several elements answer to this, expected one");
+  }
+  XmlElement& element = *found->element;
+  std::erase_if(element.attributes, [&](const XmlAttribute& a) { return a.name == found->attribute; });
+  element.attributes.push_back({found->attribute, override.value, where});
+}
+
+std::vector<const XmlElement*> childrenOf(const XmlElement& parent, const std::string& name) {
+  std::vector<const XmlElement*> out;
+  for (const XmlElement& child : parent.children) {
+    if (child.name == name) out.push_back(&child);
+  }
+  return out;
+}
+
+// An absent element reads like an empty one: every attribute at its default.
+const XmlElement& onlyChild(const XmlElement& parent, const std::string& name) {
+  static const XmlElement absent;
+  const std::vector<const XmlElement*> found = childrenOf(parent, name);
+  return found.empty() ? absent : *found[0];
+}
+
+// Names stand in override paths, column names, object names and file names.
+std::string readName(const XmlElement& element) {
+  const std::string name = readText(element, "name");
+  const auto plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  };
+  if (!std::all_of(name.begin(), name.end(), plain)) {
+    refuse(element, "name", "expected letters, digits, _ and - only");
+  }
+  return name;
+}
+
+std::string readUniqueName(const XmlElement& element, std::set<std::string>& taken) {
+  const std::string name = readName(element);
+  if (!taken.insert(name).second) refuse(element, "name", "another <" + element.name + "> has this name");
+  return name;
+}
+
+Eigen::Vector3d readVector(const XmlElement& element, const std::string& attribute, const Eigen::Vector3d& fallback) {
+  const std::vector<double> v = readNumbers(element, attribute, 3);
+  return v.empty() ? fallback : Eigen::Vector3d(v[0], v[1], v[2]);
+}
+
+std::string readPath(const XmlElement& element, const std::string& attribute, const std::string& scenePath) {
+  const std::filesystem::path folder = std::filesystem::path(scenePath).parent_path();
+  return (folder / readText(element, attribute)).lexically_normal().string();
+}
+
+Eigen::Isometry3d readPlacement(const XmlElement& element) {
+  Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
+  const std::vector<double> q = readNumbers(element, "orientation", 4);
+  if (!q.empty()) {
+    const Eigen::Quaterniond orientation(q[0], q[1], q[2], q[3]);
+    // Rounded figures are normalised; anything further off is a mistake rather than rounding.
+    if (!(std::abs(orientation.norm() - 1) <= 1e-3)) {
+      refuse(element, "orientation", "expected a unit quaternion w x y z (length within 1e-3 of 1)");
+    }
+    out.linear() = orientation.normalized().toRotationMatrix();
+  }
+  out.translation() = readVector(element, "position", Eigen::Vector3d::Zero());
+  return out;
+}
+
+void readClock(const XmlElement& clock, Scene& scene) {
+  scene.duration = readNumber(clock, "duration", scene.duration, {0, 86400, true, false});
+  scene.dynamicsRate = readNumber(clock, "dynamics", scene.dynamicsRate, {20, 1200});
+  scene.servoRate = readNumber(clock, "servo", scene.servoRate, {20, 20000});
+  const double ratio = scene.servoRate / scene.dynamicsRate;
+  if (ratio < 1 || std::abs(ratio - std::round(ratio)) > 1e-9 * ratio) {
+    refuse(clock, clock.find("servo") ? "servo" : "dynamics",
+           "expected the servo rate to be a multiple of the dynamics rate");
+  }
+}
+
+void readDynamics(const XmlElement& dynamics, Scene& scene) {
+  readChoice(dynamics, "integrator", {"explicit"}, 0);
+  readChoice(dynamics, "order", {"1"}, 0);
+  scene.gravity = readVector(dynamics, "gravity", scene.gravity);
+  scene.substeps = readInteger(dynamics, "substeps", scene.substeps, {0, 100000});
+}
+
+struct NamedTissue {
+  std::string name;
+  Tissue tissue;
+};
+
+std::vector<NamedTissue> readTissues(const XmlElement& root) {
+  std::vector<NamedTissue> out;
+  std::set<std::string> taken;
+  for (const XmlElement* e : childrenOf(root, "tissue")) {
+    Tissue t;
+    t.young = readNumber(*e, "young", t.young, positive);
+    t.poisson = readNumber(*e, "poisson", t.poisson, {0, 0.5, false, true});
+    t.density = readNumber(*e, "density", t.density, positive);
+    t.damping = readNumber(*e, "damping", t.damping, notNegative);
+    out.push_back({readUniqueName(*e, taken), t});
+  }
+  return out;
+}
+
+Tissue findTissue(const XmlElement& body, const std::vector<NamedTissue>& tissues) {
+  const std::string name = readText(body, "tissue");
+  std::vector<std::string> known;
+  for (const NamedTissue& t : tissues) {
+    if (t.name == name) return t.tissue;
+    known.push_back(t.name);
+  }
+  refuse(body, "tissue", "no <tissue> of this name; did you mean \"" + nearestName(name, known) + "\"?");
+}
+
+std::vector<FixedSphere> readFixedSpheres(const XmlElement& body) {
+  std::vector<FixedSphere> out;
+  std::set<int> taken;
+  for (const XmlElement* fix : childrenOf(body, "fix")) {
+    const bool all = readChoice(*fix, "dof", {"all", "translation"}, 0) == 0;
+    for (const int sphere : readIntegers(*fix, "spheres", 0, notNegative)) {
+      if (!taken.insert(sphere).second) {
+        refuse(*fix, "spheres", "sphere " + std::to_string(sphere) + " is fixed twice");
+      }
+      out.push_back({sphere, all ? FixedFreedom::all : FixedFreedom::translation});
+    }
+  }
+  return out;
+}
+
+LinkFactors readLinkFactors(const XmlElement& links) {
+  LinkFactors out;
+  readChoice(links, "select", {"all"}, 0);
+  out.elongation = readNumber(links, "elongation", out.elongation, positive);
+  out.flexion = readNumber(links, "flexion", out.flexion, positive);
+  out.torsion = readNumber(links, "torsion", out.torsion, positive);
+  return out;
+}
+
+void readBodies(const XmlElement& root, Scene& scene) {
+  const std::vector<NamedTissue> tissues = readTissues(root);
+  std::set<std::string> taken;
+  for (const XmlElement* e : childrenOf(root, "body")) {
+    SceneBody body;
+    body.line = e->line;
+    body.name = readUniqueName(*e, taken);
+    body.modelPath = readPath(*e, "model", scene.path);
+    body.look = readText(*e, "look");
+    body.tissue = findTissue(*e, tissues);
+    readChoice(*e, "links", {"springs"}, 0);
+    body.surface = readChoice(*e, "surface", {"full", "skin"}, 0) == 0 ? SurfaceMode::full : SurfaceMode::skin;
+    body.worldFromModel = readPlacement(*e);
+    body.fixed = readFixedSpheres(*e);
+    body.factors = readLinkFactors(onlyChild(*e, "links"));
+    scene.bodies.push_back(std::move(body));
+  }
+}
+
+void readStatics(const XmlElement& root, Scene& scene) {
+  for (const XmlElement* e : childrenOf(root, "static")) {
+    SceneStatic out;
+    out.line = e->line;
+    readChoice(*e, "shape", {"mesh"}, 0);
+    out.meshPath = readPath(*e, "mesh", scene.path);
+    out.look = readText(*e, "look");
+    const std::vector<std::string> units = {"m", "cm", "mm", "inch"};
+    out.unit = units[readChoice(*e, "unit", units, 0)];
+    out.worldFromMesh = readPlacement(*e);
+    scene.statics.push_back(std::move(out));
+  }
+}
+
+void readTools(const XmlElement& root, Scene& scene) {
+  std::set<std::string> taken;
+  for (const XmlElement* e : childrenOf(root, "tool")) {
+    SceneTool tool;
+    ToolSettings& s = tool.settings;
+    tool.line = e->line;
+    tool.name = readUniqueName(*e, taken);
+    tool.trajectoryPath = readPath(*e, "trajectory", scene.path);
+    s.radius = readNumber(*e, "radius", s.radius, positive);
+    s.stiffness = readNumber(*e, "stiffness", s.stiffness, positive);
+    s.damping = readNumber(*e, "damping", s.damping, notNegative);
+    s.forceMax = readNumber(*e, "force_max", s.forceMax, positive);
+    s.gripRadius = readNumber(*e, "grip_radius", s.gripRadius, positive);
+    const std::vector<double> friction = readNumbers(*e, "friction", 2, notNegative);
+    if (!friction.empty()) {
+      if (friction[0] < friction[1]) refuse(*e, "friction", "expected static >= dynamic friction");
+      s.staticFriction = friction[0];
+      s.dynamicFriction = friction[1];
+    }
+    scene.tools.push_back(std::move(tool));
+  }
+}
+
+// A key says what changes; what it leaves out is the camera's own.
+CameraKey readCameraKey(const XmlElement& e, CameraKey key) {
+  key.line = e.line;
+  key.time = readNumber(e, "t", 0, notNegative);
+  key.position = readVector(e, "position", key.position);
+  key.target = readVector(e, "target", key.target);
+  key.fovDegrees = readNumber(e, "fov", key.fovDegrees, {0, 180, true, true});
+  if (key.position == key.target) refuse(e, "position", "position and target are the same point");
+  return key;
+}
+
+void readCamera(const XmlElement& camera, Scene& scene) {
+  const CameraKey own = readCameraKey(camera, {});
+  for (const XmlElement* e : childrenOf(camera, "key")) {
+    const CameraKey key = readCameraKey(*e, own);
+    if (scene.camera.empty() && key.time > 0) scene.camera.push_back(own);
+    if (!scene.camera.empty() && key.time <= scene.camera.back().time) {
+      refuse(*e, "t", "expected a later time than the key before it");
+    }
+    scene.camera.push_back(key);
+  }
+  if (scene.camera.empty()) scene.camera.push_back(own);
+}
+
+void readLight(const XmlElement& light, Scene& scene) {
+  scene.lightOffset = readVector(light, "offset", scene.lightOffset);
+  scene.lightIntensity = readNumber(light, "intensity", scene.lightIntensity, notNegative);
+  scene.lightReferenceDistance = readNumber(light, "reference_distance", scene.lightReferenceDistance, positive);
+}
+
+void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene) {
+  const std::vector<int> size = readIntegers(output, "size", 2, {16, 8192});
+  if (!size.empty()) {
+    if (size[0] % 2 != 0 || size[1] % 2 != 0) refuse(output, "size", "expected even width and height (the video needs them)");
+    scene.width = size[0];
+    scene.height = size[1];
+  }
+  scene.fps = readNumber(output, "fps", scene.fps, {1, 240});
+  scene.goldenTimes = readNumbers(output, "golden", 0, notNegative);
+  for (std::size_t k = 1; k < scene.goldenTimes.size(); ++k) {
+    if (scene.goldenTimes[k] <= scene.goldenTimes[k - 1]) refuse(output, "golden", "expected increasing times");
+  }
+  // A run cut short from the command line is still a run; a scene file that contradicts itself is a mistake.
+  const bool overridden = durationOverridden && !scene.goldenTimes.empty();
+  if (overridden) std::erase_if(scene.goldenTimes, [&](double t) { return t > scene.duration; });
+  if (!scene.goldenTimes.empty() && scene.goldenTimes.back() > scene.duration) {
+    refuse(output, "golden", "a time beyond the scene's duration");
+  }
+}
+
+}  // namespace
+
+Scene readScene(const std::string& path, const std::vector<SceneOverride>& overrides) {
+  const XmlElement root = readXml(path, sceneRules(), [&](XmlElement& editable) {
+    if (!overrides.empty()) addOptionalSingles(editable);
+    for (const SceneOverride& override : overrides) applyOverride(editable, override);
+  });
+  const bool durationOverridden = std::any_of(overrides.begin(), overrides.end(),
+                                              [](const SceneOverride& o) { return o.path == "clock.duration"; });
+  Scene scene;
+  scene.path = path;
+  scene.name = readName(root);
+  readClock(onlyChild(root, "clock"), scene);
+  readDynamics(onlyChild(root, "dynamics"), scene);
+  readBodies(root, scene);
+  readStatics(root, scene);
+  readTools(root, scene);
+  readCamera(onlyChild(root, "camera"), scene);
+  readLight(onlyChild(root, "light"), scene);
+  readOutput(onlyChild(root, "output"), durationOverridden, scene);
+  return scene;
+}
+
+}  // namespace medulla

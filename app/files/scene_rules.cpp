@@ -1,0 +1,42 @@
+#include "app/files/scene_rules.h"
+
+namespace medulla {
+
+const XmlRules& sceneRules() {
+  constexpr int many = std::numeric_limits<int>::max();
+  static const XmlRules rules = {
+      {"scene",
+       {"name"},
+       {},
+       {{"clock", 1, 1},
+        {"dynamics", 0, 1},
+        {"tissue", 1, many},
+        {"body", 1, many},
+        {"static", 0, many},
+        {"tool", 0, many},
+        {"camera", 1, 1},
+        {"light", 0, 1},
+        {"output", 0, 1}}},
+      {"clock", {"duration"}, {"servo", "dynamics"}, {}},
+      {"dynamics", {}, {"integrator", "order", "gravity", "substeps"}, {}},
+      {"tissue", {"name"}, {"young", "poisson", "density", "damping"}, {}},
+      {"body",
+       {"name", "model", "tissue", "look"},
+       {"position", "orientation", "links", "surface"},
+       {{"fix", 0, many}, {"links", 0, 1}}},
+      {"fix", {"spheres"}, {"dof"}, {}},
+      {"links", {}, {"select", "elongation", "flexion", "torsion"}, {}},
+      {"static", {"shape", "mesh", "look"}, {"position", "orientation", "unit"}, {}},
+      {"tool",
+       {"name", "trajectory"},
+       {"radius", "stiffness", "damping", "friction", "force_max", "grip_radius"},
+       {}},
+      {"camera", {"position", "target"}, {"fov"}, {{"key", 0, many}}},
+      {"key", {"t"}, {"position", "target", "fov"}, {}},
+      {"light", {}, {"offset", "intensity", "reference_distance"}, {}},
+      {"output", {}, {"size", "fps", "golden"}, {}},
+  };
+  return rules;
+}
+
+}  // namespace medulla

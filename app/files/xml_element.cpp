@@ -1,0 +1,289 @@
+#include "app/files/xml_element.h"
+
+#include <tinyxml2.h>
+
+#include <algorithm>
+#include <cassert>
+
+#include "app/files/input_error.h"
+#include "app/files/number_text.h"
+#include "app/files/text_file.h"
+
+namespace medulla {
+
+namespace {
+
+std::string place(const std::string& path, int line) { return path + ":" + std::to_string(line); }
+
+std::runtime_error complaint(const std::string& where, const std::string& message) {
+  return std::runtime_error(where + ": " + message);
+}
+
+// In quotes, fit for one line of a terminal: no control characters and no megabytes.
+std::string quoted(std::string text) {
+  if (text.size() > 60) text = text.substr(0, 57) + "...";
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < ' ') c = ' ';
+  }
+  return '"' + text + '"';
+}
+
+const char* describe(tinyxml2::XMLError error) {
+  switch (error) {
+    case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT: return "an element is not closed where it was opened";
+    case tinyxml2::XML_ERROR_PARSING_ATTRIBUTE: return "an attribute is not of the form name=\"value\"";
+    case tinyxml2::XML_ERROR_PARSING_ELEMENT: return "a tag is not complete";
+    case tinyxml2::XML_ERROR_PARSING_TEXT: return "text that no tag ends";
+    case tinyxml2::XML_ERROR_PARSING_COMMENT: return "a comment without its end -->";
+    case tinyxml2::XML_ERROR_PARSING_CDATA: return "a CDATA section without its end ]]>";
+    case tinyxml2::XML_ERROR_PARSING_DECLARATION: return "a declaration that is misplaced or without its end ?>";
+    case tinyxml2::XML_ERROR_EMPTY_DOCUMENT: return "the file is empty";
+    case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED: return "elements are nested too deeply";
+    default: return tinyxml2::XMLDocument::ErrorIDToName(error);
+  }
+}
+
+void copyText(const std::string& path, const tinyxml2::XMLText& text, XmlElement& out) {
+  const std::string value = text.Value();
+  const std::size_t start = value.find_first_not_of(" \t\r\n");
+  if (start == std::string::npos) return;
+  // Lines of the text are counted from its start, which only holds for one piece.
+  if (!out.text.empty()) {
+    throw inputError(path, text.GetLineNum(), "<" + out.name + ">: text in several pieces, expected one");
+  }
+  out.text = value.substr(start);
+  out.textLine = text.GetLineNum();
+}
+
+XmlElement copyElement(const std::string& path, const tinyxml2::XMLElement& element) {
+  XmlElement out;
+  out.name = element.Name();
+  out.line = element.GetLineNum();
+  out.where = place(path, out.line);
+  for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next()) {
+    if (out.find(a->Name())) {
+      throw inputError(path, a->GetLineNum(), "<" + out.name + "> has the attribute " + quoted(a->Name()) + " twice");
+    }
+    out.attributes.push_back({a->Name(), a->Value(), place(path, a->GetLineNum())});
+  }
+  for (const tinyxml2::XMLNode* n = element.FirstChild(); n; n = n->NextSibling()) {
+    if (const tinyxml2::XMLElement* child = n->ToElement()) out.children.push_back(copyElement(path, *child));
+    if (const tinyxml2::XMLText* text = n->ToText()) copyText(path, *text, out);
+    if (n->ToUnknown()) throw inputError(path, n->GetLineNum(), "<!...> inside an element is not understood");
+  }
+  return out;
+}
+
+XmlElement parseXml(const std::string& path) {
+  const std::string text = readTextFile(path);
+  // The XML library would take a zero byte for the end of the file.
+  if (text.find('\0') != std::string::npos) throw inputError(path, 0, "holds a zero byte, expected XML text");
+  tinyxml2::XMLDocument document;
+  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
+    throw inputError(path, document.ErrorLineNum(), std::string("broken XML: ") + describe(document.ErrorID()));
+  }
+  const tinyxml2::XMLElement* root = document.RootElement();
+  if (!root) throw inputError(path, 0, "broken XML: no element");
+  for (const tinyxml2::XMLNode* n = document.FirstChild(); n; n = n->NextSibling()) {
+    if (n != root && (n->ToElement() || n->ToText())) {
+      throw inputError(path, n->GetLineNum(), "broken XML: more than one element or text at the top");
+    }
+  }
+  return copyElement(path, *root);
+}
+
+std::string suggestion(const std::string& name, const std::vector<std::string>& known) {
+  const std::string nearest = nearestName(name, known);
+  return nearest.empty() ? "; it has none" : "; did you mean " + quoted(nearest) + "?";
+}
+
+void checkAttributes(const XmlElement& element, const XmlRule& rule) {
+  std::vector<std::string> known = rule.required;
+  known.insert(known.end(), rule.optional.begin(), rule.optional.end());
+  for (const XmlAttribute& a : element.attributes) {
+    if (std::find(known.begin(), known.end(), a.name) != known.end()) continue;
+    throw complaint(a.where, "<" + element.name + "> has no attribute " + quoted(a.name) + suggestion(a.name, known));
+  }
+  for (const std::string& name : rule.required) {
+    if (!element.find(name)) throw complaint(element.where, "<" + element.name + "> lacks the attribute " + quoted(name));
+  }
+}
+
+void checkElement(const XmlElement& element, const XmlRules& rules) {
+  const XmlRule& rule = ruleOf(rules, element.name);
+  checkAttributes(element, rule);
+  if (!rule.text && !element.text.empty()) {
+    throw complaint(element.where, "<" + element.name + "> holds text " + quoted(element.text) +
+                                       ", expected none");
+  }
+  std::vector<std::string> known;
+  for (const XmlRule::Child& child : rule.children) known.push_back(child.name);
+  std::vector<int> count(known.size(), 0);
+  for (const XmlElement& child : element.children) {
+    const std::size_t k = std::find(known.begin(), known.end(), child.name) - known.begin();
+    if (k == known.size()) {
+      throw complaint(child.where, "<" + element.name + "> has no child <" + child.name + ">" +
+                                       suggestion(child.name, known));
+    }
+    if (++count[k] > rule.children[k].most) {
+      throw complaint(child.where, "<" + element.name + "> has more than " + std::to_string(rule.children[k].most) +
+                                       " <" + child.name + ">");
+    }
+    checkElement(child, rules);
+  }
+  for (std::size_t k = 0; k < known.size(); ++k) {
+    if (count[k] < rule.children[k].least) {
+      throw complaint(element.where, "<" + element.name + "> lacks a <" + known[k] + ">");
+    }
+  }
+}
+
+std::string describe(Range range) {
+  const bool below = std::isfinite(range.low), above = std::isfinite(range.high);
+  std::string low, high;
+  if (below) appendNumber(low, range.low);
+  if (above) appendNumber(high, range.high);
+  const std::string lower = (range.lowExcluded ? "> " : ">= ") + low, upper = (range.highExcluded ? "< " : "<= ") + high;
+  if (below && above) return " " + lower + " and " + upper;
+  if (below) return " " + lower;
+  if (above) return " " + upper;
+  return "";
+}
+
+bool contains(Range range, double value) {
+  const bool low = range.lowExcluded ? value > range.low : value >= range.low;
+  const bool high = range.highExcluded ? value < range.high : value <= range.high;
+  return low && high;
+}
+
+std::vector<std::string> words(const std::string& text) {
+  const char* space = " \t\r\n";
+  std::vector<std::string> out;
+  for (std::size_t begin = text.find_first_not_of(space); begin != std::string::npos;) {
+    const std::size_t end = std::min(text.find_first_of(space, begin), text.size());
+    out.push_back(text.substr(begin, end - begin));
+    begin = text.find_first_not_of(space, end);
+  }
+  return out;
+}
+
+template <typename T>
+std::vector<T> readList(const XmlElement& element, const std::string& attribute, int count, Range range) {
+  const XmlAttribute* a = element.find(attribute);
+  if (!a) return {};
+  const std::vector<std::string> texts = words(a->value);
+  const std::string kind = std::is_integral_v<T> ? "integer" : "number";
+  const std::string expected = "expected " + (count == 0 ? "one or more" : std::to_string(count)) + " " + kind +
+                               (count == 1 ? "" : "s") + describe(range);
+  if (count == 0 ? texts.empty() : texts.size() != static_cast<std::size_t>(count)) {
+    refuse(element, attribute, expected);
+  }
+  std::vector<T> values;
+  for (const std::string& text : texts) {
+    const std::optional<T> value = parseNumber<T>(text);
+    if (!value || !contains(range, *value)) refuse(element, attribute, expected);
+    values.push_back(*value);
+  }
+  return values;
+}
+
+}  // namespace
+
+const XmlAttribute* XmlElement::find(const std::string& attribute) const {
+  for (const XmlAttribute& a : attributes) {
+    if (a.name == attribute) return &a;
+  }
+  return nullptr;
+}
+
+XmlElement readXml(const std::string& path, const XmlRules& rules, const std::function<void(XmlElement&)>& edit) {
+  XmlElement root = parseXml(path);
+  const std::string& expected = rules.front().element;
+  if (root.name != expected) {
+    throw complaint(root.where, "the root element is <" + root.name + ">, expected <" + expected + ">");
+  }
+  if (edit) edit(root);
+  checkElement(root, rules);
+  return root;
+}
+
+const XmlRule& ruleOf(const XmlRules& rules, const std::string& element) {
+  const auto rule = std::find_if(rules.begin(), rules.end(), [&](const XmlRule& r) { return r.element == element; });
+  assert(rule != rules.end());
+  return *rule;
+}
+
+std::string nearestName(const std::string& name, const std::vector<std::string>& known) {
+  // Optimal string alignment distance, row by row.
+  const auto distance = [](const std::string& a, const std::string& b) {
+    std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+    for (std::size_t i = 0; i <= a.size(); ++i) {
+      for (std::size_t j = 0; j <= b.size(); ++j) {
+        if (i == 0 || j == 0) {
+          d[i][j] = i + j;
+          continue;
+        }
+        d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
+        const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+        if (swapped) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+      }
+    }
+    return d[a.size()][b.size()];
+  };
+  const std::string wanted = name.substr(0, 200);  // nobody mistypes more; the table is quadratic
+  std::string best;
+  std::size_t fewest = std::numeric_limits<std::size_t>::max();
+  for (const std::string& candidate : known) {
+    const std::size_t edits = distance(wanted, candidate);
+    if (edits < fewest) {
+      fewest = edits;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+void refuse(const XmlElement& element, const std::string& attribute, const std::string& message) {
+  const XmlAttribute* a = element.find(attribute);
+  if (!a) throw complaint(element.where, "<" + element.name + ">: " + message);
+  throw complaint(a->where, "<" + element.name + "> " + attribute + "=" + quoted(a->value) + ": " + message);
+}
+
+double readNumber(const XmlElement& element, const std::string& attribute, double fallback, Range range) {
+  const std::vector<double> values = readNumbers(element, attribute, 1, range);
+  return values.empty() ? fallback : values[0];
+}
+
+int readInteger(const XmlElement& element, const std::string& attribute, int fallback, Range range) {
+  const std::vector<int> values = readIntegers(element, attribute, 1, range);
+  return values.empty() ? fallback : values[0];
+}
+
+std::vector<double> readNumbers(const XmlElement& element, const std::string& attribute, int count, Range range) {
+  return readList<double>(element, attribute, count, range);
+}
+
+std::vector<int> readIntegers(const XmlElement& element, const std::string& attribute, int count, Range range) {
+  return readList<int>(element, attribute, count, range);
+}
+
+std::string readText(const XmlElement& element, const std::string& attribute, const std::string& fallback) {
+  const XmlAttribute* a = element.find(attribute);
+  if (!a) return fallback;
+  if (a->value.empty()) refuse(element, attribute, "is empty");
+  return a->value;
+}
+
+int readChoice(const XmlElement& element, const std::string& attribute, const std::vector<std::string>& known,
+               int fallback) {
+  const XmlAttribute* a = element.find(attribute);
+  if (!a) return fallback;
+  for (std::size_t k = 0; k < known.size(); ++k) {
+    if (a->value == known[k]) return static_cast<int>(k);
+  }
+  std::string list;
+  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + quoted(name);
+  refuse(element, attribute, "unknown value; known: " + list);
+}
+
+}  // namespace medulla

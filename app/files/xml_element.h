@@ -1,0 +1,78 @@
+#pragma once
+
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+// Strict reading of XML, shared by scene and model: a tree of plain values, a table of what may stand where, and
+// attribute readers that complain with the place. Nothing of the XML library shows here.
+namespace medulla {
+
+struct XmlAttribute {
+  std::string name, value;
+  std::string where;  // what a complaint starts with: "FILE:LINE", or "--set PATH" for a value from the command line
+};
+
+struct XmlElement {
+  std::string name;
+  std::string where;  // "FILE:LINE"
+  int line = 0;
+  std::vector<XmlAttribute> attributes;
+  std::vector<XmlElement> children;
+  std::string text;  // from its first character that is not white space
+  int textLine = 0;
+
+  const XmlAttribute* find(const std::string& attribute) const;  // nullptr where absent
+};
+
+// What may stand in an element. Elements are known by name alone: the same name means the same thing everywhere.
+struct XmlRule {
+  struct Child {
+    std::string name;
+    int least = 0, most = std::numeric_limits<int>::max();
+  };
+  std::string element;
+  std::vector<std::string> required, optional;  // attributes
+  std::vector<Child> children;
+  bool text = false;  // holds text of its own
+};
+using XmlRules = std::vector<XmlRule>;  // the first is the root's; every child named in it has its own
+
+// Reads a file and holds it against the rules. Throws std::runtime_error "FILE:LINE: ..." on broken XML, another root,
+// unknown (naming the nearest known one), repeated, missing or stray attributes, elements and text. `edit`, if given,
+// may change the tree before it is held against the rules.
+XmlElement readXml(const std::string& path, const XmlRules& rules, const std::function<void(XmlElement&)>& edit = {});
+
+const XmlRule& ruleOf(const XmlRules& rules, const std::string& element);  // asserts that there is one
+
+// The known name with the fewest edits (insert, delete, replace, swap neighbours), the first among equals; "" of none.
+std::string nearestName(const std::string& name, const std::vector<std::string>& known);
+
+// An interval that a value must lie in.
+struct Range {
+  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+  bool lowExcluded = false, highExcluded = false;
+};
+inline constexpr Range anyNumber{};
+inline constexpr Range positive{0, std::numeric_limits<double>::infinity(), true, false};
+inline constexpr Range notNegative{0};
+
+// Complaint about one attribute: "WHERE: <element> name="value": message".
+[[noreturn]] void refuse(const XmlElement& element, const std::string& attribute, const std::string& message);
+
+// Attribute readers: `fallback` where the attribute is absent. Numbers are finite and within `range`; lists are
+// separated by white space. All throw std::runtime_error through refuse().
+double readNumber(const XmlElement& element, const std::string& attribute, double fallback, Range range = anyNumber);
+int readInteger(const XmlElement& element, const std::string& attribute, int fallback, Range range = anyNumber);
+// `count` numbers, or one and more for a count of 0; empty where the attribute is absent.
+std::vector<double> readNumbers(const XmlElement& element, const std::string& attribute, int count,
+                                Range range = anyNumber);
+std::vector<int> readIntegers(const XmlElement& element, const std::string& attribute, int count,
+                              Range range = anyNumber);
+std::string readText(const XmlElement& element, const std::string& attribute, const std::string& fallback = "");
+// Index into `known`.
+int readChoice(const XmlElement& element, const std::string& attribute, const std::vector<std::string>& known,
+               int fallback);
+
+}  // namespace medulla
