@@ -1,5 +1,7 @@
 #include "app/command_line.h"
 
 namespace medulla {
-int runCommandLine(int, char**) { return 2; }
+int runCommandLine(int, char**) {
+  return 2;
+}
 }  // namespace medulla

@@ -52,13 +52,13 @@ struct Scene {
   std::vector<SceneBody> bodies;
   std::vector<SceneStatic> statics;
   std::vector<SceneTool> tools;
-  std::vector<CameraKey> camera;  // at least one, strictly increasing time, the first at 0
-  double lightIntensity = 1;             // >= 0
-  double lightReferenceDistance = 0.15;  // m, > 0; where intensity 1 exposes a surface fully
+  std::vector<CameraKey> camera;                 // at least one, strictly increasing time, the first at 0
+  double lightIntensity = 1;                     // >= 0
+  double lightReferenceDistance = 0.15;          // m, > 0; where intensity 1 exposes a surface fully
   Eigen::Vector3d lightOffset{0.012, 0.012, 0};  // m, in the camera's frame
-  int width = 1280, height = 720;   // 16 to 8192, even
-  double fps = 30;                  // 1 to 240
-  std::vector<double> goldenTimes;  // s, strictly increasing, within 0 to duration
+  int width = 1280, height = 720;                // 16 to 8192, even
+  double fps = 30;                               // 1 to 240
+  std::vector<double> goldenTimes;               // s, strictly increasing, within 0 to duration
 };
 
 // `--set PATH=VALUE`: replaces one attribute before the scene is interpreted, e.g. body.gallbladder.surface=skin,

@@ -1,32 +1,32 @@
 #include "app/files/model_file.h"
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <cassert>
 #include <string_view>
 
 #include "app/files/input_error.h"
-#include "app/files/model_check.h"
 #include "app/files/number_text.h"
 #include "app/files/output_file.h"
 #include "app/files/xml_element.h"
+#include "physics/model/mesh_topology.h"
 
-// The arrays of a model in the order of SoftBodyModel, one element each, one row of numbers per entry and line. Writer
-// and reader stand side by side, so that their columns can be compared.
+// The arrays of a model, one element each, one line of numbers per entry. The columns are those of the structs in
+// physics/model/soft_body_model.h, in their order; matrices column by column; lists of differing length start with it.
 namespace medulla {
 
 namespace {
 
-constexpr const char* formatVersion = "1";
+constexpr int formatVersion = 1;
 
 const XmlRules& modelRules() {
   static const XmlRules rules = [] {
-    const std::vector<std::string> arrays = {"input_vertices", "nodes",          "triangles",      "edges",
-                                             "spheres",        "links",          "attachments",    "buckets",
-                                             "skeleton_nodes", "skeleton_links", "render_vertices", "render_stencils",
-                                             "render_triangles"};
     XmlRules out = {{"model", {"version", "name", "mesh_hash", "settings"}, {}, {}}};
-    for (const std::string& name : arrays) {
-      out.front().children.push_back({name, 1, 1});
-      out.push_back({name, {"rows"}, {}, {}, true});
+    for (const char* array :
+         {"input_vertices", "nodes", "triangles", "edges", "spheres", "links", "attachments", "buckets",
+          "skeleton_nodes", "skeleton_links", "render_vertices", "render_stencils", "render_triangles"}) {
+      out.front().children.push_back({array, 1, 1});
+      out.push_back({array, {"rows"}, {}, {}, true});
     }
     return out;
   }();
@@ -39,34 +39,52 @@ std::string escaped(const std::string& text) {
   std::string out;
   for (const char c : text) {
     switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      case '\n': out += "&#10;"; break;
-      case '\r': out += "&#13;"; break;
-      case '\t': out += "&#9;"; break;
-      default: out += c;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
     }
   }
   return out;
 }
 
+std::string hexadecimal(std::uint64_t value) {
+  char digits[17];
+  std::snprintf(digits, sizeof(digits), "%016llx", static_cast<unsigned long long>(value));
+  return digits;
+}
+
+// Appends numbers, vectors and arrays to the line that `out` ends with.
 template <typename T>
-void put(std::string& row, const T& value) {
+void putValue(std::string& out, const T& value) {
   if constexpr (std::is_arithmetic_v<T>) {
-    if (row.back() != '\n') row += ' ';
-    appendNumber(row, value);
-  } else if constexpr (requires { value.data(); }) {  // Eigen and std::array, column by column
-    for (long k = 0; k < static_cast<long>(value.size()); ++k) put(row, value.data()[k]);
+    if (out.back() != '\n') out += ' ';
+    appendNumber(out, value);
+  } else {
+    for (long k = 0; k < static_cast<long>(value.size()); ++k) putValue(out, value.data()[k]);
   }
 }
 
+template <typename... T>
+void put(std::string& out, const T&... values) {
+  (putValue(out, values), ...);
+}
+
 template <typename Row>
-void putArray(std::string& out, const char* name, std::size_t rows, const Row& row) {
+void putRows(std::string& out, const char* name, std::size_t rows, const Row& putRow) {
   out += std::string("  <") + name + " rows=\"" + std::to_string(rows) + "\">\n";
   for (std::size_t k = 0; k < rows; ++k) {
-    row(k);
+    putRow(k);
     out += '\n';
   }
   out += std::string("  </") + name + ">\n";
@@ -74,38 +92,34 @@ void putArray(std::string& out, const char* name, std::size_t rows, const Row& r
 
 template <typename T>
 void putArray(std::string& out, const char* name, const std::vector<T>& values) {
-  putArray(out, name, values.size(), [&](std::size_t k) { put(out, values[k]); });
+  putRows(out, name, values.size(), [&](std::size_t k) { put(out, values[k]); });
 }
 
-void putSkeletonOfSpheres(std::string& out, const SoftBodyModel& model) {
-  putArray(out, "spheres", model.spheres.size(), [&](std::size_t k) {
+void putVolumeModel(std::string& out, const SoftBodyModel& model) {
+  putRows(out, "spheres", model.spheres.size(), [&](std::size_t k) {
     const FillingSphere& s = model.spheres[k];
-    put(out, s.restBallCentre), put(out, s.radius), put(out, s.restFrame), put(out, s.volume), put(out, s.secondMoment);
+    put(out, s.restBallCentre, s.radius, s.restFrame, s.volume, s.secondMoment);
   });
-  putArray(out, "links", model.links.size(), [&](std::size_t k) {
+  putRows(out, "links", model.links.size(), [&](std::size_t k) {
     const ElasticLink& l = model.links[k];
-    put(out, l.sphere0), put(out, l.sphere1), put(out, l.area), put(out, l.bendingMomentU);
-    put(out, l.bendingMomentV), put(out, l.torsionConstant), put(out, l.restU);
+    put(out, l.sphere0, l.sphere1, l.area, l.bendingMomentU, l.bendingMomentV, l.torsionConstant, l.restU);
   });
-  putArray(out, "attachments", model.attachments.size(), [&](std::size_t k) {
+  putRows(out, "attachments", model.attachments.size(), [&](std::size_t k) {
     const Attachment& a = model.attachments[k];
-    put(out, static_cast<int>(a.onLink)), put(out, a.host), put(out, a.along), put(out, a.restOffset);
-    put(out, a.area), put(out, a.volume);
+    put(out, a.onLink ? 1 : 0, a.host, a.along, a.restOffset, a.area, a.volume);
   });
-  putArray(out, "buckets", model.buckets.size(), [&](std::size_t k) {
-    put(out, static_cast<int>(model.buckets[k].size()));
-    for (const int triangle : model.buckets[k]) put(out, triangle);
-  });
+  putRows(out, "buckets", model.buckets.size(),
+          [&](std::size_t k) { put(out, static_cast<int>(model.buckets[k].size()), model.buckets[k]); });
 }
 
-void putRenderSurface(std::string& out, const RenderSurface& surface) {
-  putArray(out, "render_vertices", surface.restPosition.size(), [&](std::size_t k) {
-    put(out, surface.first[k + 1] - surface.first[k]), put(out, surface.offset[k]), put(out, surface.restPosition[k]);
-  });
-  putArray(out, "render_stencils", surface.node.size(), [&](std::size_t k) {
-    put(out, surface.node[k]), put(out, surface.weight[k]), put(out, surface.tangent0[k]), put(out, surface.tangent1[k]);
-  });
-  putArray(out, "render_triangles", surface.triangles);
+void putRenderSurface(std::string& out, const RenderSurface& s) {
+  const std::size_t vertices = s.restPosition.size();
+  assert(s.first.size() == vertices + 1 && s.offset.size() == vertices);
+  putRows(out, "render_vertices", vertices,
+          [&](std::size_t k) { put(out, s.first[k + 1] - s.first[k], s.offset[k], s.restPosition[k]); });
+  putRows(out, "render_stencils", s.node.size(),
+          [&](std::size_t k) { put(out, s.node[k], s.weight[k], s.tangent0[k], s.tangent1[k]); });
+  putArray(out, "render_triangles", s.triangles);
 }
 
 // ---- reading ----
@@ -113,25 +127,27 @@ void putRenderSurface(std::string& out, const RenderSurface& surface) {
 // The numbers of one element's text in order, row by row, with the line for complaints.
 class Rows {
  public:
-  Rows(const std::string& path, const XmlElement& element)
-      : path_(path), element_(element), rest_(element.text), line_(element.textLine) {
-    rows_ = readInteger(element, "rows", 0, notNegative);
+  Rows(const std::string& path, const XmlElement& root, const std::string& name)
+      : path_(path), element_(*std::find_if(root.children.begin(), root.children.end(), [&](const XmlElement& e) {
+          return e.name == name;
+        })) {
+    rest_ = element_.text;
+    line_ = std::max(element_.textLine, element_.line);
+    rows_ = readInteger(element_, "rows", 0, notNegative);
   }
 
-  // Calls row(k) for every row; afterwards nothing may be left.
+  // Calls readRow() for every row; afterwards no text may be left.
   template <typename Row>
-  void read(const Row& row) {
-    for (int k = 0; k < rows_; ++k) row(k);
-    if (skipSpace(), !rest_.empty()) fail("expected " + std::to_string(rows_) + " rows and no more");
+  void forEach(const Row& readRow) {
+    for (int k = 0; k < rows_; ++k) readRow();
+    skipSpace();
+    require(rest_.empty(), "more numbers than its rows hold");
   }
 
-  template <typename T>
-  void get(T& value) {
-    if constexpr (std::is_arithmetic_v<T>) {
-      value = next<T>();
-    } else {
-      for (long k = 0; k < static_cast<long>(value.size()); ++k) get(value.data()[k]);
-    }
+  // Fills numbers, vectors and arrays of fixed size.
+  template <typename... T>
+  void get(T&... values) {
+    (getValue(values), ...);
   }
 
   int index(std::size_t size, int lowest = 0) {
@@ -140,48 +156,208 @@ class Rows {
     return value;
   }
 
+  template <std::size_t N>
+  std::array<int, N> indices(std::size_t size) {
+    std::array<int, N> out;
+    for (int& i : out) i = index(size);
+    for (std::size_t k = 0; k < N; ++k) require(out[k] != out[(k + 1) % N], "the same index twice");
+    return out;
+  }
+
   void require(bool condition, const char* message) const {
-    if (!condition) fail(message);
+    if (!condition) throw inputError(path_, line_, "<" + element_.name + ">: " + message);
   }
 
  private:
   void skipSpace() {
     std::size_t k = 0;
-    for (; k < rest_.size() && (rest_[k] == ' ' || rest_[k] == '\n' || rest_[k] == '\t' || rest_[k] == '\r'); ++k) {
+    for (; k < rest_.size() && (rest_[k] == ' ' || rest_[k] == '\n' || rest_[k] == '\t'); ++k)
       line_ += rest_[k] == '\n';
-    }
     rest_.remove_prefix(k);
   }
 
   template <typename T>
   T next() {
     skipSpace();
-    const std::size_t length = std::min(rest_.find_first_of(" \n\t\r"), rest_.size());
-    if (length == 0) fail("the text ends early, expected " + std::to_string(rows_) + " rows");
+    const std::size_t length = std::min(rest_.find_first_of(" \n\t"), rest_.size());
+    require(length > 0, "fewer numbers than its rows hold");
     const std::optional<T> value = parseNumber<T>(rest_.substr(0, length));
-    if (!value) fail(std::is_integral_v<T> ? "expected an integer" : "expected a finite number");
+    require(value.has_value(), std::is_integral_v<T> ? "expected an integer" : "expected a finite number");
     rest_.remove_prefix(length);
     return *value;
   }
 
-  [[noreturn]] void fail(const std::string& message) const {
-    throw inputError(path_, std::max(line_, element_.line), "<" + element_.name + ">: " + message);
+  template <typename T>
+  void getValue(T& value) {
+    if constexpr (std::is_arithmetic_v<T>) {
+      value = next<T>();
+    } else {
+      for (long k = 0; k < static_cast<long>(value.size()); ++k) getValue(value.data()[k]);
+    }
   }
 
   const std::string& path_;
   const XmlElement& element_;
   std::string_view rest_;
-  int line_;
-  int rows_;
+  int line_ = 0, rows_ = 0;
 };
 
-template <typename T>
-std::vector<T> readArray(Rows rows) {
-  std::vector<T> out;
-  rows.read([&](int) { rows.get(out.emplace_back()); });
-  return out;
+std::uint64_t readMeshHash(const XmlElement& root) {
+  const std::string text = readText(root, "mesh_hash");
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+  if (error != std::errc() || end != text.data() + text.size() || text.size() != 16) {
+    refuse(root, "mesh_hash", "expected 16 hexadecimal digits");
+  }
+  return value;
+}
+
+void readSurface(const std::string& path, const XmlElement& root, SoftBodyModel& model) {
+  Rows nodes(path, root, "nodes");
+  nodes.forEach([&] { nodes.get(model.restNodes.emplace_back()); });
+  const std::size_t count = model.restNodes.size();
+  Rows inputs(path, root, "input_vertices");
+  inputs.forEach([&] { model.nodeOfInputVertex.push_back(inputs.index(count, -1)); });
+
+  Rows triangles(path, root, "triangles");
+  triangles.forEach([&] { model.triangles.push_back(triangles.indices<3>(count)); });
+  triangles.require(!model.triangles.empty(), "expected a closed surface");
+  const TriangleMesh mesh{model.restNodes, model.triangles};
+  for (const std::array<int, 3>& across : adjacentTriangles(mesh)) {
+    for (const int triangle : across) triangles.require(triangle >= 0, "the surface is not closed");
+  }
+  Rows edges(path, root, "edges");
+  edges.forEach([&] { model.edges.push_back(edges.indices<2>(count)); });
+  edges.require(model.edges == uniqueEdges(mesh), "not the edges of the triangles, lower node first, sorted");
+}
+
+void readSpheres(const std::string& path, const XmlElement& root, SoftBodyModel& model) {
+  Rows rows(path, root, "spheres");
+  rows.forEach([&] {
+    FillingSphere& s = model.spheres.emplace_back();
+    rows.get(s.restBallCentre, s.radius, s.restFrame, s.volume, s.secondMoment);
+    rows.require(s.radius > 0, "a radius that is not positive");
+    rows.require(s.volume > 0, "a volume that is not positive");
+    rows.require(s.secondMoment.isApprox(s.secondMoment.transpose(), 1e-9), "a second moment that is not symmetric");
+    rows.require(s.secondMoment.llt().info() == Eigen::Success, "a second moment that is not positive definite");
+  });
+  rows.require(!model.spheres.empty(), "expected at least one sphere");
+}
+
+void readLinks(const std::string& path, const XmlElement& root, SoftBodyModel& model) {
+  Rows rows(path, root, "links");
+  rows.forEach([&] {
+    ElasticLink& l = model.links.emplace_back();
+    l.sphere0 = rows.index(model.spheres.size());
+    l.sphere1 = rows.index(model.spheres.size());
+    rows.get(l.area, l.bendingMomentU, l.bendingMomentV, l.torsionConstant, l.restU);
+    const Eigen::Vector3d line = model.spheres[l.sphere1].restFrame - model.spheres[l.sphere0].restFrame;
+    rows.require(line.norm() > 0, "a link without length");
+    rows.require(l.area > 0, "an area that is not positive");
+    rows.require(l.bendingMomentU > 0 && l.bendingMomentV > 0, "a bending moment that is not positive");
+    rows.require(l.torsionConstant > 0, "a torsion constant that is not positive");
+    // Computed in double and written exactly, so only rounding separates them from the ideal.
+    rows.require(std::abs(l.restU.norm() - 1) <= 1e-9, "a restU that is not a unit vector");
+    rows.require(std::abs(l.restU.dot(line)) <= 1e-6 * line.norm(), "a restU that is not perpendicular to its link");
+  });
+}
+
+void readAttachments(const std::string& path, const XmlElement& root, SoftBodyModel& model) {
+  Rows rows(path, root, "attachments");
+  rows.forEach([&] {
+    Attachment& a = model.attachments.emplace_back();
+    a.onLink = rows.index(2) == 1;
+    a.host = rows.index(a.onLink ? model.links.size() : model.spheres.size());
+    rows.get(a.along, a.restOffset, a.area, a.volume);
+    rows.require(a.along >= 0 && a.along <= (a.onLink ? 1 : 0), "a position along its host outside 0 to 1 (sphere: 0)");
+    rows.require(a.area >= 0 && a.volume >= 0, "a negative area or volume");
+  });
+  rows.require(model.attachments.size() == model.restNodes.size(), "expected one attachment per node");
+}
+
+void readBuckets(const std::string& path, const XmlElement& root, SoftBodyModel& model) {
+  Rows rows(path, root, "buckets");
+  std::vector<bool> taken(model.triangles.size(), false);
+  std::size_t total = 0;
+  rows.forEach([&] {
+    std::vector<int>& bucket = model.buckets.emplace_back();
+    const int size = rows.index(model.triangles.size() + 1);
+    for (int k = 0; k < size; ++k) {
+      const int triangle = bucket.emplace_back(rows.index(model.triangles.size()));
+      rows.require(!taken[triangle], "a triangle in two buckets");
+      taken[triangle] = true;
+      ++total;
+    }
+  });
+  rows.require(model.buckets.size() == model.spheres.size(), "expected one bucket per sphere");
+  rows.require(total == model.triangles.size(), "a triangle in no bucket");
+}
+
+void readSkeleton(const std::string& path, const XmlElement& root, Skeleton& skeleton) {
+  Rows nodes(path, root, "skeleton_nodes");
+  nodes.forEach([&] { nodes.get(skeleton.nodes.emplace_back()); });
+  Rows links(path, root, "skeleton_links");
+  links.forEach([&] { skeleton.links.push_back(links.indices<2>(skeleton.nodes.size())); });
+}
+
+void readRenderSurface(const std::string& path, const XmlElement& root, std::size_t nodes, RenderSurface& s) {
+  Rows stencils(path, root, "render_stencils");
+  stencils.forEach([&] {
+    s.node.push_back(stencils.index(nodes));
+    stencils.get(s.weight.emplace_back(), s.tangent0.emplace_back(), s.tangent1.emplace_back());
+  });
+  Rows vertices(path, root, "render_vertices");
+  s.first = {0};
+  vertices.forEach([&] {
+    const int size = vertices.index(s.node.size() - s.first.back() + 1, 1);
+    s.first.push_back(s.first.back() + size);
+    vertices.get(s.offset.emplace_back(), s.restPosition.emplace_back());
+  });
+  vertices.require(s.first.back() == static_cast<long>(s.node.size()),
+                   "stencil sizes that do not add up to the rows of <render_stencils>");
+  Rows triangles(path, root, "render_triangles");
+  triangles.forEach([&] { s.triangles.push_back(triangles.indices<3>(s.restPosition.size())); });
 }
 
 }  // namespace
+
+void writeModel(const std::string& path, const SoftBodyModel& model) {
+  OutputFile file(path);
+  std::string out = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
+  out += "<model version=\"" + std::to_string(formatVersion) + "\" name=\"" + escaped(model.name) + "\" mesh_hash=\"" +
+         hexadecimal(model.meshHash) + "\" settings=\"" + escaped(model.settings) + "\">\n";
+  putArray(out, "input_vertices", model.nodeOfInputVertex);
+  putArray(out, "nodes", model.restNodes);
+  putArray(out, "triangles", model.triangles);
+  putArray(out, "edges", model.edges);
+  putVolumeModel(out, model);
+  putArray(out, "skeleton_nodes", model.skeleton.nodes);
+  putArray(out, "skeleton_links", model.skeleton.links);
+  putRenderSurface(out, model.renderSurface);
+  file.write(out + "</model>\n");
+  file.commit();
+}
+
+SoftBodyModel readModel(const std::string& path) {
+  // Another version may have other elements: it is the first thing to be told.
+  const auto checkVersion = [](const XmlElement& root) {
+    const int version = readInteger(root, "version", formatVersion);
+    if (version == formatVersion) return;
+    refuse(root, "version", "expected " + std::to_string(formatVersion) + "; make the model anew with medulla build");
+  };
+  const XmlElement root = readXml(path, modelRules(), checkVersion);
+  SoftBodyModel model;
+  model.name = root.find("name")->value;
+  model.meshHash = readMeshHash(root);
+  model.settings = root.find("settings")->value;
+  readSurface(path, root, model);
+  readSpheres(path, root, model);
+  readLinks(path, root, model);
+  readAttachments(path, root, model);
+  readBuckets(path, root, model);
+  readSkeleton(path, root, model.skeleton);
+  readRenderSurface(path, root, model.restNodes.size(), model.renderSurface);
+  return model;
+}
 
 }  // namespace medulla

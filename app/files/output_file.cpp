@@ -21,8 +21,8 @@ static std::runtime_error systemError(const std::string& path, const std::string
 static std::string resolveTarget(const std::string& path) {
   if (path.empty() || path.back() == '/') throw inputError(path, 0, "expected the name of a file to write");
   std::error_code error;
-  const std::filesystem::path target =
-      std::filesystem::is_symlink(path, error) ? std::filesystem::weakly_canonical(path, error) : path;
+  const bool link = std::filesystem::is_symlink(path, error);
+  const std::string target = link ? std::filesystem::weakly_canonical(path, error).string() : path;
   struct stat status {};
   if (::stat(target.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) throw inputError(path, 0, "is a folder, expected the name of a file to write");

@@ -287,7 +287,8 @@ void readLight(const XmlElement& light, Scene& scene) {
 void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene) {
   const std::vector<int> size = readIntegers(output, "size", 2, {16, 8192});
   if (!size.empty()) {
-    if (size[0] % 2 != 0 || size[1] % 2 != 0) refuse(output, "size", "expected even width and height (the video needs them)");
+    if (size[0] % 2 != 0 || size[1] % 2 != 0)
+      refuse(output, "size", "expected even width and height (the video needs them)");
     scene.width = size[0];
     scene.height = size[1];
   }

@@ -13,7 +13,9 @@ namespace medulla {
 
 namespace {
 
-std::string place(const std::string& path, int line) { return path + ":" + std::to_string(line); }
+std::string place(const std::string& path, int line) {
+  return path + ":" + std::to_string(line);
+}
 
 std::runtime_error complaint(const std::string& where, const std::string& message) {
   return std::runtime_error(where + ": " + message);
@@ -30,16 +32,26 @@ std::string quoted(std::string text) {
 
 const char* describe(tinyxml2::XMLError error) {
   switch (error) {
-    case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT: return "an element is not closed where it was opened";
-    case tinyxml2::XML_ERROR_PARSING_ATTRIBUTE: return "an attribute is not of the form name=\"value\"";
-    case tinyxml2::XML_ERROR_PARSING_ELEMENT: return "a tag is not complete";
-    case tinyxml2::XML_ERROR_PARSING_TEXT: return "text that no tag ends";
-    case tinyxml2::XML_ERROR_PARSING_COMMENT: return "a comment without its end -->";
-    case tinyxml2::XML_ERROR_PARSING_CDATA: return "a CDATA section without its end ]]>";
-    case tinyxml2::XML_ERROR_PARSING_DECLARATION: return "a declaration that is misplaced or without its end ?>";
-    case tinyxml2::XML_ERROR_EMPTY_DOCUMENT: return "the file is empty";
-    case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED: return "elements are nested too deeply";
-    default: return tinyxml2::XMLDocument::ErrorIDToName(error);
+    case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT:
+      return "an element is not closed where it was opened";
+    case tinyxml2::XML_ERROR_PARSING_ATTRIBUTE:
+      return "an attribute is not of the form name=\"value\"";
+    case tinyxml2::XML_ERROR_PARSING_ELEMENT:
+      return "a tag is not complete";
+    case tinyxml2::XML_ERROR_PARSING_TEXT:
+      return "text that no tag ends";
+    case tinyxml2::XML_ERROR_PARSING_COMMENT:
+      return "a comment without its end -->";
+    case tinyxml2::XML_ERROR_PARSING_CDATA:
+      return "a CDATA section without its end ]]>";
+    case tinyxml2::XML_ERROR_PARSING_DECLARATION:
+      return "a declaration that is misplaced or without its end ?>";
+    case tinyxml2::XML_ERROR_EMPTY_DOCUMENT:
+      return "the file is empty";
+    case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED:
+      return "elements are nested too deeply";
+    default:
+      return tinyxml2::XMLDocument::ErrorIDToName(error);
   }
 }
 
@@ -105,7 +117,8 @@ void checkAttributes(const XmlElement& element, const XmlRule& rule) {
     throw complaint(a.where, "<" + element.name + "> has no attribute " + quoted(a.name) + suggestion(a.name, known));
   }
   for (const std::string& name : rule.required) {
-    if (!element.find(name)) throw complaint(element.where, "<" + element.name + "> lacks the attribute " + quoted(name));
+    if (!element.find(name))
+      throw complaint(element.where, "<" + element.name + "> lacks the attribute " + quoted(name));
   }
 }
 
@@ -113,8 +126,7 @@ void checkElement(const XmlElement& element, const XmlRules& rules) {
   const XmlRule& rule = ruleOf(rules, element.name);
   checkAttributes(element, rule);
   if (!rule.text && !element.text.empty()) {
-    throw complaint(element.where, "<" + element.name + "> holds text " + quoted(element.text) +
-                                       ", expected none");
+    throw complaint(element.where, "<" + element.name + "> holds text " + quoted(element.text) + ", expected none");
   }
   std::vector<std::string> known;
   for (const XmlRule::Child& child : rule.children) known.push_back(child.name);
@@ -122,8 +134,8 @@ void checkElement(const XmlElement& element, const XmlRules& rules) {
   for (const XmlElement& child : element.children) {
     const std::size_t k = std::find(known.begin(), known.end(), child.name) - known.begin();
     if (k == known.size()) {
-      throw complaint(child.where, "<" + element.name + "> has no child <" + child.name + ">" +
-                                       suggestion(child.name, known));
+      throw complaint(child.where,
+                      "<" + element.name + "> has no child <" + child.name + ">" + suggestion(child.name, known));
     }
     if (++count[k] > rule.children[k].most) {
       throw complaint(child.where, "<" + element.name + "> has more than " + std::to_string(rule.children[k].most) +
@@ -143,7 +155,8 @@ std::string describe(Range range) {
   std::string low, high;
   if (below) appendNumber(low, range.low);
   if (above) appendNumber(high, range.high);
-  const std::string lower = (range.lowExcluded ? "> " : ">= ") + low, upper = (range.highExcluded ? "< " : "<= ") + high;
+  const std::string lower = (range.lowExcluded ? "> " : ">= ") + low,
+                    upper = (range.highExcluded ? "< " : "<= ") + high;
   if (below && above) return " " + lower + " and " + upper;
   if (below) return " " + lower;
   if (above) return " " + upper;

@@ -1,0 +1,48 @@
+#include "app/files/report_file.h"
+
+#include "app/files/number_text.h"
+#include "app/files/output_file.h"
+
+namespace medulla {
+
+namespace {
+
+template <typename T>
+std::string numberText(T value) {
+  std::string text;
+  appendNumber(text, value);
+  return text;
+}
+
+}  // namespace
+
+std::vector<Result> buildResults(const BuildReport& r) {
+  return {{"triangles", numberText(r.triangles), ""},
+          {"skeleton_nodes", numberText(r.skeletonNodes), ""},
+          {"skeleton_links", numberText(r.skeletonLinks), ""},
+          {"spheres", numberText(r.spheres), ""},
+          {"links", numberText(r.links), ""},
+          {"gap_max", numberText(r.gapMax), "%"},
+          {"gap_mean", numberText(r.gapMean), "%"},
+          {"gap_cones_max", numberText(r.gapConesMax), "%"},
+          {"cover", numberText(r.cover), "%"},
+          {"cover_cones", numberText(r.coverCones), "%"},
+          {"mass_error", numberText(r.massError), "%"},
+          {"centre_error", numberText(r.centreError), "%"},
+          {"inertia_error", numberText(r.inertiaError), "%"},
+          {"components", numberText(r.components), ""},
+          {"centres_outside", numberText(r.centresOutside), ""},
+          {"attachments_crossing", numberText(r.attachmentsCrossing), ""},
+          {"attachment_max", numberText(r.attachmentMax), "%"},
+          {"degree_max", numberText(r.degreeMax), ""},
+          {"seconds", numberText(r.seconds), "s"}};
+}
+
+void writeReport(const std::string& path, const std::vector<Result>& results) {
+  OutputFile file(path);
+  file.write("name,value,unit\n");
+  for (const Result& r : results) file.write(r.name + "," + r.value + "," + r.unit + "\n");
+  file.commit();
+}
+
+}  // namespace medulla

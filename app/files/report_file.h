@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "physics/model/build.h"
+
+namespace medulla {
+
+// One result of a command: a line "name value [unit]" on standard output, a row in a CSV file.
+struct Result {
+  std::string name, value, unit;  // unit is empty for counts and ratios
+};
+
+// The quality report of a model build, in the order in which it is shown.
+std::vector<Result> buildResults(const BuildReport& report);
+
+// CSV with the header name,value,unit. Errors are those of OutputFile.
+void writeReport(const std::string& path, const std::vector<Result>& results);
+
+}  // namespace medulla
