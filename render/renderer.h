@@ -15,8 +15,8 @@ namespace medulla {
 
 // A surface as it is at rest; given once. Textures, colour variation and ambient occlusion are baked from it.
 struct SurfaceShape {
-  std::string look;  // a name of lookNames()
-  std::vector<glm::vec3> restPositions;  // m, world at the start of the run
+  std::string look;                                     // a name of lookNames()
+  std::vector<glm::vec3> restPositions;                 // m, world at the start of the run
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
 };
 
@@ -62,7 +62,7 @@ struct Picture {
   ViewKind view = ViewKind::tissue;
   Camera camera;
   Light light;
-  bool endoscopeMask = true;  // round picture with a soft rim
+  bool endoscopeMask = true;           // round picture with a soft rim
   std::vector<SurfaceState> surfaces;  // index: order of addSurface
   std::vector<Instrument> instruments;
   std::vector<Ball> balls;

@@ -1,0 +1,53 @@
+#ifdef MEDULLA_HAVE_OSMESA
+
+#include <GL/gl.h>
+#include <GL/osmesa.h>
+
+#include <array>
+#include <stdexcept>
+
+#include "render/gl_context.h"
+
+namespace medulla {
+namespace {
+
+class OsmesaContext : public GlContext {
+ public:
+  OsmesaContext() {
+    const int attributes[] = {OSMESA_FORMAT,
+                              OSMESA_RGBA,
+                              OSMESA_DEPTH_BITS,
+                              0,
+                              OSMESA_PROFILE,
+                              OSMESA_CORE_PROFILE,
+                              OSMESA_CONTEXT_MAJOR_VERSION,
+                              3,
+                              OSMESA_CONTEXT_MINOR_VERSION,
+                              3,
+                              0};
+    context_ = OSMesaCreateContextAttribs(attributes, nullptr);
+    if (!context_) throw std::runtime_error("OSMesa could not make an OpenGL 3.3 core context");
+    makeCurrent();
+  }
+  ~OsmesaContext() override { OSMesaDestroyContext(context_); }
+  void makeCurrent() override {
+    if (!OSMesaMakeCurrent(context_, buffer_.data(), GL_UNSIGNED_BYTE, kSide, kSide))
+      throw std::runtime_error("OSMesa could not make its context current");
+  }
+
+ private:
+  // OSMesa insists on a default framebuffer; nothing is drawn into it.
+  static constexpr int kSide = 16;
+  std::array<unsigned char, 4 * kSide * kSide> buffer_{};
+  OSMesaContext context_ = nullptr;
+};
+
+}  // namespace
+
+std::unique_ptr<GlContext> makeOsmesaContext() {
+  return std::make_unique<OsmesaContext>();
+}
+
+}  // namespace medulla
+
+#endif

@@ -1,0 +1,184 @@
+#include "render/instrument_mesh.h"
+
+#include <cmath>
+
+namespace medulla {
+namespace {
+
+using glm::vec3;
+
+// Tool frame, m: the tip of the closed jaws at the origin, shaft along +z, jaws open about x at the hinge.
+constexpr float kHinge = 0.0200f, kShaftRadius = 0.0026f, kShaftStart = 0.0275f, kShaftEnd = 0.42f;
+constexpr float kJawHalfWidth = 0.0021f, kJawHeight = 0.0021f;
+constexpr int kAround = 24, kTeeth = 13;
+constexpr float kTau = 6.2831853f;
+constexpr vec3 kSteel(0.50f, 0.50f, 0.52f), kSheath(0.020f, 0.020f, 0.022f);
+
+// Geometry in the tool frame, moved to the world as it is appended.
+class Builder {
+ public:
+  Builder(const Instrument& instrument, SceneMesh& mesh)
+      : mesh_(mesh), worldFromTool_(glm::mat3_cast(instrument.worldFromTool)), tip_(instrument.tip) {}
+
+  std::uint32_t vertex(vec3 p, vec3 n, vec3 albedo, float openness = 1) {
+    const auto i = std::uint32_t(mesh_.position.size());
+    mesh_.position.push_back(tip_ + worldFromTool_ * p);
+    mesh_.normal.push_back(worldFromTool_ * glm::normalize(n));
+    const vec3 aside = std::abs(n.z) < 0.9f * glm::length(n) ? vec3(0, 0, 1) : vec3(1, 0, 0);
+    mesh_.tangent.push_back(worldFromTool_ * glm::normalize(glm::cross(aside, n)));
+    mesh_.uv.push_back(40.f * glm::vec2(p.z, p.x + p.y));
+    mesh_.albedo.push_back(albedo);
+    mesh_.openness.push_back(openness);
+    mesh_.blanch.push_back(0);
+    return i;
+  }
+  // Corners counter-clockwise from outside.
+  void quad(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) {
+    for (const std::uint32_t i : {a, b, c, a, c, d}) mesh_.index.push_back(i);
+  }
+  // A flat face with corners of its own.
+  void face(vec3 a, vec3 b, vec3 c, vec3 d, vec3 albedo, float openness) {
+    const vec3 n = glm::cross(b - a, d - a) + glm::cross(d - c, b - c);
+    if (glm::dot(n, n) < 1e-24f) return;
+    const std::uint32_t ia = vertex(a, n, albedo, openness), ib = vertex(b, n, albedo, openness),
+                        ic = vertex(c, n, albedo, openness), id = vertex(d, n, albedo, openness);
+    quad(ia, ib, ic, id);
+  }
+
+ private:
+  SceneMesh& mesh_;
+  glm::mat3 worldFromTool_;
+  vec3 tip_;
+};
+
+struct Ring {
+  float z, radius;
+};
+
+// Surface of revolution about z; the normals follow the profile smoothly, so that a crease needs two close rings.
+void lathe(Builder& b, const std::vector<Ring>& profile, vec3 albedo) {
+  std::uint32_t previous = 0;
+  for (std::size_t k = 0; k < profile.size(); ++k) {
+    const Ring &before = profile[k ? k - 1 : 0], &after = profile[k + 1 < profile.size() ? k + 1 : k];
+    const float dz = after.z - before.z, dr = after.radius - before.radius;
+    std::uint32_t first = 0;
+    for (int s = 0; s <= kAround; ++s) {
+      const float a = kTau * float(s) / kAround, x = std::cos(a), y = std::sin(a);
+      const std::uint32_t i =
+          b.vertex({profile[k].radius * x, profile[k].radius * y, profile[k].z}, {dz * x, dz * y, -dr}, albedo);
+      if (s == 0) first = i;
+    }
+    for (std::uint32_t s = 0; k > 0 && s < kAround; ++s)
+      b.quad(previous + s, previous + s + 1, first + s + 1, first + s);
+    previous = first;
+  }
+}
+
+void addShaft(Builder& b) {
+  const float r = kShaftRadius;
+  // Clevis that holds the hinge, and the collar.
+  lathe(b,
+        {{kHinge - 0.0012f, 0.0001f},
+         {kHinge - 0.0010f, 0.0013f},
+         {kHinge, 0.0019f},
+         {kHinge + 0.0015f, 0.0021f},
+         {kHinge + 0.0045f, 0.0022f},
+         {kHinge + 0.0048f, 0.0024f},
+         {kShaftStart, 0.0025f},
+         {kShaftStart + 0.0004f, 0.0025f}},
+        kSteel);
+  // Light is computed per vertex and interpolated without perspective: rings stay close.
+  std::vector<Ring> sheath = {{kShaftStart, 0.0023f}, {kShaftStart + 0.0001f, r - 0.0001f}, {kShaftStart + 0.0004f, r}};
+  for (float z = kShaftStart + 0.003f; z < kShaftEnd; z += 0.004f) sheath.push_back({z, r});
+  lathe(b, sheath, kSheath);
+}
+
+// Half width and height of a jaw along its length, t = 0 at the hinge, 1 at the tip.
+struct JawSection {
+  float z, halfWidth, height;
+};
+JawSection jawSection(float t) {
+  const float end = t > 0.88f ? std::sqrt(std::max(1 - (t - 0.88f) * (t - 0.88f) / 0.0145f, 0.f)) : 1.f;
+  return {kHinge * (1 - t), kJawHalfWidth * (1 - 0.22f * t) * (0.12f + 0.88f * end),
+          kJawHeight * (1 - 0.45f * t) * (0.25f + 0.75f * end)};
+}
+
+// side = +1: the jaw above the xz plane; the other is its mirror image, so that its faces turn the other way.
+void addJaw(Builder& b, float side, float angle) {
+  const float c = std::cos(angle), s = std::sin(angle) * side;
+  const auto place = [&](float x, float y, float z) {  // y away from the bite; turned about the hinge
+    const float dz = z - kHinge, dy = y * side;
+    return vec3(x, c * dy - s * dz, kHinge + s * dy + c * dz);
+  };
+  const auto turned = [&](vec3 n) { return vec3(n.x, c * n.y * side - s * n.z, s * n.y * side + c * n.z); };
+  constexpr int kSlices = 4 * kTeeth, kArc = 12;
+  std::uint32_t previous = 0;
+  for (int k = 0; k <= kSlices; ++k) {
+    const float t = float(k) / kSlices;
+    const JawSection j = jawSection(t);
+    std::uint32_t first = 0;
+    for (int a = 0; a <= kArc; ++a) {  // outer side: a flattened half ellipse from +x over the back to -x
+      const float phi = 0.5f * kTau * float(a) / kArc, x = std::cos(phi), y = std::pow(std::sin(phi) + 1e-6f, 0.8f);
+      const float lean = t > 0.85f ? -0.9f * (t - 0.85f) / 0.15f : -0.05f;
+      const std::uint32_t i = b.vertex(place(j.halfWidth * x, 0.0003f + j.height * y, j.z),
+                                       turned({x / j.halfWidth, std::sin(phi) / j.height, lean / j.height}), kSteel);
+      if (a == 0) first = i;
+    }
+    for (std::uint32_t a = 0; k > 0 && a < kArc; ++a) {
+      if (side > 0)
+        b.quad(previous + a, first + a, first + a + 1, previous + a + 1);
+      else
+        b.quad(previous + a, previous + a + 1, first + a + 1, first + a);
+    }
+    previous = first;
+  }
+  // Bite: transverse ridges, flat faces; smooth near the hinge and at the very tip.
+  for (int k = 0; k < 2 * kTeeth; ++k) {
+    const float t0 = float(k) / (2 * kTeeth), t1 = float(k + 1) / (2 * kTeeth);
+    const auto depth = [](float t, bool valley) { return valley && t > 0.2f && t < 0.97f ? 0.00055f : 0.00008f; };
+    const JawSection j0 = jawSection(t0), j1 = jawSection(t1);
+    const float y0 = depth(t0, k % 2 == 0), y1 = depth(t1, k % 2 == 1);
+    const vec3 p0 = place(-j0.halfWidth, y0, j0.z), p1 = place(j0.halfWidth, y0, j0.z),
+               q0 = place(-j1.halfWidth, y1, j1.z), q1 = place(j1.halfWidth, y1, j1.z);
+    if (side > 0)
+      b.face(p0, q0, q1, p1, 0.65f * kSteel, 0.7f);
+    else
+      b.face(p0, p1, q1, q0, 0.65f * kSteel, 0.7f);
+    // Flank between the outer side's rim and the ridge.
+    for (const float x : {-1.f, 1.f}) {
+      const vec3 a = place(x * j0.halfWidth, 0.0003f, j0.z), d = place(x * j1.halfWidth, 0.0003f, j1.z);
+      const vec3 e = x < 0 ? p0 : p1, f = x < 0 ? q0 : q1;
+      if ((side > 0) == (x > 0))
+        b.face(a, e, f, d, 0.8f * kSteel, 0.85f);
+      else
+        b.face(a, d, f, e, 0.8f * kSteel, 0.85f);
+    }
+  }
+}
+
+}  // namespace
+
+void appendInstrument(const Instrument& instrument, SceneMesh& mesh) {
+  MeshPart part;
+  part.look = &findLook("steel");
+  part.instrument = true;
+  part.firstVertex = std::uint32_t(mesh.position.size());
+  part.firstIndex = std::uint32_t(mesh.index.size());
+  Builder builder(instrument, mesh);
+  addJaw(builder, 1, instrument.jawAngle);
+  addJaw(builder, -1, instrument.jawAngle);
+  addShaft(builder);
+  part.vertexCount = std::uint32_t(mesh.position.size()) - part.firstVertex;
+  part.indexCount = std::uint32_t(mesh.index.size()) - part.firstIndex;
+  mesh.parts.push_back(part);
+}
+
+void removeInstruments(SceneMesh& mesh) {
+  while (!mesh.parts.empty() && mesh.parts.back().instrument) {
+    mesh.index.resize(mesh.parts.back().firstIndex);
+    mesh.resizeVertices(mesh.parts.back().firstVertex);
+    mesh.parts.pop_back();
+  }
+}
+
+}  // namespace medulla

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "render/renderer.h"
+#include "render/scene_mesh.h"
+
+namespace medulla {
+
+// Appends the parts of one laparoscopic grasper (shaft 5 mm across, toothed jaws) in the pose given: steel and black
+// sheath, world frame, with everything the tissue shader needs.
+void appendInstrument(const Instrument& instrument, SceneMesh& mesh);
+// Drops every part appended so far.
+void removeInstruments(SceneMesh& mesh);
+
+}  // namespace medulla

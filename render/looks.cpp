@@ -1,0 +1,189 @@
+#include "render/looks.h"
+
+#include <stdexcept>
+
+#include "render/renderer.h"
+
+namespace medulla {
+namespace {
+
+using glm::vec3;
+
+Look liver() {
+  Look l;
+  l.name = "liver";
+  // Darker than it seems: a lighter red turns to orange plastic under the endoscope's light.
+  l.albedoLow = {0.125f, 0.022f, 0.015f};
+  l.albedoHigh = {0.235f, 0.047f, 0.029f};
+  l.mottleFrequency = 22;
+  l.wrap = {0.24f, 0.07f, 0.05f};
+  l.roughness = 0.36f;
+  l.wetRoughness = 0.14f;
+  l.mottle = 0.95f;
+  l.vessels = 0.10f;
+  l.vesselTint = {1.3f, 0.6f, 0.6f};
+  l.bump = 0.62f;
+  l.detailScale = 11;
+  l.detail = {1024, 3, 1.2f, 0.4f, 0.10f};
+  return l;
+}
+
+Look gallbladder() {
+  Look l;
+  l.name = "gallbladder";
+  l.albedoLow = {0.072f, 0.088f, 0.034f};
+  l.albedoHigh = {0.185f, 0.175f, 0.070f};
+  l.mottleFrequency = 22;
+  l.patches[0] = {{0.24f, 0.115f, 0.065f}, 42, 21, 1, {}, 0.42f, 0.70f, 0.55f};               // olive-brown blotches
+  l.patches[1] = {{0.30f, 0.125f, 0.075f}, 66, 9, 0.22f, {0, 1.1f, 0}, 0.55f, 1.10f, 0.85f};  // red neck
+  l.patches[2] = {{0.62f, 0.40f, 0.13f}, 54, 40, 1, {0, 0.22f, 0}, 0.66f, 0.80f, 0.75f};      // fat
+  l.wrap = {0.34f, 0.22f, 0.12f};
+  l.roughness = 0.37f;
+  l.wetRoughness = 0.17f;
+  l.mottle = 0.70f;
+  l.vessels = 0.55f;
+  l.vesselTint = {1.9f, 0.36f, 0.45f};
+  l.bump = 0.30f;
+  l.detailScale = 16;
+  l.detail = {512, 6, 1.5f, -1.3f, 0};
+  return l;
+}
+
+Look stomach() {
+  Look l;
+  l.name = "stomach";
+  l.albedoLow = {0.50f, 0.155f, 0.12f};
+  l.albedoHigh = {0.68f, 0.29f, 0.215f};
+  l.mottleFrequency = 22;
+  l.patches[0] = {{0.86f, 0.56f, 0.22f}, 22, 3, 1, {}, 0.60f, 0.74f, 0.5f};
+  l.wrap = {0.45f, 0.20f, 0.14f};
+  l.roughness = 0.42f;
+  l.wetRoughness = 0.14f;
+  l.mottle = 0.55f;
+  l.vessels = 0.62f;
+  l.vesselTint = {0.78f, 0.16f, 0.25f};
+  l.bump = 0.50f;
+  l.detailScale = 8.4f;
+  l.detail = {1024, 7, 2.6f, -0.6f, 0};
+  return l;
+}
+
+Look gut() {
+  Look l = stomach();
+  l.name = "gut";
+  l.albedoLow = {0.52f, 0.20f, 0.15f};
+  l.albedoHigh = {0.70f, 0.36f, 0.27f};
+  l.vessels = 0.5f;
+  l.detailScale = 12;
+  l.detail.vesselHeading = 1.2f;
+  return l;
+}
+
+Look fat() {
+  Look l;
+  l.name = "fat";
+  l.albedoLow = {0.60f, 0.285f, 0.060f};
+  l.albedoHigh = {0.86f, 0.52f, 0.17f};
+  l.mottleFrequency = 22;
+  l.patches[0] = {{0.50f, 0.15f, 0.08f}, 22, 3, -1, {}, -0.47f, -0.36f, 0.55f};
+  l.wrap = {0.34f, 0.26f, 0.10f};
+  l.roughness = 0.38f;
+  l.wetRoughness = 0.14f;
+  l.mottle = 0.75f;
+  l.vessels = 0.55f;
+  l.vesselTint = {0.75f, 0.16f, 0.20f};
+  l.bump = 0.60f;
+  l.detailScale = 12;
+  l.unrollTilt = 0.96f;  // lies flat, seen from above its front
+  l.castsShadow = false;
+  l.detail = {512, 7, 2.0f, 0.9f, 0};
+  return l;
+}
+
+Look wall() {
+  Look l;
+  l.name = "wall";
+  l.albedoLow = {0.36f, 0.085f, 0.065f};
+  l.albedoHigh = {0.60f, 0.22f, 0.16f};
+  l.mottleFrequency = 22;
+  l.patches[0] = {{0.88f, 0.58f, 0.20f}, 11, 2, 1, {}, 0.50f, 0.66f, 0.8f};
+  l.wrap = {0.40f, 0.16f, 0.10f};
+  l.roughness = 0.42f;
+  l.wetRoughness = 0.14f;
+  l.mottle = 0.60f;
+  l.vessels = 0.60f;
+  l.vesselTint = {0.75f, 0.20f, 0.25f};
+  l.bump = 0.40f;
+  l.detailScale = 3.2f;
+  l.castsShadow = false;
+  l.encloses = true;
+  l.detail = {512, 6, 2.2f, 0.4f, 0};
+  return l;
+}
+
+Look dolphin() {
+  Look l;
+  l.name = "dolphin";
+  l.albedoLow = {0.16f, 0.20f, 0.25f};
+  l.albedoHigh = {0.24f, 0.29f, 0.34f};
+  l.mottleFrequency = 2;
+  l.patches[0] = {{0.62f, 0.64f, 0.64f}, 3, 5, 0.15f, {0, -1, 0}, -0.42f, -0.24f, 0.9f};  // pale belly
+  l.wrap = {0.10f, 0.12f, 0.14f};
+  l.roughness = 0.40f;
+  l.wetRoughness = 0.20f;
+  l.mottle = 0.20f;
+  l.bump = 0.08f;
+  l.detailScale = 1.5f;
+  l.detail = {256, 0, 0, 0, 0};
+  return l;
+}
+
+Look steel() {
+  Look l;
+  l.name = "steel";
+  l.albedoLow = l.albedoHigh = {0.50f, 0.50f, 0.52f};
+  l.roughness = 0.24f;
+  l.wetRoughness = 0.10f;
+  l.specular = 3;
+  l.mottle = 0.15f;
+  l.bump = 0.06f;
+  l.detailScale = 40;
+  l.metal = true;
+  l.detail = {256, 0, 0, 0, 0};
+  return l;
+}
+
+// Diffuse white of a calibration card: no texture, no highlight, no ambient. Its pixels follow a closed formula.
+Look matte() {
+  Look l;
+  l.name = "matte";
+  l.specular = 0;
+  l.ambient = 0;
+  l.detail = {16, 0, 0, 0, 0};
+  return l;
+}
+
+}  // namespace
+
+const std::vector<Look>& looks() {
+  static const std::vector<Look> table = {liver(), stomach(), gallbladder(), gut(),  fat(),
+                                          wall(),  dolphin(), steel(),       matte()};
+  return table;
+}
+
+const Look& findLook(const std::string& name) {
+  std::string known;
+  for (const Look& look : looks()) {
+    if (look.name == name) return look;
+    known += (known.empty() ? "" : ", ") + look.name;
+  }
+  throw std::runtime_error("unknown look '" + name + "', expected one of " + known);
+}
+
+std::vector<std::string> lookNames() {
+  std::vector<std::string> names;
+  for (const Look& look : looks()) names.push_back(look.name);
+  return names;
+}
+
+}  // namespace medulla

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+// What organs look like, as data: adding a look adds a row to the table in looks.cpp and no code.
+namespace medulla {
+
+// A colour painted over parts of a surface at rest where
+//   noiseWeight * fractalNoise(frequency * p + seed) + dot(gradient, q)   passes from `from` to `to`;
+// p in m, q = position in the surface's bounding box, 0..1 per axis.
+struct Patch {
+  glm::vec3 colour{0};  // linear RGB
+  float frequency = 0;  // 1/m
+  float seed = 0;
+  float noiseWeight = 1;
+  glm::vec3 gradient{0};
+  float from = 0, to = 1;
+  float amount = 0;  // 0..1 at full coverage; 0 ends the list
+};
+
+// Vessels and fine structure of the tileable detail texture.
+struct DetailPattern {
+  int side = 512;           // texels
+  int vesselTrees = 0;      // per tile
+  float vesselWidth = 2;    // texels of a 512 tile, of the widest trunk
+  float vesselHeading = 0;  // rad, mean direction
+  float cells = 0;          // 0..1, lobules (liver)
+};
+
+struct Look {
+  std::string name;
+  glm::vec3 albedoLow{0.5f}, albedoHigh{0.5f};  // linear RGB; noise at mottleFrequency mixes between them
+  float mottleFrequency = 22;                   // 1/m
+  std::array<Patch, 4> patches;
+  glm::vec3 wrap{0};          // 0..1 per channel: light that bleeds past the terminator (subsurface scattering)
+  float roughness = 0.4f;     // of the tissue's own highlight
+  float wetRoughness = 0.2f;  // of the film of fluid over it
+  float specular = 1;         // factor on the highlights: 0 matt, 1 wet tissue, more: metal
+  float mottle = 0;           // contrast of the detail texture's colour
+  float vessels = 0;          // 0..1 opacity
+  glm::vec3 vesselTint{1};    // factor on the albedo where a vessel runs
+  float bump = 0;             // slope of the wet film's micro relief
+  float detailScale = 10;     // tiles per m
+  float unrollTilt = 0;       // rad about x, of the axis the texture is unrolled around (0: +z)
+  float ambient = 1;          // share of the cavity's light
+  bool metal = false;         // mirrors the cavity instead of scattering
+  bool castsShadow = true;    // what lies behind everything casts none worth its time
+  bool encloses = false;      // the cavity's wall: the ambient light comes from it
+  DetailPattern detail;
+};
+
+const std::vector<Look>& looks();
+const Look& findLook(const std::string& name);  // throws std::runtime_error naming the known ones
+
+}  // namespace medulla

@@ -1,0 +1,179 @@
+#define GL_GLEXT_PROTOTYPES
+#include "render/model_view.h"
+
+#include <GL/gl.h>
+#include <GL/glext.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/type_ptr.hpp>
+
+#include "render/shaders.h"
+
+namespace medulla {
+namespace {
+
+constexpr float kTau = 6.2831853f;
+constexpr std::array<int, 3> kRings = {8, 20, 48};
+constexpr std::array<float, 2> kFinerAbove = {0.012f, 0.06f};  // projected radius, picture heights
+
+void attribute(unsigned slot, int components, std::size_t stride, std::size_t offset, unsigned divisor) {
+  glEnableVertexAttribArray(slot);
+  glVertexAttribPointer(slot, components, GL_FLOAT, GL_FALSE, int(stride), reinterpret_cast<const void*>(offset));
+  glVertexAttribDivisor(slot, divisor);
+}
+
+}  // namespace
+
+ModelView::UnitMesh ModelView::makeUnitMesh(const std::vector<glm::vec3>& positions,
+                                            const std::vector<glm::vec3>& normals,
+                                            const std::vector<unsigned>& indices) {
+  std::vector<glm::vec3> interleaved;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    interleaved.push_back(positions[i]);
+    interleaved.push_back(normals[i]);
+  }
+  UnitMesh m;
+  m.indexCount = int(indices.size());
+  glGenVertexArrays(1, &m.vertexArray);
+  glGenBuffers(1, &m.vertices);
+  glGenBuffers(1, &m.indices);
+  glGenBuffers(1, &m.instances);
+  glBindVertexArray(m.vertexArray);
+  glBindBuffer(GL_ARRAY_BUFFER, m.vertices);
+  glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(interleaved.size() * sizeof(glm::vec3)), interleaved.data(), GL_STATIC_DRAW);
+  attribute(0, 3, 2 * sizeof(glm::vec3), 0, 0);
+  attribute(1, 3, 2 * sizeof(glm::vec3), sizeof(glm::vec3), 0);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, m.indices);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, GLsizeiptr(indices.size() * sizeof(unsigned)), indices.data(), GL_STATIC_DRAW);
+  glBindBuffer(GL_ARRAY_BUFFER, m.instances);
+  for (unsigned k = 0; k < 4; ++k) attribute(2 + k, 4, sizeof(Instance), k * sizeof(glm::vec4), 1);
+  glBindVertexArray(0);
+  return m;
+}
+
+ModelView::UnitMesh ModelView::makeSphere(int rings) {
+  std::vector<glm::vec3> p;
+  std::vector<unsigned> index;
+  const int around = 2 * rings;
+  for (int j = 0; j <= rings; ++j)
+    for (int i = 0; i <= around; ++i) {
+      const float theta = 0.5f * kTau * float(j) / float(rings), phi = kTau * float(i) / float(around);
+      p.emplace_back(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
+    }
+  for (int j = 0; j < rings; ++j)
+    for (int i = 0; i < around; ++i) {
+      const unsigned a = unsigned(j * (around + 1) + i), b = a + unsigned(around) + 1;
+      for (const unsigned k : {a, b, b + 1, a, b + 1, a + 1}) index.push_back(k);
+    }
+  return makeUnitMesh(p, p, index);
+}
+
+ModelView::UnitMesh ModelView::makeCylinder(int sides) {
+  std::vector<glm::vec3> p, n;
+  std::vector<unsigned> index;
+  for (int s = 0; s <= sides; ++s) {
+    const float a = kTau * float(s) / float(sides);
+    for (const float z : {0.f, 1.f}) {
+      p.emplace_back(std::cos(a), std::sin(a), z);
+      n.emplace_back(std::cos(a), std::sin(a), 0);
+    }
+  }
+  for (unsigned s = 0; s < unsigned(sides); ++s)
+    for (const unsigned k : {0u, 2u, 3u, 0u, 3u, 1u}) index.push_back(2 * s + k);
+  return makeUnitMesh(p, n, index);
+}
+
+ModelView::ModelView() {
+  program_ = buildProgram("", kModelVertexShader, kModelFragmentShader);
+  backdropProgram_ = buildProgram("", kBackdropVertexShader, kBackdropFragmentShader);
+  glGenVertexArrays(1, &emptyArray_);
+  for (std::size_t k = 0; k < spheres_.size(); ++k) spheres_[k] = makeSphere(kRings[k]);
+  cylinder_ = makeCylinder(12);
+}
+
+ModelView::~ModelView() {
+  glDeleteProgram(program_);
+  glDeleteProgram(backdropProgram_);
+  glDeleteVertexArrays(1, &emptyArray_);
+  for (const UnitMesh& m : {spheres_[0], spheres_[1], spheres_[2], cylinder_}) {
+    glDeleteVertexArrays(1, &m.vertexArray);
+    for (const unsigned b : {m.vertices, m.indices, m.instances}) glDeleteBuffers(1, &b);
+  }
+}
+
+void ModelView::drawBackdrop() const {
+  glDisable(GL_DEPTH_TEST);
+  glUseProgram(backdropProgram_);
+  glBindVertexArray(emptyArray_);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glEnable(GL_DEPTH_TEST);
+}
+
+void ModelView::drawInstances(const UnitMesh& mesh, const std::vector<Instance>& instances) const {
+  if (instances.empty()) return;
+  glBindVertexArray(mesh.vertexArray);
+  glBindBuffer(GL_ARRAY_BUFFER, mesh.instances);
+  glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(instances.size() * sizeof(Instance)), instances.data(), GL_STREAM_DRAW);
+  glDrawElementsInstanced(GL_TRIANGLES, mesh.indexCount, GL_UNSIGNED_INT, nullptr, int(instances.size()));
+}
+
+void ModelView::setCamera(const Viewpoint& v) const {
+  glUseProgram(program_);
+  const auto uniform = [this](const char* name) { return glGetUniformLocation(program_, name); };
+  glUniformMatrix4fv(uniform("clipFromWorld"), 1, GL_FALSE, glm::value_ptr(v.clipFromWorld));
+  glUniform3fv(uniform("eye"), 1, glm::value_ptr(v.position));
+  glUniform3fv(uniform("right"), 1, glm::value_ptr(v.right));
+  glUniform3fv(uniform("up"), 1, glm::value_ptr(v.up));
+  glUniform3fv(uniform("back"), 1, glm::value_ptr(v.back));
+}
+
+void ModelView::draw(const Viewpoint& view, const std::vector<Ball>& balls, const std::vector<Segment>& segments) {
+  const auto instanceOf = [](glm::vec3 origin, glm::vec3 x, glm::vec3 y, glm::vec3 z, glm::vec4 colour) {
+    return Instance{{{x.x, y.x, z.x, origin.x}, {x.y, y.y, z.y, origin.y}, {x.z, y.z, z.z, origin.z}}, colour};
+  };
+  std::array<std::vector<Instance>, 3> opaque;
+  struct SeenThrough {
+    float depth;
+    std::size_t level;
+    Instance instance;
+  };
+  std::vector<SeenThrough> seenThrough;
+  for (const Ball& ball : balls) {
+    const float depth = pictureFromWorld(view, ball.centre).z;
+    const float size = 0.5f * ball.radius / (std::max(depth, kNearPlane) * view.tangent);
+    const std::size_t level = std::size_t(size > kFinerAbove[0]) + std::size_t(size > kFinerAbove[1]);
+    const float r = ball.radius;
+    const Instance i = instanceOf(ball.centre, {r, 0, 0}, {0, r, 0}, {0, 0, r}, ball.colour);
+    if (ball.colour.a >= 1)
+      opaque[level].push_back(i);
+    else
+      seenThrough.push_back({depth, level, i});
+  }
+  std::vector<Instance> rods;
+  for (const Segment& s : segments) {
+    const glm::vec3 along = s.b - s.a;
+    const float length = glm::length(along);
+    if (length <= 0) continue;
+    const glm::vec3 w = along / length, aside = std::abs(w.x) < 0.7f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+    const glm::vec3 u = glm::normalize(glm::cross(aside, w));
+    rods.push_back(instanceOf(s.a, u * s.radius, glm::cross(w, u) * s.radius, along, s.colour));
+  }
+
+  setCamera(view);
+  glEnable(GL_CULL_FACE);
+  glFrontFace(GL_CW);  // the picture is drawn upside down: see Viewpoint::clipFromWorld
+  for (std::size_t k = 0; k < opaque.size(); ++k) drawInstances(spheres_[k], opaque[k]);
+  drawInstances(cylinder_, rods);
+
+  // Farthest first, each over what is behind it.
+  std::stable_sort(seenThrough.begin(), seenThrough.end(),
+                   [](const SeenThrough& a, const SeenThrough& b) { return a.depth > b.depth; });
+  glEnable(GL_BLEND);
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
+  for (const SeenThrough& s : seenThrough) drawInstances(spheres_[s.level], {s.instance});
+  glDisable(GL_BLEND);
+  glDisable(GL_CULL_FACE);
+}
+
+}  // namespace medulla

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "render/renderer.h"
+#include "render/viewpoint.h"
+
+namespace medulla {
+
+// Draws balls and segments of the model (paper, figures 2 and 11) with instanced unit meshes. Needs a current context.
+class ModelView {
+ public:
+  ModelView();
+  ~ModelView();
+  ModelView(const ModelView&) = delete;
+  ModelView& operator=(const ModelView&) = delete;
+
+  void drawBackdrop() const;
+  void draw(const Viewpoint& viewpoint, const std::vector<Ball>& balls, const std::vector<Segment>& segments);
+
+ private:
+  // Rows of the 3x4 matrix that places the unit mesh, and a colour.
+  struct Instance {
+    glm::vec4 row[3];
+    glm::vec4 colour;
+  };
+  struct UnitMesh {
+    unsigned vertexArray = 0, vertices = 0, indices = 0, instances = 0;
+    int indexCount = 0;
+  };
+  static UnitMesh makeUnitMesh(const std::vector<glm::vec3>& positions, const std::vector<glm::vec3>& normals,
+                               const std::vector<unsigned>& indices);
+  static UnitMesh makeSphere(int rings);
+  static UnitMesh makeCylinder(int sides);
+  void drawInstances(const UnitMesh& mesh, const std::vector<Instance>& instances) const;
+  void setCamera(const Viewpoint& viewpoint) const;
+
+  unsigned program_ = 0, backdropProgram_ = 0, emptyArray_ = 0;
+  std::array<UnitMesh, 3> spheres_;  // coarse to fine: the silhouette's error stays below a third of a pixel
+  UnitMesh cylinder_;
+};
+
+}  // namespace medulla

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+
+// Deterministic noise for colours and textures: integer hashes, no tables, no state.
+namespace medulla {
+
+float latticeHash(std::int32_t x, std::int32_t y, std::int32_t z);  // 0..1
+float valueNoise(glm::vec3 p);                                      // 0..1, one lattice cell per unit, C1
+float fractalNoise(glm::vec3 p);                                    // 0..1, four octaves of valueNoise
+
+// Tileable in [0, period)^2; `seed` picks the pattern.
+float tiledNoise(float x, float y, int period, int seed);  // 0..1
+float tiledCells(float x, float y, int period, int seed);  // Worley F2 - F1: 0 on cell borders
+
+// A small generator of its own (xorshift, Marsaglia 2003): the standard library's distributions differ between
+// versions.
+class RandomSequence {
+ public:
+  explicit RandomSequence(std::uint32_t seed) : state_(seed * 2654435761u + 1) {}
+  float next();  // 0..1
+
+ private:
+  std::uint32_t state_;
+};
+
+inline float smoothStep(float from, float to, float x) {
+  const float t = glm::clamp((x - from) / (to - from), 0.f, 1.f);
+  return t * t * (3 - 2 * t);
+}
+
+}  // namespace medulla

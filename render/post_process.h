@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render/image.h"
+
+namespace medulla {
+
+// What is done to the picture after it was read back: a fraction of what it would cost in software OpenGL.
+class PostProcess {
+ public:
+  PostProcess(int width, int height);
+  void fadeRim(Image& image) const;  // darkens towards the endoscope's rim; black outside
+  void smoothEdges(Image& image);    // FXAA (Lottes 2009, the short variant) on pixels of high local contrast
+
+ private:
+  struct RimPixel {
+    std::uint32_t index;
+    std::uint8_t factor;  // of 255
+  };
+  struct Smoothed {
+    std::uint32_t index;
+    std::uint8_t rgb[3];
+  };
+  void computeLuma(const Image& image);
+  void smoothRow(const Image& image, int y);
+
+  int width_, height_;
+  std::vector<RimPixel> rim_;
+  std::vector<std::uint8_t> luma_, edge_;
+  std::vector<Smoothed> smoothed_;
+};
+
+}  // namespace medulla

@@ -1,0 +1,218 @@
+#define GL_GLEXT_PROTOTYPES
+#include "render/renderer.h"
+
+#include <GL/gl.h>
+#include <GL/glext.h>
+
+#include <cassert>
+#include <stdexcept>
+
+#include "render/gl_context.h"
+#include "render/instrument_mesh.h"
+#include "render/model_view.h"
+#include "render/post_process.h"
+#include "render/surface_bake.h"
+#include "render/tissue_pass.h"
+#include "render/touch.h"
+
+namespace medulla {
+namespace {
+
+constexpr float kSeenThroughOpacity = 0.38f;  // of moving skin over the model in ViewKind::both
+
+// Colour and depth off screen. Floating-point depth: with 24 bits llvmpipe is a third slower.
+struct Framebuffer {
+  unsigned id = 0, buffers[2] = {0, 0};
+
+  Framebuffer(int width, int height) {
+    glGenFramebuffers(1, &id);
+    glBindFramebuffer(GL_FRAMEBUFFER, id);
+    glGenRenderbuffers(2, buffers);
+    const unsigned format[] = {GL_RGBA8, GL_DEPTH_COMPONENT32F}, point[] = {GL_COLOR_ATTACHMENT0, GL_DEPTH_ATTACHMENT};
+    for (int k = 0; k < 2; ++k) {
+      glBindRenderbuffer(GL_RENDERBUFFER, buffers[k]);
+      glRenderbufferStorage(GL_RENDERBUFFER, format[k], width, height);
+      glFramebufferRenderbuffer(GL_FRAMEBUFFER, point[k], GL_RENDERBUFFER, buffers[k]);
+    }
+    if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
+      throw std::runtime_error("OpenGL has no framebuffer of " + std::to_string(width) + "x" + std::to_string(height));
+  }
+  ~Framebuffer() {
+    glDeleteRenderbuffers(2, buffers);
+    glDeleteFramebuffers(1, &id);
+  }
+};
+
+void checkSettings(const RendererSettings& s) {
+  const auto bad = [](int v) { return v < 16 || v > 8192 || v % 2 != 0; };
+  if (bad(s.width) || bad(s.height))
+    throw std::runtime_error("picture size " + std::to_string(s.width) + "x" + std::to_string(s.height) +
+                             ", expected even numbers from 16 to 8192");
+}
+
+}  // namespace
+
+struct Renderer::Data {
+  RendererSettings settings;
+  std::unique_ptr<GlContext> context;
+  Framebuffer framebuffer;
+  TissuePass tissue;
+  ModelView model;
+  PostProcess post;
+
+  SceneMesh mesh;  // surfaces at their place in this picture, then instruments
+  SceneMesh rest;  // surfaces at rest, baked
+  bool baked = true;
+  LightView lightView;
+  ShadowMap shadow;
+  VertexLight lit;
+  DrawLists lists;
+
+  explicit Data(const RendererSettings& s)
+      : settings(s), context(makeGlContext(s.context)), framebuffer(s.width, s.height), post(s.width, s.height) {
+    tissue.addLook(findLook("steel"));
+    glFinish();
+    spreadRasterThreads();
+  }
+  ~Data() { context->makeCurrent(); }
+
+  const ShadowMap* shadowIfOn() const { return settings.shadows ? &shadow : nullptr; }
+
+  void bake();
+  void placeSurfaces(const Picture& picture);
+  void placeInstruments(const Picture& picture);
+  void lightAndSort(const Picture& picture, const Viewpoint& view);
+  void draw(const Picture& picture, const Viewpoint& view);
+  void readBack(Image& out) const;
+};
+
+void Renderer::Data::bake() {
+  if (baked) return;
+  for (const MeshPart& part : rest.parts) {
+    computeNormals(rest, part);
+    bakeTextureCoordinates(rest, part);
+    computeTangents(rest, part);
+    bakeAlbedo(rest, part);
+    tissue.addLook(*part.look);
+  }
+  bakeOpenness(rest);
+  mesh = rest;
+  baked = true;
+}
+
+void Renderer::Data::placeSurfaces(const Picture& picture) {
+  removeInstruments(mesh);
+  std::fill(mesh.blanch.begin(), mesh.blanch.end(), 0.f);
+  for (std::size_t p = 0; p < mesh.parts.size(); ++p) {
+    MeshPart& part = mesh.parts[p];
+    const auto first = std::ptrdiff_t(part.firstVertex), last = first + std::ptrdiff_t(part.vertexCount);
+    const bool given = p < picture.surfaces.size() && !picture.surfaces[p].positions.empty();
+    part.moving = given;
+    if (given) {
+      const std::vector<glm::vec3>& positions = picture.surfaces[p].positions;
+      assert(positions.size() == part.vertexCount);
+      std::copy(positions.begin(), positions.end(), mesh.position.begin() + first);
+      computeNormals(mesh, part);
+      computeTangents(mesh, part);
+    } else {
+      std::copy(rest.position.begin() + first, rest.position.begin() + last, mesh.position.begin() + first);
+      std::copy(rest.normal.begin() + first, rest.normal.begin() + last, mesh.normal.begin() + first);
+      std::copy(rest.tangent.begin() + first, rest.tangent.begin() + last, mesh.tangent.begin() + first);
+    }
+  }
+}
+
+void Renderer::Data::placeInstruments(const Picture& picture) {
+  for (const Instrument& i : picture.instruments)
+    if (i.touching) applyTouch(i, mesh);
+  for (const Instrument& i : picture.instruments) appendInstrument(i, mesh);
+}
+
+void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view) {
+  lightView = makeLightView(picture.light, view, picture.camera);
+  if (settings.shadows) renderShadowMap(mesh, lightView, shadow);
+  lightVertices(mesh, view, picture.light, lightView, shadowIfOn(), lit);
+  sortVisibleTriangles(mesh, lit, shadowIfOn(), view, lists);
+}
+
+void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.id);
+  glViewport(0, 0, settings.width, settings.height);
+  glEnable(GL_DEPTH_TEST);
+  glDepthFunc(GL_LESS);
+  glClearColor(0.02f, 0.01f, 0.01f, 1);
+  glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  if (picture.view == ViewKind::model) model.drawBackdrop();
+  if (view.round) tissue.drawMask(view);
+  tissue.upload(lit, lists, shadowIfOn());
+
+  std::vector<char> opaque(mesh.parts.size()), seenThrough(mesh.parts.size());
+  for (std::size_t p = 0; p < mesh.parts.size(); ++p) {
+    const MeshPart& part = mesh.parts[p];
+    const bool skin = part.moving && picture.view == ViewKind::both;
+    opaque[p] = part.instrument || (picture.view != ViewKind::model && !skin);
+    seenThrough[p] = skin;
+  }
+  tissue.draw(mesh, lists, opaque, view, lightView, 1);
+  if (picture.view == ViewKind::tissue) return;
+  model.draw(view, picture.balls, picture.segments);
+  tissue.draw(mesh, lists, seenThrough, view, lightView, kSeenThroughOpacity);
+}
+
+void Renderer::Data::readBack(Image& out) const {
+  out.width = settings.width;
+  out.height = settings.height;
+  out.pixels.resize(4ul * settings.width * settings.height);
+  glReadPixels(0, 0, settings.width, settings.height, GL_RGBA, GL_UNSIGNED_BYTE, out.pixels.data());
+  if (const unsigned error = glGetError()) throw std::runtime_error("OpenGL error " + std::to_string(error));
+}
+
+Renderer::Renderer(const RendererSettings& settings) {
+  checkSettings(settings);
+  data_ = std::make_unique<Data>(settings);
+}
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+
+int Renderer::addSurface(SurfaceShape shape) {
+  SceneMesh& m = data_->rest;
+  MeshPart part;
+  part.look = &findLook(shape.look);
+  part.firstVertex = std::uint32_t(m.position.size());
+  part.vertexCount = std::uint32_t(shape.restPositions.size());
+  part.firstIndex = std::uint32_t(m.index.size());
+  part.indexCount = std::uint32_t(3 * shape.triangles.size());
+  m.position.insert(m.position.end(), shape.restPositions.begin(), shape.restPositions.end());
+  m.resizeVertices(m.position.size());
+  for (const auto& t : shape.triangles)
+    for (const std::uint32_t v : t) {
+      assert(v < part.vertexCount);
+      m.index.push_back(part.firstVertex + v);
+    }
+  m.parts.push_back(part);
+  data_->baked = false;
+  return int(m.parts.size()) - 1;
+}
+
+void Renderer::render(const Picture& picture, Image& out) {
+  Data& d = *data_;
+  d.context->makeCurrent();
+  const bool round = picture.endoscopeMask && picture.view != ViewKind::model;
+  const Viewpoint view = makeViewpoint(picture.camera, float(d.settings.width) / float(d.settings.height), round);
+  d.bake();
+  d.placeSurfaces(picture);
+  d.placeInstruments(picture);
+  d.lightAndSort(picture, view);
+  d.draw(picture, view);
+  d.readBack(out);
+  if (round) d.post.fadeRim(out);
+  if (d.settings.antialias) d.post.smoothEdges(out);
+}
+
+std::string Renderer::description() const {
+  data_->context->makeCurrent();
+  const auto text = [](unsigned name) { return std::string(reinterpret_cast<const char*>(glGetString(name))); };
+  return text(GL_RENDERER) + ", OpenGL " + text(GL_VERSION);
+}
+
+}  // namespace medulla

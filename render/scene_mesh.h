@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "render/looks.h"
+
+namespace medulla {
+
+// A range of vertices and triangles of SceneMesh that shares a look.
+struct MeshPart {
+  const Look* look = nullptr;
+  std::uint32_t firstVertex = 0, vertexCount = 0, firstIndex = 0, indexCount = 0;
+  bool moving = false;  // drawn from given positions in this picture
+  bool instrument = false;
+};
+
+// Everything that is drawn with tissue shading, in one set of arrays: surfaces in the order they were added, then the
+// instruments. Positions in m, world.
+struct SceneMesh {
+  std::vector<glm::vec3> position, normal;
+  std::vector<glm::vec3> tangent;  // unit, along the texture's u; v runs along cross(normal, tangent)
+  std::vector<glm::vec2> uv;       // of the detail texture, 1 per tile; baked at rest, so that it sticks to the tissue
+  std::vector<glm::vec3> albedo;   // linear RGB, baked at rest
+  std::vector<float> openness;     // 0..1: share of the cavity's light that arrives (ambient occlusion), baked at rest
+  std::vector<float> blanch;       // 0..1: blood pressed out by an instrument
+  std::vector<std::uint32_t> index;
+  std::vector<MeshPart> parts;
+
+  void resizeVertices(std::size_t count);
+};
+
+using Triangles = std::vector<std::array<std::uint32_t, 3>>;
+
+// Area-weighted vertex normals (Max's sum of cross products) of one part.
+void computeNormals(SceneMesh& mesh, const MeshPart& part);
+// Tangents from the gradient of u over each triangle; needs normals.
+void computeTangents(SceneMesh& mesh, const MeshPart& part);
+
+}  // namespace medulla

@@ -1,0 +1,208 @@
+#define GL_GLEXT_PROTOTYPES
+#include "render/shaders.h"
+
+#include <GL/gl.h>
+#include <GL/glext.h>
+
+#include <stdexcept>
+
+namespace medulla {
+namespace {
+
+// The ACES curve (Narkowicz 2015) and the sRGB transfer in one rational fit over sqrt(x), largest error 0.006: a
+// quarter of the time of both in turn.
+constexpr const char* kToneCurve = R"(
+vec3 toneCurve(vec3 c) {
+  vec3 r = sqrt(max(c, 0.));
+  return (5.21175593 * c + .0267191537 * r - .00373619759) / (5.32664275 * c - .583381459 * r + 1.);
+}
+)";
+
+unsigned compile(unsigned kind, const std::string& source) {
+  const unsigned shader = glCreateShader(kind);
+  const char* text = source.c_str();
+  glShaderSource(shader, 1, &text, nullptr);
+  glCompileShader(shader);
+  int ok = 0;
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
+  if (ok) return shader;
+  char log[2048] = "";
+  glGetShaderInfoLog(shader, sizeof log, nullptr, log);
+  throw std::runtime_error(std::string("a shader does not compile: ") + log);
+}
+
+}  // namespace
+
+unsigned buildProgram(const std::string& defines, const char* vertex, const char* fragment) {
+  const std::string head = "#version 330 core\n" + defines;
+  const unsigned program = glCreateProgram();
+  const unsigned shaders[] = {compile(GL_VERTEX_SHADER, head + vertex),
+                              compile(GL_FRAGMENT_SHADER, head + kToneCurve + fragment)};
+  for (const unsigned s : shaders) glAttachShader(program, s);
+  glLinkProgram(program);
+  for (const unsigned s : shaders) glDeleteShader(s);
+  int ok = 0;
+  glGetProgramiv(program, GL_LINK_STATUS, &ok);
+  if (ok) return program;
+  char log[2048] = "";
+  glGetProgramInfoLog(program, sizeof log, nullptr, log);
+  throw std::runtime_error(std::string("shaders do not link: ") + log);
+}
+
+// lobes: a1 - 1, c1, a2 - 1, c2 of GlossLobes; tint.w: the film's peak.
+// Interpolated without perspective: the triangles are small, and a division per pixel is saved.
+const char* const kTissueVertexShader = R"(
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec4 directGloss;
+layout(location = 2) in vec4 ambientRadius;
+layout(location = 3) in vec4 halfwayBias;
+layout(location = 4) in vec2 uv;
+uniform mat4 clipFromWorld, shadowFromWorld;
+uniform vec4 lobes, tint;
+noperspective out vec4 vDirect;
+noperspective out vec4 vAmbient;
+noperspective out vec3 vHalfway;
+noperspective out vec2 vUv;
+#if SHADE == 1
+out vec4 vShadow;
+#endif
+void main() {
+  gl_Position = clipFromWorld * vec4(position, 1);
+  vDirect = directGloss;
+  vAmbient = ambientRadius;
+  vHalfway = halfwayBias.xyz;
+  vUv = uv;
+#ifdef DULL
+  float x = halfwayBias.z * halfwayBias.z, d1 = x * lobes.x + 1., d2 = x * lobes.z + 1.;
+  vDirect.w *= lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), tint.w);
+#endif
+#if SHADE == 1
+  vShadow = shadowFromWorld * vec4(position, 1);
+  vShadow.z -= halfwayBias.w * vShadow.w;
+#endif
+}
+)";
+
+// surface: mottling, vessel opacity, slope of the film's relief, share of it in the diffuse light.
+const char* const kTissueFragmentShader = R"(
+noperspective in vec4 vDirect;
+noperspective in vec4 vAmbient;
+noperspective in vec3 vHalfway;
+noperspective in vec2 vUv;
+out vec4 pixel;
+uniform sampler2D detail;
+uniform vec4 surface, lobes, tint;
+uniform float opacity;
+#if SHADE == 1
+in vec4 vShadow;
+uniform sampler2DShadow shadowMap;
+uniform float texel;
+
+// Nine taps on two turned squares. A rotation per pixel would hide their steps better but leaves a pattern.
+float softShadow(vec3 q, float radius) {
+  float r = radius * texel;
+#define TAP(X, Y) texture(shadowMap, q + vec3(X * r, Y * r, 0))
+  float inner = TAP(-.42, -.20) + TAP(.20, -.42) + TAP(.42, .20) + TAP(-.20, .42);
+  float outer = TAP(-.35, -.88) + TAP(.88, -.35) + TAP(.35, .88) + TAP(-.88, .35);
+  return (TAP(0., 0.) + inner + outer) / 9.;
+}
+#endif
+
+void main() {
+  vec4 t = texture(detail, vUv);
+  vec3 detailColour = mix(vec3(1. + surface.x * (t.x - .5)), tint.rgb, t.y * surface.y);
+#if SHADE == 2
+  vec3 colour = detailColour * vAmbient.rgb;
+#else
+  vec2 slope = (t.zw - .5) * surface.z;
+  float along = dot(slope, vHalfway.xy);
+#ifdef DULL
+  float gloss = vDirect.w;
+#else
+  float h = max(vHalfway.z - along, 0.);
+  float x = h * h / ((1. + dot(slope, slope)) * dot(vHalfway, vHalfway));
+  float d1 = x * lobes.x + 1., d2 = x * lobes.z + 1.;
+  float gloss = vDirect.w * (lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), tint.w));
+#endif
+  vec3 diffuse = vDirect.rgb * (1. - along * surface.w);
+#if SHADE == 1
+  float s = softShadow(vShadow.xyz / vShadow.w * .5 + .5, vAmbient.w);
+  // Light bleeds into the shadow's edge through the tissue, and red light farthest.
+  diffuse *= vec3(mix(s, sqrt(s), .5) * .955 + .045, s, s);
+  gloss *= s;
+#endif
+  vec3 colour = detailColour * (diffuse + vAmbient.rgb) + gloss * vec3(1., .97, .93);
+#endif
+  pixel = vec4(toneCurve(colour), opacity);
+}
+)";
+
+const char* const kMaskVertexShader = R"(
+layout(location = 0) in vec2 position;
+void main() { gl_Position = vec4(position, -1, 1); }
+)";
+const char* const kMaskFragmentShader = R"(
+out vec4 pixel;
+void main() { pixel = vec4(0, 0, 0, 1); }
+)";
+
+// A unit sphere or a unit cylinder along z, placed by a 3x4 matrix per instance.
+const char* const kModelVertexShader = R"(
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec4 row0;
+layout(location = 3) in vec4 row1;
+layout(location = 4) in vec4 row2;
+layout(location = 5) in vec4 colour;
+uniform mat4 clipFromWorld;
+out vec3 vNormal;
+out vec3 vPosition;
+flat out vec4 vColour;
+void main() {
+  vec4 p = vec4(position, 1);
+  vPosition = vec3(dot(row0, p), dot(row1, p), dot(row2, p));
+  vec3 x = vec3(row0.x, row1.x, row2.x), z = vec3(row0.z, row1.z, row2.z), y = vec3(row0.y, row1.y, row2.y);
+  vNormal = x * (normal.x / dot(x, x)) + y * (normal.y / dot(y, y)) + z * (normal.z / dot(z, z));
+  vColour = colour;
+  gl_Position = clipFromWorld * vec4(vPosition, 1);
+}
+)";
+
+// Studio light: a large key from above the camera, a cool fill from below, a soft highlight and a darker outline.
+const char* const kModelFragmentShader = R"(
+in vec3 vNormal;
+in vec3 vPosition;
+flat in vec4 vColour;
+out vec4 pixel;
+uniform vec3 eye, right, up, back;
+void main() {
+  vec3 n = normalize(vNormal), v = normalize(eye - vPosition);
+  vec3 key = normalize(.45 * up - .35 * right + .8 * back);
+  float wrap = max((dot(n, key) + .35) / 1.35, 0.);
+  float facing = max(dot(n, v), 0.);
+  vec3 fill = mix(vec3(.20, .22, .27), vec3(.42, .42, .40), dot(n, up) * .5 + .5);
+  float gloss = pow(max(dot(n, normalize(key + v)), 0.), 60.);
+  float outline = smoothstep(0., .55, facing);
+  vec3 c = vColour.rgb * (fill + .85 * wrap * wrap) * mix(.55, 1., outline) + .22 * gloss;
+  pixel = vec4(toneCurve(c), mix(min(1., vColour.a * 1.8), vColour.a, outline));
+}
+)";
+
+const char* const kBackdropVertexShader = R"(
+out vec2 place;
+void main() {
+  place = vec2(gl_VertexID == 1 ? 3. : -1., gl_VertexID == 2 ? 3. : -1.);
+  gl_Position = vec4(place, 1, 1);
+}
+)";
+const char* const kBackdropFragmentShader = R"(
+in vec2 place;
+out vec4 pixel;
+void main() {
+  float r = dot(place, place);
+  vec3 c = mix(vec3(.93, .94, .95), vec3(.66, .69, .73), clamp(.45 * r + .18 * place.y, 0., 1.));
+  pixel = vec4(c, 1);
+}
+)";
+
+}  // namespace medulla

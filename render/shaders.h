@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+// GLSL 3.30 sources. `defines` are lines "#define NAME VALUE\n" put under the version line.
+namespace medulla {
+
+unsigned buildProgram(const std::string& defines, const char* vertex, const char* fragment);  // throws with GLSL's log
+
+// Tissue and steel. SHADE 0 lit, 1 shadow edge, 2 dark; DULL: no highlight can be seen.
+extern const char *const kTissueVertexShader, *const kTissueFragmentShader;
+// Covers what lies outside the round picture at the near plane: those pixels are never shaded.
+extern const char *const kMaskVertexShader, *const kMaskFragmentShader;
+// Balls and segments of the model view, instanced.
+extern const char *const kModelVertexShader, *const kModelFragmentShader;
+// Background of the model view: one triangle.
+extern const char *const kBackdropVertexShader, *const kBackdropFragmentShader;
+
+}  // namespace medulla

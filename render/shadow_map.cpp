@@ -1,0 +1,73 @@
+#include "render/shadow_map.h"
+
+#include <algorithm>
+
+namespace medulla {
+namespace {
+
+constexpr float kBehind = -1e9f;
+
+void projectVertices(const SceneMesh& mesh, const LightView& light, std::vector<glm::vec3>& texel) {
+  texel.resize(mesh.position.size());
+  const float half = 0.5f * kShadowSide;
+  for (std::size_t i = 0; i < texel.size(); ++i) {
+    const glm::vec4 clip = light.clipFromWorld * glm::vec4(mesh.position[i], 1);
+    const float inverse = 1 / std::max(clip.w, 1e-6f);
+    texel[i] = {(clip.x * inverse + 1) * half, (clip.y * inverse + 1) * half, clip.z * inverse * 0.5f + 0.5f};
+    if (clip.w < light.nearDistance) texel[i].x = kBehind;
+  }
+}
+
+void buildBlocks(ShadowMap& s) {
+  constexpr int b = ShadowMap::kBlockSide, blocks = ShadowMap::kBlocks;
+  s.nearest.resize(blocks * blocks);
+  s.farthest.resize(blocks * blocks);
+  for (int j = 0; j < blocks; ++j)
+    for (int i = 0; i < blocks; ++i) {
+      float low[b], high[b];
+      std::fill(low, low + b, 1.f);
+      std::fill(high, high + b, 0.f);
+      for (int y = 0; y < b; ++y) {
+        const float* row = &s.map.depth[std::size_t(j * b + y) * s.map.stride + i * b];
+        for (int x = 0; x < b; ++x) {
+          low[x] = std::min(low[x], row[x]);
+          high[x] = std::max(high[x], row[x]);
+        }
+      }
+      s.nearest[j * blocks + i] = *std::min_element(low, low + b);
+      s.farthest[j * blocks + i] = *std::max_element(high, high + b);
+    }
+}
+
+}  // namespace
+
+void renderShadowMap(const SceneMesh& mesh, const LightView& light, ShadowMap& s) {
+  projectVertices(mesh, light, s.texel);
+  s.map.clear();
+  for (const MeshPart& part : mesh.parts) {
+    if (!part.look->castsShadow) continue;
+    for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
+      const glm::vec3 a = s.texel[mesh.index[k]], b = s.texel[mesh.index[k + 1]], c = s.texel[mesh.index[k + 2]];
+      if (std::min({a.x, b.x, c.x}) > 0.5f * kBehind) s.map.rasterize(a, b, c);
+    }
+  }
+  buildBlocks(s);
+}
+
+Shade shadeOfTriangle(const ShadowMap& s, glm::vec3 a, glm::vec3 b, glm::vec3 c) {
+  constexpr float kMargin = 6;  // texels: the widest reach of the soft edge's taps
+  constexpr int side = ShadowMap::kBlockSide, last = ShadowMap::kBlocks - 1;
+  const auto block = [&](float texel) { return std::clamp(int(std::clamp(texel, -1e6f, 1e6f)) / side, 0, last); };
+  const int x0 = block(std::min({a.x, b.x, c.x}) - kMargin), x1 = block(std::max({a.x, b.x, c.x}) + kMargin);
+  const int y0 = block(std::min({a.y, b.y, c.y}) - kMargin), y1 = block(std::max({a.y, b.y, c.y}) + kMargin);
+  float low = 1, high = 0;
+  for (int y = y0; y <= y1; ++y)
+    for (int x = x0; x <= x1; ++x) {
+      low = std::min(low, s.nearest[y * ShadowMap::kBlocks + x]);
+      high = std::max(high, s.farthest[y * ShadowMap::kBlocks + x]);
+    }
+  const float zLow = std::min({a.z, b.z, c.z}), zHigh = std::max({a.z, b.z, c.z});
+  return zHigh <= low + 0.0005f ? Shade::lit : zLow > high + 0.002f ? Shade::dark : Shade::edge;
+}
+
+}  // namespace medulla

@@ -1,0 +1,167 @@
+#include "render/surface_bake.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/depth_map.h"
+#include "render/noise.h"
+
+namespace medulla {
+namespace {
+
+using glm::vec3;
+
+// Radius of the sphere with the part's ratio of volume to surface; negative for a cavity seen from inside. Tells the
+// unrolling how far the surface curves.
+float meanRadius(const SceneMesh& mesh, const MeshPart& part) {
+  double volume = 0, area = 0;
+  const vec3 origin = part.vertexCount ? mesh.position[part.firstVertex] : vec3(0);
+  for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
+    const vec3 a = mesh.position[mesh.index[k]] - origin, b = mesh.position[mesh.index[k + 1]] - origin,
+               c = mesh.position[mesh.index[k + 2]] - origin;
+    volume += glm::dot(a, glm::cross(b, c)) / 6;
+    area += glm::length(glm::cross(b - a, c - a)) / 2;
+  }
+  return area > 0 ? float(3 * volume / area) : 0.f;
+}
+
+// Planar projection along z, unrolled by the normal: exact arc length on a sphere of the given radius, continuous
+// everywhere but where the normal points to -z, which the camera sees last. One fetch with such coordinates costs a
+// quarter of a triplanar lookup and shows no seams.
+glm::vec2 unroll(vec3 p, vec3 n, float radius) {
+  const float angle = std::min(std::acos(glm::clamp(n.z, -1.f, 1.f)), 2.5f);
+  const float sine = std::max(std::sin(angle), 1e-3f);
+  const float excess = angle < 0.05f ? angle * angle / 6 : angle / sine - 1;
+  return glm::vec2(p) + radius * excess * glm::vec2(n);
+}
+
+struct Bounds {
+  vec3 low{1e30f}, high{-1e30f};
+  void add(vec3 p) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+};
+
+Bounds boundsOf(const SceneMesh& mesh, const MeshPart& part) {
+  Bounds b;
+  for (std::uint32_t i = 0; i < part.vertexCount; ++i) b.add(mesh.position[part.firstVertex + i]);
+  return b;
+}
+
+vec3 mixClamped(vec3 a, vec3 b, float t) {
+  return glm::mix(a, b, glm::clamp(t, 0.f, 1.f));
+}
+
+constexpr int kDirections = 64, kMapSide = 512;
+
+// Points of the golden spiral: even over the sphere for any count, no table.
+vec3 spiralDirection(int k) {
+  const float z = 1 - (2 * float(k) + 1) / float(kDirections);
+  const float r = std::sqrt(1 - z * z), turn = 2.39996323f * float(k);
+  return {r * std::cos(turn), r * std::sin(turn), z};
+}
+
+// Visibility is averaged over the edges twice: 64 directions leave bands otherwise.
+void smoothOpenness(SceneMesh& mesh) {
+  std::vector<float> sum(mesh.openness.size()), weight(mesh.openness.size());
+  for (int pass = 0; pass < 2; ++pass) {
+    sum = mesh.openness;
+    std::fill(weight.begin(), weight.end(), 1.f);
+    for (std::size_t k = 0; k < mesh.index.size(); k += 3)
+      for (int e = 0; e < 3; ++e) {
+        const std::uint32_t a = mesh.index[k + e], b = mesh.index[k + (e + 1) % 3];
+        sum[a] += mesh.openness[b];
+        sum[b] += mesh.openness[a];
+        weight[a] += 1;
+        weight[b] += 1;
+      }
+    for (std::size_t i = 0; i < sum.size(); ++i) mesh.openness[i] = sum[i] / weight[i];
+  }
+}
+
+bool occludes(const MeshPart& part) {
+  return !part.look->encloses && !part.instrument;
+}
+
+// Orthographic depth map of the scene seen against `direction`, and how much light each vertex gets along it.
+void gatherDirection(const SceneMesh& mesh, vec3 centre, float radius, vec3 direction, DepthMap& map,
+                     std::vector<vec3>& texel, std::vector<float>& light, std::vector<float>& total) {
+  const vec3 aside = std::abs(direction.x) < 0.7f ? vec3(1, 0, 0) : vec3(0, 1, 0);
+  const vec3 right = glm::normalize(glm::cross(aside, direction)), up = glm::cross(direction, right);
+  const float scale = 0.5f / radius;
+  for (std::size_t i = 0; i < texel.size(); ++i) {
+    const vec3 p = mesh.position[i] - centre;
+    texel[i] = {(glm::dot(p, right) * scale + 0.5f) * kMapSide, (glm::dot(p, up) * scale + 0.5f) * kMapSide,
+                0.5f - glm::dot(p, direction) * scale};
+  }
+  map.clear();
+  for (const MeshPart& part : mesh.parts) {
+    if (!occludes(part)) continue;
+    for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3)
+      map.rasterize(texel[mesh.index[k]], texel[mesh.index[k + 1]], texel[mesh.index[k + 2]]);
+  }
+  const float bias = 2.5f / kMapSide;  // two and a half texels
+  for (std::size_t i = 0; i < texel.size(); ++i) {
+    const float cosine = glm::dot(mesh.normal[i], direction);
+    if (cosine <= 0) continue;
+    total[i] += cosine;
+    // Reading one texel along the normal keeps the surface from hiding itself at grazing angles.
+    const int x = int(texel[i].x + 1.5f * glm::dot(mesh.normal[i], right)),
+              y = int(texel[i].y + 1.5f * glm::dot(mesh.normal[i], up));
+    const bool outside = x < 0 || y < 0 || x >= kMapSide || y >= kMapSide;
+    if (outside || texel[i].z - bias <= map.at(x, y)) light[i] += cosine;
+  }
+}
+
+}  // namespace
+
+void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
+  const float radius = meanRadius(mesh, part), c = std::cos(part.look->unrollTilt), s = std::sin(part.look->unrollTilt);
+  const auto tilted = [c, s](vec3 v) { return vec3(v.x, c * v.y - s * v.z, s * v.y + c * v.z); };
+  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
+    mesh.uv[i] = unroll(tilted(mesh.position[i]), tilted(mesh.normal[i]), radius) * part.look->detailScale;
+}
+
+void bakeAlbedo(SceneMesh& mesh, const MeshPart& part) {
+  const Look& look = *part.look;
+  const Bounds bounds = boundsOf(mesh, part);
+  const vec3 extent = glm::max(bounds.high - bounds.low, vec3(1e-6f));
+  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+    const vec3 p = mesh.position[i], inBox = (p - bounds.low) / extent;
+    const float coarse = fractalNoise(p * look.mottleFrequency + 3.f);
+    const float middle = fractalNoise(p * look.mottleFrequency * 3.f + 9.f);
+    vec3 albedo = mixClamped(look.albedoLow, look.albedoHigh, 0.7f * coarse + 0.55f * (middle - 0.25f));
+    for (const Patch& patch : look.patches) {
+      if (patch.amount == 0) break;
+      const float at =
+          patch.noiseWeight * fractalNoise(p * patch.frequency + patch.seed) + glm::dot(patch.gradient, inBox);
+      albedo = glm::mix(albedo, patch.colour, patch.amount * smoothStep(patch.from, patch.to, at));
+    }
+    mesh.albedo[i] = albedo;
+  }
+}
+
+void bakeOpenness(SceneMesh& mesh) {
+  Bounds bounds;
+  for (const MeshPart& part : mesh.parts)
+    if (occludes(part)) {
+      const Bounds b = boundsOf(mesh, part);
+      bounds.add(b.low);
+      bounds.add(b.high);
+    }
+  const std::size_t n = mesh.position.size();
+  std::fill(mesh.openness.begin(), mesh.openness.end(), 1.f);
+  if (n == 0 || bounds.low.x > bounds.high.x) return;
+  const vec3 centre = 0.5f * (bounds.low + bounds.high);
+  const float radius = std::max(0.5f * glm::length(bounds.high - bounds.low), 1e-6f);
+  DepthMap map(kMapSide);
+  std::vector<vec3> texel(n);
+  std::vector<float> light(n, 0.f), total(n, 0.f);
+  for (int k = 0; k < kDirections; ++k)
+    gatherDirection(mesh, centre, radius, spiralDirection(k), map, texel, light, total);
+  for (std::size_t i = 0; i < n; ++i) mesh.openness[i] = total[i] > 0 ? light[i] / total[i] : 1.f;
+  smoothOpenness(mesh);
+}
+
+}  // namespace medulla

@@ -1,0 +1,173 @@
+#define GL_GLEXT_PROTOTYPES
+#include "render/tissue_pass.h"
+
+#include <GL/gl.h>
+#include <GL/glext.h>
+
+#include <cmath>
+#include <glm/gtc/type_ptr.hpp>
+
+#include "render/detail_texture.h"
+#include "render/shaders.h"
+
+namespace medulla {
+namespace {
+
+constexpr int kMaskSegments = 96;
+
+void attribute(unsigned slot, int components, std::size_t offset) {
+  glEnableVertexAttribArray(slot);
+  glVertexAttribPointer(slot, components, GL_FLOAT, GL_FALSE, sizeof(LitVertex), reinterpret_cast<const void*>(offset));
+}
+
+unsigned makeDetail(const Look& look, int seed) {
+  unsigned texture = 0;
+  glGenTextures(1, &texture);
+  glBindTexture(GL_TEXTURE_2D, texture);
+  const std::vector<std::uint8_t> texels = makeDetailTexture(look.detail, seed);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, look.detail.side, look.detail.side, 0, GL_RGBA, GL_UNSIGNED_BYTE,
+               texels.data());
+  glGenerateMipmap(GL_TEXTURE_2D);
+  // Blending two mip levels costs four milliseconds a picture and cannot be told apart on this fine structure.
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_NEAREST);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  return texture;
+}
+
+unsigned makeShadowTexture() {
+  unsigned texture = 0;
+  glGenTextures(1, &texture);
+  glBindTexture(GL_TEXTURE_2D, texture);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, kShadowSide, kShadowSide, 0, GL_DEPTH_COMPONENT, GL_FLOAT,
+               nullptr);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
+  return texture;
+}
+
+}  // namespace
+
+TissuePass::Program TissuePass::makeProgram(Variant v) {
+  const bool dull = v == Variant::litDull || v == Variant::edgeDull;
+  const int shade = v == Variant::dark ? 2 : v == Variant::edge || v == Variant::edgeDull ? 1 : 0;
+  Program p;
+  p.id = buildProgram("#define SHADE " + std::to_string(shade) + "\n" + (dull ? "#define DULL\n" : ""),
+                      kTissueVertexShader, kTissueFragmentShader);
+  const auto uniform = [&p](const char* name) { return glGetUniformLocation(p.id, name); };
+  p.clipFromWorld = uniform("clipFromWorld");
+  p.shadowFromWorld = uniform("shadowFromWorld");
+  p.surface = uniform("surface");
+  p.lobes = uniform("lobes");
+  p.tint = uniform("tint");
+  p.opacity = uniform("opacity");
+  glUseProgram(p.id);
+  glUniform1i(uniform("detail"), 0);
+  glUniform1i(uniform("shadowMap"), 1);
+  glUniform1f(uniform("texel"), 1.f / kShadowSide);
+  return p;
+}
+
+TissuePass::TissuePass() {
+  for (int v = 0; v < kVariants; ++v) programs_[v] = makeProgram(static_cast<Variant>(v));
+  maskProgram_ = buildProgram("", kMaskVertexShader, kMaskFragmentShader);
+  shadowTexture_ = makeShadowTexture();
+
+  glGenVertexArrays(1, &vertexArray_);
+  glGenBuffers(1, &vertices_);
+  glGenBuffers(1, &indices_);
+  glBindVertexArray(vertexArray_);
+  glBindBuffer(GL_ARRAY_BUFFER, vertices_);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices_);
+  attribute(0, 3, offsetof(LitVertex, position));
+  attribute(1, 4, offsetof(LitVertex, direct));   // and gloss
+  attribute(2, 4, offsetof(LitVertex, ambient));  // and shadowRadius
+  attribute(3, 4, offsetof(LitVertex, halfway));  // and shadowBias
+  attribute(4, 2, offsetof(LitVertex, uv));
+
+  glGenVertexArrays(1, &maskArray_);
+  glGenBuffers(1, &maskBuffer_);
+}
+
+TissuePass::~TissuePass() {
+  for (const Program& p : programs_) glDeleteProgram(p.id);
+  glDeleteProgram(maskProgram_);
+  for (const auto& [look, texture] : textures_) glDeleteTextures(1, &texture);
+  glDeleteTextures(1, &shadowTexture_);
+  for (const unsigned b : {vertices_, indices_, maskBuffer_}) glDeleteBuffers(1, &b);
+  for (const unsigned a : {vertexArray_, maskArray_}) glDeleteVertexArrays(1, &a);
+}
+
+void TissuePass::addLook(const Look& look) {
+  if (textures_.contains(look.name)) return;
+  // The seed is the look's place in the table, not the order of use: a scene's pictures do not depend on its order.
+  const int seed = int(&look - looks().data());
+  textures_[look.name] = makeDetail(look, seed);
+}
+
+void TissuePass::drawMask(const Viewpoint& view) {
+  std::vector<glm::vec2> strip;
+  for (int k = 0; k <= kMaskSegments; ++k) {
+    const float a = 6.2831853f * float(k) / kMaskSegments;
+    const glm::vec2 d(std::cos(a), std::sin(a));
+    // A little outside the rim, which the post-process draws; the polygon's sides cut the corners by 0.05 %.
+    strip.push_back(2.004f * kRimOuter * d / glm::vec2(view.aspect, 1));
+    strip.push_back(3.f * d);
+  }
+  glUseProgram(maskProgram_);
+  glBindVertexArray(maskArray_);
+  glBindBuffer(GL_ARRAY_BUFFER, maskBuffer_);
+  glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(strip.size() * sizeof(glm::vec2)), strip.data(), GL_STREAM_DRAW);
+  glEnableVertexAttribArray(0);
+  glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, 0, nullptr);
+  glDrawArrays(GL_TRIANGLE_STRIP, 0, int(strip.size()));
+}
+
+void TissuePass::upload(const VertexLight& lit, const DrawLists& lists, const ShadowMap* shadow) {
+  glBindVertexArray(vertexArray_);
+  glBindBuffer(GL_ARRAY_BUFFER, vertices_);
+  glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(lit.vertices.size() * sizeof(LitVertex)), lit.vertices.data(),
+               GL_STREAM_DRAW);
+  glBufferData(GL_ELEMENT_ARRAY_BUFFER, GLsizeiptr(lists.index.size() * sizeof(std::uint32_t)), lists.index.data(),
+               GL_STREAM_DRAW);
+  if (!shadow) return;
+  glActiveTexture(GL_TEXTURE1);
+  glBindTexture(GL_TEXTURE_2D, shadowTexture_);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, shadow->map.stride);
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, kShadowSide, kShadowSide, GL_DEPTH_COMPONENT, GL_FLOAT,
+                  shadow->map.depth.data());
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+  glActiveTexture(GL_TEXTURE0);
+}
+
+void TissuePass::draw(const SceneMesh& mesh, const DrawLists& lists, const std::vector<char>& wanted,
+                      const Viewpoint& view, const LightView& lightView, float opacity) {
+  if (opacity < 1) {
+    glEnable(GL_BLEND);
+    glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
+  }
+  glBindVertexArray(vertexArray_);
+  for (const DrawRun& run : lists.runs) {
+    if (!wanted[run.part]) continue;
+    const Look& look = *mesh.parts[run.part].look;
+    const Program& p = programs_[static_cast<std::size_t>(run.variant)];
+    const GlossLobes lobes = glossLobes(look);
+    constexpr float kDiffuseRelief = 0.9f;
+    glUseProgram(p.id);
+    glUniformMatrix4fv(p.clipFromWorld, 1, GL_FALSE, glm::value_ptr(view.clipFromWorld));
+    glUniformMatrix4fv(p.shadowFromWorld, 1, GL_FALSE, glm::value_ptr(lightView.clipFromWorld));
+    glUniform4f(p.surface, look.mottle, look.vessels, look.bump, kDiffuseRelief);
+    glUniform4f(p.lobes, lobes.a1 - 1, lobes.c1, lobes.a2 - 1, lobes.c2);
+    glUniform4f(p.tint, look.vesselTint.x, look.vesselTint.y, look.vesselTint.z, kFilmPeak);
+    glUniform1f(p.opacity, opacity);
+    glBindTexture(GL_TEXTURE_2D, textures_.at(look.name));
+    glDrawElements(GL_TRIANGLES, int(run.indexCount), GL_UNSIGNED_INT,
+                   reinterpret_cast<const void*>(run.firstIndex * sizeof(std::uint32_t)));
+  }
+  glDisable(GL_BLEND);
+}
+
+}  // namespace medulla

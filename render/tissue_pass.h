@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "render/visible_triangles.h"
+
+namespace medulla {
+
+// The OpenGL side of tissue and steel: programs, detail textures, buffers. Needs a current context.
+class TissuePass {
+ public:
+  TissuePass();
+  ~TissuePass();
+  TissuePass(const TissuePass&) = delete;
+  TissuePass& operator=(const TissuePass&) = delete;
+
+  void addLook(const Look& look);  // makes its texture, once
+  void drawMask(const Viewpoint& viewpoint);
+  void upload(const VertexLight& lit, const DrawLists& lists, const ShadowMap* shadow);
+  // Draws the runs of the parts for which `wanted` is set; opacity < 1 blends over what is there.
+  void draw(const SceneMesh& mesh, const DrawLists& lists, const std::vector<char>& wanted, const Viewpoint& viewpoint,
+            const LightView& lightView, float opacity);
+
+ private:
+  struct Program {
+    unsigned id = 0;
+    int clipFromWorld, shadowFromWorld, surface, lobes, tint, opacity;
+  };
+  static Program makeProgram(Variant variant);
+
+  std::array<Program, kVariants> programs_;
+  std::map<std::string, unsigned> textures_;  // by look
+  unsigned maskProgram_ = 0, maskArray_ = 0, maskBuffer_ = 0;
+  unsigned vertexArray_ = 0, vertices_ = 0, indices_ = 0, shadowTexture_ = 0;
+};
+
+}  // namespace medulla

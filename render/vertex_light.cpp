@@ -1,0 +1,195 @@
+#include "render/vertex_light.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/noise.h"
+
+namespace medulla {
+namespace {
+
+using glm::vec3;
+
+// Light scattered by the cavity itself, linear RGB: from below and from above, and the veil of moist air.
+constexpr vec3 kAmbientBelow(0.070f, 0.022f, 0.018f), kAmbientAbove(0.130f, 0.075f, 0.065f);
+constexpr vec3 kRimLight(0.10f, 0.045f, 0.035f), kVeil(0.085f, 0.022f, 0.016f);
+constexpr vec3 kBlanched(0.56f, 0.44f, 0.33f);
+
+// Reflectance at normal incidence of a film of water, a little raised (Schlick 1994).
+constexpr float kFilmReflectance = 0.035f;
+
+// Everything about one picture that the vertices share.
+struct Surroundings {
+  const Viewpoint& view;
+  const Light& light;
+  const LightView& lightView;
+  float coneInner, coneOuter;  // cosines: the endoscope's cone is a little wider than the picture
+};
+
+// One vertex while it is lit.
+struct Shading {
+  vec3 normal, toEye, toLight;
+  float eyeDistance, lightDistance;
+  float exposure;  // light per albedo without distance: falls off towards the rim, and in the veil
+  float veil;      // 0..1
+  float falloff;   // light's distance and cone
+  vec3 albedo;
+  float openness;
+};
+
+Shading shadingOf(const SceneMesh& mesh, std::size_t i, vec3 picture, const Surroundings& s) {
+  Shading v;
+  v.normal = mesh.normal[i];
+  v.toEye = s.view.position - mesh.position[i];
+  v.eyeDistance = std::max(glm::length(v.toEye), 1e-6f);
+  v.toEye /= v.eyeDistance;
+  v.toLight = s.lightView.position - mesh.position[i];
+  v.lightDistance = std::max(glm::length(v.toLight), 1e-6f);
+  v.toLight /= v.lightDistance;
+  v.falloff = lightFalloff(s.light, v.lightDistance) *
+              smoothStep(s.coneOuter, s.coneInner, -glm::dot(v.toLight, s.lightView.direction));
+  const float r = std::sqrt(picture.x * picture.x + picture.y * picture.y);
+  const float vignette = s.view.round ? 1 - 0.55f * smoothStep(0.25f, 0.85f, r) : 1.f;
+  v.exposure = kExposure * vignette;
+  const float reference = s.light.referenceDistance;
+  v.veil = s.view.round ? 1 - std::exp(-0.65f * std::max(v.eyeDistance / reference - 0.76f, 0.f)) : 0.f;
+  const float blanch = mesh.blanch[i];
+  v.albedo = glm::mix(mesh.albedo[i], kBlanched, 0.75f * blanch);
+  v.openness = mesh.openness[i] * (1 - 0.3f * blanch);
+  return v;
+}
+
+float fresnelEdge(const Shading& v) {
+  const float grazing = 1 - std::max(glm::dot(v.normal, v.toEye), 0.f);
+  return grazing * grazing * grazing * grazing;
+}
+
+void lightTissue(const Shading& v, const Look& look, LitVertex& out) {
+  const float cosine = glm::dot(v.normal, v.toLight), visible = v.exposure * (1 - v.veil);
+  const vec3 reach = 1.f + look.wrap;
+  const vec3 diffuse = glm::max((cosine + look.wrap) / (reach * reach), 0.f);
+  const float crease = look.ambient > 0 ? 0.55f + 0.45f * v.openness : 1.f;
+  out.direct = v.albedo * diffuse * (v.falloff * visible * crease);
+  const vec3 sky = glm::mix(kAmbientBelow, kAmbientAbove, v.normal.y * 0.5f + 0.5f) * v.openness;
+  const vec3 rim = kRimLight * (fresnelEdge(v) * v.openness * 0.8f * std::min(v.falloff, 1.5f));
+  out.ambient = (v.albedo * sky * 1.2f + rim) * (visible * look.ambient);
+}
+
+// Steel mirrors the cavity: dim red below, pale above, and bands where lamp and lit organs would be.
+void lightMetal(const Shading& v, LitVertex& out) {
+  const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
+  const vec3 mirrored = 2.f * v.normal * facing - v.toEye;
+  const float above = mirrored.y * 0.5f + 0.5f;
+  const float band = 0.9f * smoothStep(0.55f, 0.95f, glm::dot(mirrored, v.toEye)) +
+                     0.5f * smoothStep(-0.75f, -0.35f, mirrored.x) * smoothStep(0.15f, -0.3f, mirrored.x);
+  const vec3 cavity =
+      vec3(0.05f, 0.018f, 0.014f) + vec3(0.16f, 0.085f, 0.07f) * (above * above) + vec3(0.55f, 0.53f, 0.50f) * band;
+  const float edge = facing < 0 ? 0.f : fresnelEdge(v);
+  out.direct = v.albedo * (std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 0.39f * visible);
+  out.ambient = (v.albedo * 1.1f + 0.010f + 0.06f * edge) * cavity * (v.openness * visible * std::min(v.falloff, 1.4f));
+}
+
+// Can the highlight be seen anywhere within the slopes of the relief? (Most pixels of tissue cannot: they go to a
+// cheaper shader.)
+bool canGlint(float gloss, float cosine, const Look& look, const GlossLobes& lobes) {
+  constexpr float kVisible = 0.008f;  // two grey levels in the dark
+  const float c = std::clamp(cosine, 0.f, 1.f), s = std::sqrt(1 - c * c);
+  const float slope = look.bump * 0.42f, tiltCos = 1 / std::sqrt(1 + slope * slope), tiltSin = slope * tiltCos;
+  const float best = s < tiltSin && c > 0.5f ? 1.f : c * tiltCos + s * tiltSin, x = best * best;
+  const float d1 = 1 + (lobes.a1 - 1) * x, d2 = 1 + (lobes.a2 - 1) * x;
+  return gloss * (lobes.c1 / (d1 * d1) + std::min(lobes.c2 / (d2 * d2), kFilmPeak)) > kVisible;
+}
+
+// Is the vertex lit, dark, or near an edge? Looks around it in the shadow map as far as a soft edge reaches; the
+// distance of what it finds in the way sets how soft the edge is (Fernando 2005, percentage-closer soft shadows).
+Shade shadeVertex(const ShadowMap& shadow, vec3 texel, const Shading& v, const LightView& light, LitVertex& out) {
+  constexpr int kTaps = 17;
+  constexpr float kReach = 18, kMinimumBias = 0.0008f;
+  constexpr float kX[kTaps] = {0, 1, -1, 0, 0, .7f, .7f, -.7f, -.7f, .45f, -.45f, .2f, -.2f, 0, 0, 1.2f, -1.2f};
+  constexpr float kY[kTaps] = {0, 0, 0, 1, -1, .7f, -.7f, .7f, -.7f, .2f, -.2f, -.45f, .45f, 1.2f, -1.2f, 0, 0};
+  const float cosine = glm::dot(v.normal, v.toLight);
+  const float slope = std::min(std::sqrt(std::max(1 - cosine * cosine, 0.f)) / std::max(cosine, 0.12f), 4.f);
+  const float range = light.farDistance * light.nearDistance / (light.farDistance - light.nearDistance);
+  const float depthPerMetre = range / (v.lightDistance * v.lightDistance);
+  const float metresPerTexel = 2 * v.lightDistance * light.tangent / kShadowSide;
+  int lit = 0, tried = 0;
+  float blockers = 0, blockerDepth = 0;
+  for (int k = 0; k < kTaps; ++k) {
+    const int x = int(texel.x + kX[k] * kReach), y = int(texel.y + kY[k] * kReach);
+    if (x < 0 || y < 0 || x >= kShadowSide || y >= kShadowSide) continue;
+    ++tried;
+    const float away = std::sqrt(kX[k] * kX[k] + kY[k] * kY[k]) * kReach;
+    const float bias = kMinimumBias + depthPerMetre * (0.5f + away) * metresPerTexel * slope;
+    const float depth = shadow.map.at(x, y);
+    if (texel.z - bias <= depth)
+      ++lit;
+    else {
+      blockers += 1;
+      blockerDepth += depth;
+    }
+  }
+  out.shadowRadius = 2;
+  out.shadowBias = 0.0006f + 0.0011f * slope;
+  if (blockers > 0) {
+    const float gap = (texel.z - blockerDepth / blockers) / depthPerMetre;
+    out.shadowRadius = std::min(1.2f + 0.03f * std::max(gap, 0.f) / metresPerTexel, 7.f);
+    out.shadowBias = 0.0007f + 1.8f * depthPerMetre * metresPerTexel * (out.shadowRadius + 0.7f) * slope;
+  }
+  if (cosine < -0.05f) return Shade::dark;
+  return lit == tried ? Shade::lit : lit == 0 ? Shade::dark : Shade::edge;
+}
+
+}  // namespace
+
+float lightFalloff(const Light& light, float distance) {
+  const float r2 = light.referenceDistance * light.referenceDistance;
+  return light.intensity * (1 + kSoftening) * r2 / (distance * distance + kSoftening * r2);
+}
+
+GlossLobes glossLobes(const Look& look) {
+  constexpr float kPi = 3.14159265f;
+  const auto fourth = [](float x) { return x * x * x * x; };
+  const float a1 = fourth(look.roughness), a2 = fourth(look.wetRoughness);
+  return {a1, a1 / kPi * 0.18f * look.specular, a2, a2 / kPi * 0.22f * look.specular};
+}
+
+void lightVertices(const SceneMesh& mesh, const Viewpoint& view, const Light& light, const LightView& lightView,
+                   const ShadowMap* shadow, VertexLight& out) {
+  const std::size_t n = mesh.position.size();
+  out.vertices.resize(n);
+  out.picture.resize(n);
+  out.shade.assign(n, Shade::lit);
+  out.glinting.assign(n, 1);
+  const float cone = std::atan(2 * kRimOuter * view.tangent);
+  const Surroundings s{view, light, lightView, std::cos(0.40f * cone), std::cos(std::min(1.07f * cone, 1.5f))};
+  for (const MeshPart& part : mesh.parts) {
+    const Look& look = *part.look;
+    const GlossLobes lobes = glossLobes(look);
+    for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+      LitVertex& o = out.vertices[i];
+      o.position = mesh.position[i];
+      o.uv = mesh.uv[i];
+      out.picture[i] = pictureFromWorld(view, mesh.position[i]);
+      const Shading v = shadingOf(mesh, i, out.picture[i], s);
+      if (look.metal)
+        lightMetal(v, o);
+      else
+        lightTissue(v, look, o);
+      o.ambient += kVeil * (v.veil * v.exposure * look.ambient);
+
+      const vec3 halfway = glm::normalize(v.toLight + v.toEye);
+      const float lh = glm::dot(v.toLight, halfway);
+      const float fresnel = kFilmReflectance + (1 - kFilmReflectance) * std::exp2((-5.55473f * lh - 6.98316f) * lh);
+      o.gloss = fresnel * std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 3 * v.exposure * (1 - v.veil);
+      const vec3 t = mesh.tangent[i];
+      o.halfway = {glm::dot(halfway, t), glm::dot(halfway, glm::cross(v.normal, t)), glm::dot(halfway, v.normal)};
+      out.glinting[i] = canGlint(o.gloss, o.halfway.z, look, lobes);
+      o.shadowRadius = 2;
+      o.shadowBias = 0;
+      // Instruments take no shadow: the light sits beside the lens, and a thin jaw only shadows itself in stripes.
+      if (shadow && !part.instrument) out.shade[i] = shadeVertex(*shadow, shadow->texel[i], v, lightView, o);
+    }
+  }
+}
+
+}  // namespace medulla

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "render/shadow_map.h"
+#include "render/viewpoint.h"
+
+namespace medulla {
+
+// What the shaders get per vertex: light is computed here on the CPU, once per vertex instead of once per pixel, which
+// is what makes thirty pictures a second possible on two cores.
+struct LitVertex {
+  glm::vec3 position;  // m, world
+  glm::vec3 direct;    // diffuse light of the endoscope, times albedo
+  float gloss;         // strength of the highlights
+  glm::vec3 ambient;   // everything that shadow does not touch, times albedo
+  float shadowRadius;  // texels: half width of a soft shadow edge
+  glm::vec3 halfway;   // between light and eye: along tangent, bitangent, normal
+  float shadowBias;    // depth
+  glm::vec2 uv;
+};
+
+// Highlight of a look: two lobes c / (1 + (a - 1) cos^2)^2 (GGX, Walter et al. 2007), the tissue's and the wet film's.
+struct GlossLobes {
+  float a1, c1, a2, c2;
+};
+GlossLobes glossLobes(const Look& look);
+constexpr float kFilmPeak = 13.2f;  // of the film's lobe: beyond it only aliasing grows
+
+struct VertexLight {
+  std::vector<LitVertex> vertices;
+  std::vector<glm::vec3> picture;      // pictureFromWorld of every vertex
+  std::vector<Shade> shade;            // of the vertex, by taps around it
+  std::vector<std::uint8_t> glinting;  // 0 where no highlight can be seen even with the relief's slopes
+};
+
+// A surface facing the light at distance d gets, per unit of albedo,
+//   kExposure * intensity * 1.14 r^2 / (d^2 + 0.14 r^2),  r = referenceDistance:
+// inverse square, softened because the light has a size and a camera's automatic exposure holds back near glare.
+constexpr float kExposure = 1.3f, kSoftening = 0.14f;
+float lightFalloff(const Light& light, float distance);
+
+void lightVertices(const SceneMesh& mesh, const Viewpoint& viewpoint, const Light& light, const LightView& lightView,
+                   const ShadowMap* shadow, VertexLight& out);
+
+}  // namespace medulla

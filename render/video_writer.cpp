@@ -1,0 +1,139 @@
+#include "render/video_writer.h"
+
+#include <pthread.h>
+#include <unistd.h>
+
+#include <cassert>
+#include <cerrno>
+#include <condition_variable>
+#include <csignal>
+#include <cstring>
+#include <deque>
+#include <filesystem>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+
+#include "render/encoder_process.h"
+#include "render/yuv.h"
+
+namespace medulla {
+namespace {
+
+// Enough that neither side waits for the other's jitter; more only costs memory (3.7 MB each at 720p).
+constexpr std::size_t kQueuedPictures = 3;
+
+std::string checkedPartialPath(const std::string& path) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) throw std::runtime_error(path + ": cannot be written: no such folder");
+  if (fs::is_directory(path, error)) throw std::runtime_error(path + ": cannot be written: it is a folder");
+  if (access(folder.c_str(), W_OK) != 0)
+    throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
+  return path + ".partial-" + std::to_string(getpid());
+}
+
+}  // namespace
+
+// The caller queues pictures; one thread converts and feeds them to the encoder, so that encoding overlaps drawing.
+struct VideoWriter::Data {
+  std::string path, partial;
+  int width, height;
+  EncoderProcess encoder;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::deque<Image> waiting, spare;
+  bool ended = false, failed = false;
+  std::thread feeder;
+
+  Data(const std::string& p, int w, int h, double fps)
+      : path(p),
+        partial(checkedPartialPath(p)),
+        width(w),
+        height(h),
+        encoder(partial, w, h, fps),
+        spare(kQueuedPictures) {
+    feeder = std::thread([this] { feed(); });
+  }
+
+  ~Data() {
+    end();
+    std::error_code ignored;
+    std::filesystem::remove(partial, ignored);
+  }
+
+  void end() {
+    {
+      const std::lock_guard lock(mutex);
+      ended = true;
+    }
+    changed.notify_all();
+    if (feeder.joinable()) feeder.join();
+  }
+
+  void feed() {
+    sigset_t pipeSignal;
+    sigemptyset(&pipeSignal);
+    sigaddset(&pipeSignal, SIGPIPE);
+    pthread_sigmask(SIG_BLOCK, &pipeSignal, nullptr);  // a dead encoder is a failed write, not the end of the program
+    std::vector<std::uint8_t> planes;
+    for (;;) {
+      std::unique_lock lock(mutex);
+      changed.wait(lock, [this] { return ended || !waiting.empty(); });
+      if (waiting.empty() || failed) return;
+      Image image = std::move(waiting.front());
+      waiting.pop_front();
+      lock.unlock();
+      rgbaToI420(image, planes);
+      const bool written = encoder.write(planes);
+      lock.lock();
+      spare.push_back(std::move(image));
+      failed = failed || !written;
+      lock.unlock();
+      changed.notify_all();
+    }
+  }
+
+  [[noreturn]] void fail() {
+    end();
+    encoder.finish();
+    throw std::runtime_error(path + ": ffmpeg failed: " + encoder.complaint());
+  }
+};
+
+VideoWriter::VideoWriter(const std::string& path, int width, int height, double fps) {
+  assert(width > 0 && height > 0 && width % 2 == 0 && height % 2 == 0 && fps > 0);
+  data_ = std::make_unique<Data>(path, width, height, fps);
+}
+VideoWriter::~VideoWriter() = default;
+VideoWriter::VideoWriter(VideoWriter&&) noexcept = default;
+
+void VideoWriter::write(const Image& image) {
+  assert(image.width == data_->width && image.height == data_->height);
+  std::unique_lock lock(data_->mutex);
+  assert(!data_->ended);
+  data_->changed.wait(lock, [this] { return data_->failed || !data_->spare.empty(); });
+  if (data_->failed) {
+    lock.unlock();
+    data_->fail();
+  }
+  Image copy = std::move(data_->spare.front());
+  data_->spare.pop_front();
+  lock.unlock();
+  copy = image;
+  lock.lock();
+  data_->waiting.push_back(std::move(copy));
+  lock.unlock();
+  data_->changed.notify_all();
+}
+
+void VideoWriter::finish() {
+  data_->end();
+  if (data_->failed || !data_->encoder.finish()) data_->fail();
+  std::error_code error;
+  std::filesystem::rename(data_->partial, data_->path, error);
+  if (error) throw std::runtime_error(data_->path + ": cannot be written: " + error.message());
+}
+
+}  // namespace medulla

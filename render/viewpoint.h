@@ -1,0 +1,36 @@
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "render/renderer.h"
+#include "render/shadow_map.h"
+
+namespace medulla {
+
+// Radius of the endoscope's round picture, in picture heights from the centre; its rim fades between the two.
+constexpr float kRimInner = 0.79f, kRimOuter = 0.815f;
+
+// The camera of one picture with what follows from it.
+struct Viewpoint {
+  glm::vec3 position{0}, right{1, 0, 0}, up{0, 1, 0}, back{0, 0, 1};  // m; unit axes
+  float tangent = 1;                                                  // of half the vertical field of view
+  float aspect = 1;                                                   // width / height
+  bool round = true;                                                  // the picture is cut to a circle
+  glm::mat4 clipFromWorld{1};  // y points down, so that the first row read back is the top one
+};
+
+// Near plane, m: the instrument's shaft passes close to the lens.
+constexpr float kNearPlane = 0.005f;
+
+// x, y in picture heights from the centre (y up), z = depth in m.
+inline glm::vec3 pictureFromWorld(const Viewpoint& v, glm::vec3 p) {
+  const glm::vec3 d = p - v.position;
+  const float depth = -glm::dot(v.back, d);
+  const float scale = 0.5f / (glm::max(depth, kNearPlane) * v.tangent);
+  return {glm::dot(v.right, d) * scale, glm::dot(v.up, d) * scale, depth};
+}
+
+Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round);
+LightView makeLightView(const Light& light, const Viewpoint& viewpoint, const Camera& camera);
+
+}  // namespace medulla
