@@ -7,6 +7,7 @@
 #include <fstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "assets/shapes/mesh_check.h"
@@ -23,16 +24,23 @@ struct MeshRecipe {
   Box box;             // mm, encloses the organ
   double gridSpacing;  // mm
   RemeshSettings remesh;
+  bool seenFromInside = false;  // wound clockwise seen from outside
 };
 
 static std::vector<MeshRecipe> recipes() {
   const Box gallbladderBox{{-85, -80, -35}, {-5, 10, 45}};
   return {{"gallbladder", "gallbladder", gallbladder, gallbladderBox, 1.0, {466, 15, 0.4}},
-          {"gallbladder", "gallbladder_fine", gallbladder, gallbladderBox, 0.8, {20000, 15, 0.4}}};
+          {"gallbladder", "gallbladder_fine", gallbladder, gallbladderBox, 0.8, {20000, 15, 0.4}},
+          {"scenery", "liver", liver, {{-175, -65, -105}, {140, 145, 75}}, 2.5, {9000, 40, 0.4}},
+          {"scenery", "stomach", stomach, {{-55, -135, -80}, {145, 120, 75}}, 2.5, {5000, 30, 0.5}},
+          {"scenery", "fat", fat, {{-220, -240, -125}, {190, -20, 150}}, 2.5, {6000, 15, 0.6}},
+          {"scenery", "wall", cavity, {{-270, -220, -170}, {240, 190, 290}}, 9, {4000, 60, 0.6}, true}};
 }
 
 static void makeMesh(const MeshRecipe& recipe, const std::filesystem::path& directory) {
-  const TriangleMesh mesh = remesh(surfaceNets(recipe.sdf, recipe.box, recipe.gridSpacing), recipe.sdf, recipe.remesh);
+  TriangleMesh mesh = remesh(surfaceNets(recipe.sdf, recipe.box, recipe.gridSpacing), recipe.sdf, recipe.remesh);
+  if (recipe.seenFromInside)
+    for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
   const MeshCheck check = checkMesh(mesh);
   fmt::print("{}: {} triangles, length {:.1f} mm, volume {:.1f} ml, genus {}, quality min {:.2f} median {:.2f}\n",
              recipe.name, mesh.triangles.size(), meshLength(mesh), check.volume / 1000, check.genus, check.qualityMin,
