@@ -41,7 +41,8 @@ const char* completeScene = R"(<?xml version="1.0"?>
 class SceneFile : public testing::Test {
  protected:
   Scene read(const std::string& text, const std::vector<SceneOverride>& overrides = {}) const {
-    return readScene(temporary.write("x.xml", text), overrides);
+    temporary.write("x.xml", text);
+    return readScene(temporary / "x.xml", overrides);
   }
   // The complaint, without the folder; empty where there is none.
   std::string complaint(const std::string& text, const std::vector<SceneOverride>& overrides = {}) const {
@@ -63,7 +64,7 @@ class SceneFile : public testing::Test {
   }
 
   TemporaryFolder temporary;
-  const std::string folder = temporary.path;
+  const std::string folder = temporary.path();
 };
 
 TEST_F(SceneFile, EveryValueArrives) {

@@ -1,39 +1,38 @@
 #pragma once
 
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 namespace medulla {
 
-// A folder for one test, gone with everything in it afterwards.
+// A folder that is gone when the test ends.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    const testing::TestInfo& test = *testing::UnitTest::GetInstance()->current_test_info();
-    path = (std::filesystem::temp_directory_path() /
-            (std::string("medulla_") + test.test_suite_name() + "_" + test.name() + "_" + std::to_string(::getpid())))
-               .string();
-    std::filesystem::create_directories(path);
+    char base[] = "/tmp/medulla_test_XXXXXX";
+    path_ = mkdtemp(base);
   }
-  ~TemporaryFolder() { std::filesystem::remove_all(path); }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  // Writes a file and returns its path.
-  std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(path + "/" + name, std::ios::binary) << text;
-    return path + "/" + name;
+  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+  const std::string& path() const { return path_; }
+  // Names in the folder, hidden ones too.
+  std::vector<std::string> contents() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(path_)) {
+      names.push_back(entry.path().filename().string());
+    }
+    return names;
   }
-  // How many files are in it, for tests that ask what was left behind.
-  std::size_t count() const {
-    return std::distance(std::filesystem::directory_iterator(path), std::filesystem::directory_iterator());
-  }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(path_ + "/" + name) << text; }
 
-  std::string path;
+ private:
+  std::string path_;
 };
 
 }  // namespace medulla

@@ -6,7 +6,7 @@ namespace medulla {
 
 // A text file that appears under its name only when whole: it is collected beside the target under a name of its own
 // (TARGET.PID-N.part) and renamed by commit(). Destroyed before that, it leaves nothing and an earlier file stays as it
-// was; ^C becomes an exception (app/interrupt.h), so that it comes to that too.
+// was; ^C becomes an exception (app/interrupt.h) and so comes here too.
 // The constructor throws std::runtime_error at once where the target cannot be written (no such folder, not permitted,
 // a folder or device of that name), write() and commit() where the system fails (disk full), with path and reason.
 class OutputFile {
