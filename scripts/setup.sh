@@ -55,12 +55,12 @@ installPackages() {
     if command -v sudo > /dev/null && { sudo -n true 2> /dev/null || { [[ -t 0 ]] && sudo -v; }; }; then
       as=(sudo)
     else
-      say "${#missing[@]} packages are missing and there is no right to install them. As root, run:"
+      say "packages are missing and there is no right to install them; as root, run:"
       say "apt-get update && apt-get install -y --no-install-recommends ${missing[*]}"
       return 1
     fi
   fi
-  say "installing ${#missing[@]} packages: ${missing[*]}"
+  say "installing ${missing[*]}"
   # Lists that exist are tried first; they may be too old for the archive, so that a failure fetches them and tries again.
   if compgen -G '/var/lib/apt/lists/*_Packages*' > /dev/null && aptInstall; then return; fi
   say "fetching the package lists"
