@@ -12,6 +12,8 @@
 // The haptic side of a run (paper 4 and 5): proxies of all tools against the blended surfaces of all bodies, at the
 // servo rate. The servo reads two dynamics frames and never changes them; the dynamics reads what the servo hands over
 // at the end of a dynamics frame.
+//
+// One dynamics frame of a run:  tick x N (alpha = 1/N .. 1), handOver, World::advance, commit(last frame, new frame).
 namespace medulla {
 
 // A surface that a tool can touch: a soft body's triangles grouped by filling sphere.
@@ -21,16 +23,20 @@ struct TouchableBody {
 
 struct ToolState {
   Eigen::Vector3d device = Eigen::Vector3d::Zero();  // m
-  Eigen::Vector3d proxy = Eigen::Vector3d::Zero();   // m, centre of the proxy sphere
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();   // N, on the hand: stiffness (proxy - device) + damping, clamped
+  // m, centre of the proxy sphere; while holding it rides on the held patch
+  Eigen::Vector3d proxy = Eigen::Vector3d::Zero();
+  // N, on the hand, clamped: stiffness (proxy - device) + damping; while holding, the sum of the held nodes' springs
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
   bool inContact = false;
   bool holding = false;
-  bool clamped = false;  // force_max was reached
+  bool clamped = false;  // forceMax was reached
 };
 
 class Servo {
  public:
-  // One bucket scene per filling sphere of every body. `rest` is the first frame.
+  // One bucket scene per filling sphere of every body; body k of a frame is bodies[k]. `rest` is the first frame. A
+  // tool that starts inside of a body gets a proxy at the nearest point outside. Throws std::runtime_error when Embree
+  // cannot start, or naming the tool whose settings or start are out of range.
   Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools, double tickDuration,
         const DynamicsFrame& rest, const std::vector<ToolSample>& start);
   ~Servo();
@@ -38,16 +44,17 @@ class Servo {
   Servo& operator=(Servo&&) noexcept;
 
   // Dynamics side, after each dynamics frame: the two frames to blend from now on, and the buckets refitted around
-  // both. Keeps references' contents by copy.
+  // both. Keeps references' contents by copy. `from` is the `to` of the last commit, and alpha had reached 1.
   void commit(const DynamicsFrame& from, const DynamicsFrame& to);
 
-  // One servo tick at the blend alpha (0..1] for one sample per tool. Never allocates, never locks.
+  // One servo tick at the blend alpha (0..1], not falling between commits, for one sample per tool. Never allocates,
+  // never locks. Throws std::runtime_error naming the tool whose device is not finite or beyond toolReach.
   void tick(double alpha, const std::vector<ToolSample>& inputs);
 
   const std::vector<ToolState>& tools() const;
 
   // The springs that stand for the tools' contacts and grips during the next dynamics frame of `frameDuration` s.
-  // `out` is cleared and filled.
+  // `out` is cleared and filled; nothing is allocated once it has grown.
   void handOver(double frameDuration, Loads& out) const;
 
  private:

@@ -1,0 +1,44 @@
+#include "haptics/grab.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace medulla {
+
+static const ProxyContact& mainContact(const Proxy& proxy) {
+  return *std::max_element(proxy.contacts.begin(), proxy.contacts.begin() + proxy.contactCount,
+                           [](const ProxyContact& a, const ProxyContact& b) { return a.share < b.share; });
+}
+
+static void holdPatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
+                      double gripRadius, Grip& grip) {
+  const ProxyContact& contact = mainContact(proxy);
+  const std::array<int, 3>& touched = surface.triangles[contact.triangle];
+  const int body = surface.bodyOfNode[touched[0]];
+  const Eigen::Quaterniond toolFromWorld = device.worldFromTool.conjugate();
+  for (int n = surface.firstNode[body]; n < int(surface.from.size()) && surface.bodyOfNode[n] == body; ++n) {
+    const Eigen::Vector3d x = surface.node(n, alpha);
+    const bool isTouched = std::find(touched.begin(), touched.end(), n) != touched.end();
+    if (!isTouched && (x - contact.point).norm() > gripRadius) continue;
+    assert(grip.held.size() < grip.held.capacity());
+    grip.held.push_back({n, toolFromWorld * (x - proxy.centre)});
+  }
+}
+
+void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
+                double gripRadius, Grip& grip) {
+  const bool closes = device.grip > 0.5;
+  if (closes == grip.closed) return;
+  grip.closed = closes;
+  grip.held.clear();
+  if (closes && proxy.inContact()) holdPatch(surface, alpha, proxy, device, gripRadius, grip);
+}
+
+Eigen::Vector3d meanHeldGap(const BlendedSurface& surface, double alpha, const ToolSample& device, const Grip& grip) {
+  assert(!grip.held.empty());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const HeldOffset& held : grip.held) sum += surface.node(held.node, alpha) - heldTarget(device, held);
+  return sum / double(grip.held.size());
+}
+
+}  // namespace medulla

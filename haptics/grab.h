@@ -1,0 +1,36 @@
+#pragma once
+
+#include <vector>
+
+#include "haptics/proxy.h"
+
+// Grabbing: a grip that closes in contact holds the patch of tissue around the contact until it opens.
+namespace medulla {
+
+struct HeldOffset {
+  int node = 0;            // of BlendedSurface
+  Eigen::Vector3d offset;  // m, in the tool's frame: twisting the tool twists the tissue
+};
+
+struct Grip {
+  bool closed = false;
+  std::vector<HeldOffset> held;  // empty while open, and when the grip closed on nothing
+};
+
+// Opens or closes by the sample's grip (closed above 0.5). Closing in contact holds every node of the touched body
+// within gripRadius of the contact point, and at least the three of the touched triangle. A node's offset is measured
+// from the proxy, not from the device: the springs then start with exactly the force that the contact had.
+// `grip.held` must have room for every node of the surface: nothing is allocated here.
+void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
+                double gripRadius, Grip& grip);
+
+// Where the tool wants a held node, m, world.
+inline Eigen::Vector3d heldTarget(const ToolSample& device, const HeldOffset& held) {
+  return device.position + device.worldFromTool * held.offset;
+}
+
+// Mean over the held nodes of node minus target, m: the springs share the tool's stiffness equally, so stiffness times
+// this is the force on the tool.
+Eigen::Vector3d meanHeldGap(const BlendedSurface& surface, double alpha, const ToolSample& device, const Grip& grip);
+
+}  // namespace medulla

@@ -1,0 +1,319 @@
+#include "haptics/proxy.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+// The proxy stops this far short of a surface, so that rounding never puts it inside; farther than `touching` a contact
+// is over. Both in metres.
+static constexpr double standOff = 1e-7, touching = 1e-6;
+// Below this a proxy has arrived, m.
+static constexpr double arrived = 1e-9;
+// Enough for every groove and corner met in a tick; what is left is done in the next.
+static constexpr int maxSweeps = 10, maxPushes = 10, maxPasses = 4;
+
+// ---- Nearest point in half-spaces
+// ------------------------------------------------------------------------------------
+
+// Point of the intersection of the chosen planes that is nearest to the goal: goal + N^T p with N N^T p = b - N goal.
+static bool nearestOnPlanes(const Vector3d& goal, const HalfSpace* halfSpaces, const int* chosen, int count,
+                            Vector3d& result, std::array<double, 3>& pressure) {
+  Eigen::Matrix3d gram = Eigen::Matrix3d::Identity();
+  Vector3d depth = Vector3d::Zero();
+  for (int i = 0; i < count; ++i) {
+    const HalfSpace& h = halfSpaces[chosen[i]];
+    depth[i] = h.offset - h.normal.dot(goal);
+    for (int j = 0; j < i; ++j) gram(i, j) = gram(j, i) = h.normal.dot(halfSpaces[chosen[j]].normal);
+  }
+  const double determinant = gram.determinant();
+  if (std::abs(determinant) < 1e-12) return false;  // parallel planes: fewer of them do
+  const Vector3d p = gram.inverse() * depth;
+  result = goal;
+  pressure = {};
+  for (int i = 0; i < count; ++i) {
+    if (p[i] < -1e-12) return false;
+    pressure[chosen[i]] = std::max(0.0, p[i]);
+    result += p[i] * halfSpaces[chosen[i]].normal;
+  }
+  return true;
+}
+
+bool nearestInHalfSpaces(const Vector3d& goal, const HalfSpace* halfSpaces, int count, Vector3d& result,
+                         std::array<double, 3>& pressure) {
+  static constexpr int subsets[8][4] = {{0}, {1, 0}, {1, 1}, {1, 2}, {2, 0, 1}, {2, 0, 2}, {2, 1, 2}, {3, 0, 1, 2}};
+  double best = std::numeric_limits<double>::infinity();
+  for (const auto& subset : subsets) {
+    if (std::any_of(subset + 1, subset + 1 + subset[0], [&](int k) { return k >= count; })) continue;
+    Vector3d x;
+    std::array<double, 3> p;
+    if (!nearestOnPlanes(goal, halfSpaces, subset + 1, subset[0], x, p)) continue;
+    const bool allowed = std::all_of(halfSpaces, halfSpaces + count,
+                                     [&](const HalfSpace& h) { return h.normal.dot(x) >= h.offset - 1e-11; });
+    if (!allowed || (x - goal).squaredNorm() >= best) continue;
+    best = (x - goal).squaredNorm();
+    result = x;
+    pressure = p;
+  }
+  return best < std::numeric_limits<double>::infinity();
+}
+
+// ---- Half-spaces collected on the way
+// --------------------------------------------------------------------------------
+
+namespace {
+struct TouchedPlanes {
+  std::array<HalfSpace, 3> planes;
+  std::array<int, 3> triangles{};
+  std::array<double, 3> pressure{};
+  int count = 0;
+};
+}  // namespace
+
+// A fourth plane replaces the one that holds the proxy back least. Nearly parallel ones count as one.
+static void addPlane(TouchedPlanes& touched, const HalfSpace& plane, int triangle) {
+  for (int k = 0; k < touched.count; ++k)
+    if (touched.planes[k].normal.dot(plane.normal) > 1 - 1e-9) {
+      touched.planes[k] = plane;
+      touched.triangles[k] = triangle;
+      return;
+    }
+  int slot = touched.count;
+  if (slot == 3)
+    slot = int(std::min_element(touched.pressure.begin(), touched.pressure.end()) - touched.pressure.begin());
+  else
+    ++touched.count;
+  touched.planes[slot] = plane;
+  touched.triangles[slot] = triangle;
+}
+
+static void dropPlane(TouchedPlanes& touched, int k) {
+  --touched.count;
+  touched.planes[k] = touched.planes[touched.count];
+  touched.triangles[k] = touched.triangles[touched.count];
+}
+
+// ---- The device moves
+// ------------------------------------------------------------------------------------------------
+
+// Moves the proxy to `target` or standOff short of the first surface on the way. The step back along the path grows at
+// grazing incidence, so that the distance to the surface stays standOff.
+static bool moveTo(const Buckets& buckets, double alpha, const Vector3d& target, Proxy& proxy, SurfaceHit& hit) {
+  const Vector3d motion = target - proxy.centre;
+  if (!buckets.sweep(proxy.centre, motion, proxy.radius, alpha, hit)) {
+    proxy.centre = target;
+    return false;
+  }
+  const double length = motion.norm(), incidence = std::max(0.02, -hit.normal.dot(motion) / length);
+  proxy.centre += std::max(0.0, hit.t - standOff / (incidence * length)) * motion;
+  return true;
+}
+
+static double distanceTo(const Buckets& buckets, double alpha, int triangle, const Vector3d& p) {
+  return (p - closestPoint(buckets.surface().triangle(triangle, alpha), p).point).norm();
+}
+
+// A sphere that rolled over an edge has left the plane it first met there.
+static void dropLeftPlanes(const Buckets& buckets, double alpha, const Proxy& proxy, TouchedPlanes& touched) {
+  for (int k = touched.count - 1; k >= 0; --k)
+    if (distanceTo(buckets, alpha, touched.triangles[k], proxy.centre) > proxy.radius + touching) dropPlane(touched, k);
+}
+
+// God-object search: sweep towards the target; at a hit, the target becomes the point nearest to the goal that the
+// touched planes allow (Zilles and Salisbury 1995).
+static TouchedPlanes slideTo(const Buckets& buckets, double alpha, const Vector3d& goal, Proxy& proxy) {
+  TouchedPlanes touched;
+  Vector3d target = goal;
+  for (int k = 0; k < maxSweeps && (target - proxy.centre).norm() >= arrived; ++k) {
+    SurfaceHit hit;
+    if (moveTo(buckets, alpha, target, proxy, hit))
+      addPlane(touched, {hit.normal, hit.normal.dot(proxy.centre)}, hit.triangle);
+    dropLeftPlanes(buckets, alpha, proxy, touched);
+    if (nearestInHalfSpaces(goal, touched.planes.data(), touched.count, target, touched.pressure)) continue;
+    // Wedged between walls that leave no point free: it stays, and presses on what opposes the goal.
+    for (int i = 0; i < touched.count; ++i)
+      touched.pressure[i] = std::max(0.0, -touched.planes[i].normal.dot(goal - proxy.centre));
+    break;
+  }
+  return touched;
+}
+
+static ProxyContact contactAt(const Buckets& buckets, double alpha, int triangle, const Vector3d& centre) {
+  const TrianglePoint q = closestPoint(buckets.surface().triangle(triangle, alpha), centre);
+  return {triangle, q.weights, q.point, (centre - q.point).normalized(), 0};
+}
+
+static void keepPressingContacts(const Buckets& buckets, double alpha, const TouchedPlanes& touched, Proxy& proxy) {
+  proxy.contactCount = 0;
+  double sum = 0;
+  for (int k = 0; k < touched.count; ++k) {
+    if (!(touched.pressure[k] > arrived)) continue;
+    ProxyContact& contact = proxy.contacts[proxy.contactCount++];
+    contact = contactAt(buckets, alpha, touched.triangles[k], proxy.centre);
+    contact.share = touched.pressure[k];
+    sum += contact.share;
+  }
+  for (int k = 0; k < proxy.contactCount; ++k) proxy.contacts[k].share /= sum;
+}
+
+// Coulomb friction as a change of the goal. Without friction the proxy would slide from `start` to `free`, pressed by
+// the depth |free - device|. It may trail behind `free` by up to mu times that depth. Stick: the goal is pulled back
+// onto the line through the start along the contact normal; slip: by exactly mu_d depth. Solving again towards the new
+// goal, rather than moving `free` back, keeps grooves and bumps right.
+static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& start, const Vector3d& free,
+                             const Vector3d& device, bool& slipping) {
+  const double depth = (free - device).norm();
+  const Vector3d normal = (free - device) / depth;
+  Vector3d slide = free - start;
+  slide -= slide.dot(normal) * normal;
+  const double length = slide.norm();
+  if (length <= (slipping ? tool.dynamicFriction : tool.staticFriction) * depth) {
+    slipping = false;
+    return device - slide;
+  }
+  slipping = true;
+  return device - (tool.dynamicFriction * depth / length) * slide;
+}
+
+void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Vector3d& device,
+                  Proxy& proxy) {
+  const Proxy start = proxy;
+  TouchedPlanes touched = slideTo(buckets, alpha, device, proxy);
+  const bool pressed = touched.count > 0 && (proxy.centre - device).norm() > arrived;
+  if (pressed && tool.staticFriction > 0) {
+    bool slipping = start.slipping;
+    const Vector3d goal = frictionGoal(tool, start.centre, proxy.centre, device, slipping);
+    proxy = start;
+    proxy.slipping = slipping;
+    touched = slideTo(buckets, alpha, goal, proxy);
+  }
+  keepPressingContacts(buckets, alpha, touched, proxy);
+  if (!proxy.inContact()) proxy.slipping = true;
+}
+
+// ---- The surface moves
+// -----------------------------------------------------------------------------------------------
+
+static Vector3d weighted(const Triangle& triangle, const Vector3d& weights) {
+  return weights.x() * triangle.a + weights.y() * triangle.b + weights.z() * triangle.c;
+}
+
+// The mean motion of what the proxy touches. Without it a still tool feels nothing of a surface that moves through it.
+static Vector3d carriedBy(const Buckets& buckets, double alpha, const Proxy& proxy) {
+  Vector3d motion = Vector3d::Zero();
+  for (int k = 0; k < proxy.contactCount; ++k) {
+    const ProxyContact& contact = proxy.contacts[k];
+    motion += contact.share *
+              (weighted(buckets.surface().triangle(contact.triangle, alpha), contact.weights) - contact.point);
+  }
+  return motion;
+}
+
+// The path of the proxy from `start` to `end` as seen from each moving triangle (Ruspini and Khatib 2000, "adjusted
+// segment"): the start is shifted by the triangle's own motion near it. Where a triangle would pass the proxy, the end
+// is moved back to the touched side. Repeated, because moving back from one triangle may meet another.
+static Vector3d notPassedOver(Buckets& buckets, double alphaBefore, double alpha, double radius, const Vector3d& start,
+                              Vector3d end) {
+  for (int pass = 0; pass < maxPasses; ++pass) {
+    Vector3d corrected = end;
+    double largest = 0;
+    for (const int t : buckets.near(0.5 * (start + end), 0.5 * (end - start).norm() + standOff)) {
+      const Triangle before = buckets.surface().triangle(t, alphaBefore), now = buckets.surface().triangle(t, alpha);
+      const TrianglePoint closest = closestPoint(before, start);
+      const Vector3d adjusted = start + weighted(now, closest.weights) - closest.point;
+      SweepHit hit;
+      if (!sweepSphere(adjusted, end - adjusted, radius, now, 1, hit)) continue;
+      const Vector3d outside = adjusted + hit.t * (end - adjusted) + standOff * hit.normal;
+      if ((outside - end).norm() <= largest) continue;
+      largest = (outside - end).norm();
+      corrected = outside;
+    }
+    if (largest == 0) break;
+    end = corrected;
+  }
+  return end;
+}
+
+static int nearestTriangle(Buckets& buckets, double alpha, const Vector3d& p, double& distance) {
+  int nearest = -1;
+  for (const int t : buckets.near(p, 0)) {
+    const double d = distanceTo(buckets, alpha, t, p);
+    if (d >= distance) continue;
+    distance = d;
+    nearest = t;
+  }
+  return nearest;
+}
+
+// Moves the proxy out to standOff beyond the tool's radius from every triangle, by the shortest way that the planes
+// found so far allow. Each move is swept with the clearance there is, so that pushing out of one surface never leads
+// through another; where no room is found the proxy keeps the clearance it has.
+static void pushOut(Buckets& buckets, double alpha, double toolRadius, Proxy& proxy) {
+  TouchedPlanes touched;
+  const Vector3d start = proxy.centre;
+  for (int k = 0; k <= maxPushes; ++k) {
+    proxy.radius = toolRadius;
+    const int nearest = nearestTriangle(buckets, alpha, proxy.centre, proxy.radius);
+    if (nearest < 0 || k == maxPushes) return;
+    const Vector3d q = closestPoint(buckets.surface().triangle(nearest, alpha), proxy.centre).point;
+    const Vector3d normal = (proxy.centre - q).normalized();
+    addPlane(touched, {normal, normal.dot(q) + toolRadius + standOff}, nearest);
+    Vector3d target;
+    if (!nearestInHalfSpaces(start, touched.planes.data(), touched.count, target, touched.pressure)) return;
+    SurfaceHit hit;
+    moveTo(buckets, alpha, target, proxy, hit);
+  }
+}
+
+void followSurface(Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy) {
+  const Vector3d start = proxy.centre;
+  proxy.centre =
+      notPassedOver(buckets, alphaBefore, alpha, proxy.radius, start, start + carriedBy(buckets, alpha, proxy));
+  pushOut(buckets, alpha, toolRadius, proxy);
+  for (int k = 0; k < proxy.contactCount; ++k) {
+    ProxyContact& contact = proxy.contacts[k];
+    contact.point = weighted(buckets.surface().triangle(contact.triangle, alpha), contact.weights);
+  }
+}
+
+// ---- The start
+// -------------------------------------------------------------------------------------------------------
+
+// Solid angle of a triangle seen from p, over 4 pi (Van Oosterom and Strackee 1983). Summed over a closed surface: 1
+// inside, 0 outside.
+static double windingShare(const Triangle& triangle, const Vector3d& p) {
+  const Vector3d a = triangle.a - p, b = triangle.b - p, c = triangle.c - p;
+  const double la = a.norm(), lb = b.norm(), lc = c.norm();
+  return std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) / (2 * M_PI);
+}
+
+Proxy placeProxy(const Buckets& buckets, const Vector3d& device, double toolRadius) {
+  const BlendedSurface& surface = buckets.surface();
+  Proxy proxy;
+  proxy.centre = device;
+  // Once per body that may contain it, and once to find nothing: bodies may overlap.
+  for (std::size_t pass = 0; pass <= surface.firstNode.size(); ++pass) {
+    double winding = 0, nearest = std::numeric_limits<double>::infinity();
+    TrianglePoint closest;
+    for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
+      const Triangle triangle = surface.triangle(int(t), 1);
+      winding += windingShare(triangle, proxy.centre);
+      const TrianglePoint q = closestPoint(triangle, proxy.centre);
+      if ((q.point - proxy.centre).norm() >= nearest) continue;
+      nearest = (q.point - proxy.centre).norm();
+      closest = q;
+    }
+    proxy.radius = std::min(toolRadius, nearest);
+    if (winding < 0.5) return proxy;
+    // Straight on through the nearest point of the surface.
+    const Vector3d outward = nearest > 0 ? Vector3d((closest.point - proxy.centre) / nearest) : Vector3d::UnitY();
+    proxy.centre = closest.point + standOff * outward;
+  }
+  return proxy;
+}
+
+}  // namespace medulla

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+
+#include "haptics/buckets.h"
+#include "haptics/tool_input.h"
+
+// The virtual proxy (paper 4; Ruspini, Kolarov and Khatib 1997): a sphere that follows the device but never enters a
+// surface. Lengths in metres, world frame.
+namespace medulla {
+
+struct ProxyContact {
+  int triangle = -1;
+  Eigen::Vector3d weights;  // barycentric, of the touched point
+  Eigen::Vector3d point;    // where the touched point was at the last tick
+  Eigen::Vector3d normal;   // unit, from the point to the proxy's centre
+  double share = 0;         // of the contact force, 0..1, sum over the contacts 1
+};
+
+struct Proxy {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  // The tool's radius; less while surfaces leave no room for it: a squeezed proxy shrinks rather than tunnels.
+  double radius = 0;
+  bool slipping = true;
+  int contactCount = 0;
+  std::array<ProxyContact, 3> contacts;
+
+  bool inContact() const { return contactCount > 0; }
+};
+
+// A proxy at the device, or, when that is inside of a body, just outside at the nearest point of its surface, small, to
+// grow as it is pushed out.
+Proxy placeProxy(const Buckets& buckets, const Eigen::Vector3d& device, double toolRadius);
+
+// The surface moves from alphaBefore to alpha (of the same two frames) and takes the proxy along: carried by what it
+// touches, never passed over, pushed out of what came too near.
+void followSurface(Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy);
+
+// The device moves while the surface stands at alpha: the proxy goes to the nearest reachable point, held back by
+// Coulomb friction. Afterwards its contacts are those that press.
+void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Eigen::Vector3d& device,
+                  Proxy& proxy);
+
+struct HalfSpace {
+  Eigen::Vector3d normal;  // unit; allowed are points x with normal.x >= offset
+  double offset = 0;
+};
+
+// The point nearest to `goal` in up to three half-spaces, by enumeration of which of them are active. `pressure[k]` is
+// the Kuhn-Tucker multiplier: result = goal + sum pressure[k] normal[k], all >= 0. Returns false, with result
+// untouched, when no point satisfies all (within 1e-11 m), as between opposite walls.
+bool nearestInHalfSpaces(const Eigen::Vector3d& goal, const HalfSpace* halfSpaces, int count, Eigen::Vector3d& result,
+                         std::array<double, 3>& pressure);
+
+}  // namespace medulla

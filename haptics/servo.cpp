@@ -1,0 +1,299 @@
+#include "haptics/servo.h"
+
+#include <cassert>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "haptics/buckets.h"
+#include "haptics/grab.h"
+#include "haptics/proxy.h"
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+namespace {
+// A tool between two hand-overs. The "coupled" position is the device as the coupling feels it: where the clamped
+// spring would end. It is the device itself unless forceMax was reached.
+struct Tool {
+  ToolSettings settings;
+  Proxy proxy;
+  Grip grip;
+  ToolSample device, deviceAtFrameStart;
+  Vector3d coupled = Vector3d::Zero(), coupledAtFrameStart = Vector3d::Zero();
+  Vector3d coupledSum = Vector3d::Zero();  // over the frame's ticks
+  int ticks = 0;
+  double clampScale = 1;  // of the force, at the last tick
+};
+}  // namespace
+
+struct Servo::Data {
+  Buckets buckets;
+  double tickDuration;
+  double alpha = 1;  // of the last tick
+  std::vector<Tool> tools;
+  std::vector<ToolState> states;
+};
+
+// ---- Checks
+// ----------------------------------------------------------------------------------------------------------
+
+static void checkSample(const ToolSample& sample, std::size_t tool) {
+  const bool inReach = sample.position.allFinite() && sample.position.lpNorm<Eigen::Infinity>() <= toolReach;
+  if (!inReach)
+    throw std::runtime_error("tool " + std::to_string(tool) + ": device position is not finite or more than " +
+                             std::to_string(int(toolReach)) + " m from the origin");
+  if (!(std::abs(sample.worldFromTool.norm() - 1) < 1e-3) || !std::isfinite(sample.grip))
+    throw std::runtime_error("tool " + std::to_string(tool) + ": expected a unit quaternion and a finite grip");
+}
+
+static void checkSettings(const ToolSettings& s, std::size_t tool) {
+  const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
+  const bool valid = positive(s.radius) && positive(s.stiffness) && s.damping >= 0 && std::isfinite(s.damping) &&
+                     s.dynamicFriction >= 0 && s.staticFriction >= s.dynamicFriction &&
+                     std::isfinite(s.staticFriction) && positive(s.forceMax) && positive(s.gripRadius);
+  if (!valid)
+    throw std::runtime_error("tool " + std::to_string(tool) +
+                             ": expected radius, stiffness, forceMax and gripRadius > 0, damping >= 0 and "
+                             "staticFriction >= dynamicFriction >= 0, all finite");
+}
+
+// ---- One tick
+// --------------------------------------------------------------------------------------------------------
+
+static Vector3d nodeVelocity(const BlendedSurface& surface, int n) {
+  return surface.duration > 0 ? Vector3d((surface.to[n] - surface.from[n]) / surface.duration) : Vector3d::Zero();
+}
+
+static Vector3d contactVelocity(const BlendedSurface& surface, const ProxyContact& contact) {
+  const auto& [a, b, c] = surface.triangles[contact.triangle];
+  return contact.weights.x() * nodeVelocity(surface, a) + contact.weights.y() * nodeVelocity(surface, b) +
+         contact.weights.z() * nodeVelocity(surface, c);
+}
+
+static Vector3d meanContactVelocity(const BlendedSurface& surface, const Proxy& proxy) {
+  Vector3d v = Vector3d::Zero();
+  for (int k = 0; k < proxy.contactCount; ++k)
+    v += proxy.contacts[k].share * contactVelocity(surface, proxy.contacts[k]);
+  return v;
+}
+
+static Vector3d meanHeldVelocity(const BlendedSurface& surface, const Grip& grip) {
+  Vector3d v = Vector3d::Zero();
+  for (const HeldOffset& held : grip.held) v += nodeVelocity(surface, held.node);
+  return v / double(grip.held.size());
+}
+
+static Vector3d tangential(const Vector3d& v, const Vector3d& normal) {
+  return v - v.dot(normal) * normal;
+}
+
+// The coupling of a pushing contact: a spring and a damper that never pulls. A slipping contact is dragged by friction
+// alone, which the proxy's position already holds, so its damper works along the normal only. The damper runs between
+// the device and the surface point, whose velocity is that of the dynamics: the proxy's own, differenced over ticks,
+// would jump at every edge.
+static Vector3d contactForce(const BlendedSurface& surface, const Tool& tool, const Vector3d& deviceVelocity) {
+  const Proxy& proxy = tool.proxy;
+  const Vector3d spring = tool.settings.stiffness * (proxy.centre - tool.device.position);
+  if (!proxy.inContact() || spring.squaredNorm() == 0) return Vector3d::Zero();
+  const Vector3d normal = spring.normalized();
+  Vector3d damper = tool.settings.damping * (meanContactVelocity(surface, proxy) - deviceVelocity);
+  if (proxy.slipping) damper = damper.dot(normal) * normal;
+  const Vector3d force = spring + damper;
+  const double push = force.dot(normal);
+  return push > 0 ? force : Vector3d(force - push * normal);
+}
+
+static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Tool& tool,
+                          const Vector3d& deviceVelocity) {
+  return tool.settings.stiffness * meanHeldGap(surface, alpha, tool.device, tool.grip) +
+         tool.settings.damping * (meanHeldVelocity(surface, tool.grip) - deviceVelocity);
+}
+
+static void record(const Vector3d& force, Tool& tool, ToolState& state) {
+  const double size = force.norm();
+  state.clamped = size > tool.settings.forceMax;
+  tool.clampScale = state.clamped ? tool.settings.forceMax / size : 1;
+  state.force = tool.clampScale * force;
+  state.device = tool.device.position;
+  state.proxy = tool.proxy.centre;
+  state.holding = !tool.grip.held.empty();
+  state.inContact = tool.proxy.inContact();
+  tool.coupled = state.clamped && !state.holding
+                     ? Vector3d(tool.proxy.centre + tool.clampScale * (tool.device.position - tool.proxy.centre))
+                     : tool.device.position;
+  tool.coupledSum += tool.coupled;
+  ++tool.ticks;
+}
+
+static void tickTool(Buckets& buckets, double alphaBefore, double alpha, double tickDuration, const ToolSample& input,
+                     Tool& tool, ToolState& state) {
+  const BlendedSurface& surface = buckets.surface();
+  const Vector3d deviceVelocity = (input.position - tool.device.position) / tickDuration;
+  tool.device = input;
+  followSurface(buckets, alphaBefore, alpha, tool.settings.radius, tool.proxy);
+  updateGrip(surface, alpha, tool.proxy, tool.device, tool.settings.gripRadius, tool.grip);
+  if (!tool.grip.held.empty()) {
+    record(heldForce(surface, alpha, tool, deviceVelocity), tool, state);
+  } else {
+    followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
+    record(contactForce(surface, tool, deviceVelocity), tool, state);
+  }
+}
+
+void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
+  assert(inputs.size() == data_->tools.size() && alpha > 0 && alpha <= 1 && alpha >= data_->alpha);
+  for (std::size_t k = 0; k < inputs.size(); ++k) checkSample(inputs[k], k);
+  for (std::size_t k = 0; k < inputs.size(); ++k)
+    tickTool(data_->buckets, data_->alpha, alpha, data_->tickDuration, inputs[k], data_->tools[k], data_->states[k]);
+  data_->alpha = alpha;
+}
+
+// ---- Dynamics side
+// ---------------------------------------------------------------------------------------------------
+
+static void startFrame(Tool& tool) {
+  tool.deviceAtFrameStart = tool.device;
+  tool.coupledAtFrameStart = tool.coupled;
+  tool.coupledSum.setZero();
+  tool.ticks = 0;
+}
+
+void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to) {
+  data_->buckets.commit(from, to);
+  data_->alpha = 0;
+  for (Tool& tool : data_->tools) startFrame(tool);
+}
+
+namespace {
+// A straight path over the frame that ended with the last tick.
+struct Path {
+  Vector3d end, velocity;
+};
+}  // namespace
+
+// The path of the coupled device, with the frame's mean rather than its end kept: the dynamics then feels the same mean
+// pull that the hand felt, however the device moved within the frame. Ticks stand at dt, 2 dt .. T, their mean time is
+// T/2 + dt/2, so the path's end lies (T - dt)/2 later than their mean.
+static Path coupledPath(const Tool& tool, double frameDuration, double tickDuration) {
+  if (tool.ticks == 0) return {tool.coupled, Vector3d::Zero()};
+  const Vector3d velocity = (tool.coupled - tool.coupledAtFrameStart) / (tool.ticks * tickDuration);
+  return {tool.coupledSum / tool.ticks + 0.5 * (frameDuration - tickDuration) * velocity, velocity};
+}
+
+// One spring per contact triangle, anchored so that stiffness (anchor - x) is the force of the coupling, k (device -
+// proxy), when x is the contact point: anchor = device + (contact point - proxy). Its tangential part is limited to
+// what friction carries; a slipping contact's anchor moves along the surface with the surface, not with the device,
+// because the point that is touched stays behind.
+static void handOverContacts(const BlendedSurface& surface, const Tool& tool, int index, const Path& path, Loads& out) {
+  const ToolSettings& settings = tool.settings;
+  const Proxy& proxy = tool.proxy;
+  const Vector3d stretch = path.end - proxy.centre;
+  for (int k = 0; k < proxy.contactCount; ++k) {
+    const ProxyContact& contact = proxy.contacts[k];
+    const double depth = std::max(0.0, -stretch.dot(contact.normal));
+    Vector3d drag = tangential(stretch, contact.normal), velocity = path.velocity;
+    const double limit = (proxy.slipping ? settings.dynamicFriction : settings.staticFriction) * depth;
+    if (drag.norm() > limit) drag *= limit / drag.norm();
+    if (proxy.slipping) velocity += tangential(contactVelocity(surface, contact) - path.velocity, contact.normal);
+    const auto& nodes = surface.triangles[contact.triangle];
+    const int body = surface.bodyOfNode[nodes[0]], first = surface.firstNode[body];
+    ToolSpring& spring = out.toolSprings.emplace_back();
+    spring.tool = index;
+    spring.body = body;
+    spring.nodes = {nodes[0] - first, nodes[1] - first, nodes[2] - first};
+    spring.weights = {contact.weights.x(), contact.weights.y(), contact.weights.z()};
+    spring.anchor = contact.point + stretch.dot(contact.normal) * contact.normal + drag;
+    spring.anchorVelocity = velocity;
+    spring.outward = contact.normal;
+    spring.stiffness = settings.stiffness * contact.share;
+    spring.damping = settings.damping * contact.share;
+  }
+}
+
+// Every held node pulled to where the tool wants it, by an equal share of the tool's stiffness: pulling is as stiff as
+// pushing. Beyond forceMax the targets come nearer, so that the tissue feels no more than the hand.
+static void handOverGrip(const BlendedSurface& surface, double alpha, const Tool& tool, int index, const Path& path,
+                         double frameDuration, Loads& out) {
+  const double share = 1.0 / double(tool.grip.held.size());
+  const int body = surface.bodyOfNode[tool.grip.held.front().node];
+  ToolSample end = tool.device, start = tool.deviceAtFrameStart;
+  end.position = path.end;
+  start.position = path.end - frameDuration * path.velocity;
+  for (const HeldOffset& held : tool.grip.held) {
+    const Vector3d x = surface.node(held.node, alpha), target = heldTarget(end, held);
+    HeldNode& node = out.heldNodes.emplace_back();
+    node.tool = index;
+    node.body = body;
+    node.node = held.node - surface.firstNode[body];
+    node.anchor = x + tool.clampScale * (target - x);
+    node.anchorVelocity = (target - heldTarget(start, held)) / frameDuration;
+    node.stiffness = tool.settings.stiffness * share;
+    node.damping = tool.settings.damping * share;
+  }
+}
+
+void Servo::handOver(double frameDuration, Loads& out) const {
+  assert(frameDuration > 0);
+  out.toolSprings.clear();
+  out.heldNodes.clear();
+  const BlendedSurface& surface = data_->buckets.surface();
+  for (std::size_t k = 0; k < data_->tools.size(); ++k) {
+    const Tool& tool = data_->tools[k];
+    const Path path = coupledPath(tool, frameDuration, data_->tickDuration);
+    if (!tool.grip.held.empty())
+      handOverGrip(surface, data_->alpha, tool, int(k), path, frameDuration, out);
+    else
+      handOverContacts(surface, tool, int(k), path, out);
+  }
+}
+
+// ---- Life
+// ------------------------------------------------------------------------------------------------------------
+
+static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, const ToolSample& start) {
+  Tool tool;
+  tool.settings = settings;
+  tool.device = start;
+  tool.coupled = start.position;
+  tool.proxy = placeProxy(buckets, start.position, settings.radius);
+  tool.grip.held.reserve(buckets.surface().from.size());
+  startFrame(tool);
+  return tool;
+}
+
+static Buckets makeBuckets(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools,
+                           const DynamicsFrame& rest) {
+  std::vector<std::shared_ptr<const SoftBodyModel>> models;
+  for (const TouchableBody& body : bodies) models.push_back(body.model);
+  double largestRadius = 0;
+  for (std::size_t k = 0; k < tools.size(); ++k) {
+    checkSettings(tools[k], k);
+    largestRadius = std::max(largestRadius, tools[k].radius);
+  }
+  return {models, largestRadius, rest};
+}
+
+Servo::Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools, double tickDuration,
+             const DynamicsFrame& rest, const std::vector<ToolSample>& start)
+    : data_(new Data{makeBuckets(bodies, tools, rest), tickDuration, 0, {}, {}}) {
+  assert(tools.size() == start.size() && tickDuration > 0);
+  for (std::size_t k = 0; k < tools.size(); ++k) {
+    checkSample(start[k], k);
+    data_->tools.push_back(makeTool(data_->buckets, tools[k], start[k]));
+    ToolState state;
+    state.device = start[k].position;
+    state.proxy = data_->tools.back().proxy.centre;
+    data_->states.push_back(state);
+  }
+}
+Servo::~Servo() = default;
+Servo::Servo(Servo&&) noexcept = default;
+Servo& Servo::operator=(Servo&&) noexcept = default;
+
+const std::vector<ToolState>& Servo::tools() const {
+  return data_->states;
+}
+
+}  // namespace medulla
