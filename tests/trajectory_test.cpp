@@ -1,0 +1,140 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "app/files/trajectory_file.h"
+#include "haptics/tool_input.h"
+
+namespace medulla {
+
+static const std::string header = "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n";
+
+static std::string complaintAbout(const std::string& text) {
+  try {
+    parseTrajectory(text, "file.csv");
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+static void expectComplaint(const std::string& text, const std::string& start, const std::string& part) {
+  const std::string complaint = complaintAbout(text);
+  EXPECT_EQ(complaint.rfind(start, 0), 0U) << complaint;
+  EXPECT_NE(complaint.find(part), std::string::npos) << complaint;
+  EXPECT_EQ(complaint.find('\n'), std::string::npos) << complaint;
+}
+
+TEST(TrajectoryFile, ReadsRowsCommentsAndForeignLineEnds) {
+  const Trajectory trajectory = parseTrajectory(
+      "# made by hand\r\n" + header + "0, 0.1,-0.2,3e-1, 1,0,0,0, 0 # start\r\n\r\n0.5,0,0,0,0.9995,0,0,0,1",
+      "file.csv");
+  ASSERT_EQ(trajectory.samples.size(), 2U);
+  EXPECT_EQ(trajectory.samples[0].position, Eigen::Vector3d(0.1, -0.2, 0.3));
+  EXPECT_EQ(trajectory.samples[1].time, 0.5);
+  EXPECT_EQ(trajectory.samples[1].grip, 1);
+  EXPECT_NEAR(trajectory.samples[1].worldFromTool.w(), 1, 1e-15);
+}
+
+TEST(TrajectoryFile, AcceptsMeasuredForces) {
+  const Trajectory trajectory =
+      parseTrajectory("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,fx[N],fy[N],fz[N]\n1,0,0,0,1,0,0,0,0,1,2,3\n", "file.csv");
+  EXPECT_EQ(trajectory.samples.size(), 1U);
+}
+
+TEST(TrajectoryFile, EveryMistakeIsNamedWithItsLine) {
+  const std::string good = "0,0,0,0,1,0,0,0,0\n";
+  expectComplaint("", "file.csv: ", "no header");
+  expectComplaint("# nothing\n", "file.csv: ", "no header");
+  expectComplaint(header, "file.csv: ", "no rows");
+  expectComplaint("t[s],x[m],y[m],z[m],qw,qx,qy,qz\n" + good, "file.csv:1: ", "column grip is missing");
+  expectComplaint("t[s],y[m],x[m],z[m],qw,qx,qy,qz,grip\n" + good, "file.csv:1: ", "column 2 is 'y[m]'");
+  expectComplaint("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,colour\n" + good, "file.csv:1: ", "'colour'");
+  expectComplaint("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,fx[N]\n" + good, "file.csv:1: ", "10 columns");
+  expectComplaint("0,0,0,0,1,0,0,0,0\n" + good, "file.csv:1: ", "column t[s] is missing");
+  expectComplaint(header + "0,0,0,0,1,0,0,0\n", "file.csv:2: ", "8 columns");
+  expectComplaint(header + good + "1,0,nan,0,1,0,0,0,0\n", "file.csv:3: ", "column y[m] is 'nan'");
+  expectComplaint(header + good + "1,0,inf,0,1,0,0,0,0\n", "file.csv:3: ", "column y[m] is 'inf'");
+  expectComplaint(header + "0,0,1e999,0,1,0,0,0,0\n", "file.csv:2: ", "column y[m] is '1e999'");
+  expectComplaint(header + "0,0,zero,0,1,0,0,0,0\n", "file.csv:2: ", "'zero'");
+  expectComplaint(header + "0,0,0.1x,0,1,0,0,0,0\n", "file.csv:2: ", "'0.1x'");
+  expectComplaint(header + "0,0,,0,1,0,0,0,0\n", "file.csv:2: ", "column y[m] is ''");
+  expectComplaint(header + "0,0,0,300,1,0,0,0,0\n", "file.csv:2: ", "column z[m] is 300");
+  expectComplaint(header + good + good, "file.csv:3: ", "strictly increasing");
+  expectComplaint(header + good + "-1,0,0,0,1,0,0,0,0\n", "file.csv:3: ", "strictly increasing");
+  expectComplaint(header + "0,0,0,0,0.9,0,0,0,0\n", "file.csv:2: ", "length 0.9");
+  expectComplaint(header + "0,0,0,0,0,0,0,0,0\n", "file.csv:2: ", "length 0");
+  expectComplaint(header + "0,0,0,0,1,0,0,0,1.5\n", "file.csv:2: ", "column grip is 1.5");
+}
+
+TEST(TrajectoryFile, MissingFilesAndFoldersAreRefused) {
+  EXPECT_THROW(readTrajectory("/no/such/file.csv"), std::runtime_error);
+  EXPECT_THROW(readTrajectory(std::filesystem::temp_directory_path().string()), std::runtime_error);
+}
+
+static Trajectory keys(const std::vector<std::pair<double, double>>& timeAndX) {
+  Trajectory trajectory;
+  for (const auto& [time, x] : timeAndX) {
+    ToolSample sample;
+    sample.time = time;
+    sample.position = {x, 2 * x, 0.3};
+    trajectory.samples.push_back(sample);
+  }
+  return trajectory;
+}
+
+static double xAt(const Trajectory& trajectory, double time) {
+  return sampleTrajectory(trajectory, time).position.x();
+}
+
+TEST(Trajectory, PassesThroughItsKeysAndStandsStillOutside) {
+  const Trajectory trajectory = keys({{1, 0.1}, {1.5, 0.4}, {4, -0.2}});
+  EXPECT_EQ(xAt(trajectory, 0), 0.1);
+  for (const ToolSample& key : trajectory.samples) EXPECT_NEAR(xAt(trajectory, key.time), key.position.x(), 1e-15);
+  EXPECT_EQ(xAt(trajectory, 9), -0.2);
+  EXPECT_EQ(sampleTrajectory(trajectory, 2.5).time, 2.5);
+}
+
+TEST(Trajectory, NeverLeavesTheRangeOfItsTwoKeysAndRestsBetweenEqualOnes) {
+  const Trajectory trajectory = keys({{0, 0}, {0.1, 0.5}, {1.3, 0.5}, {1.4, 0.2}, {3, 0.21}, {3.01, 1}});
+  for (std::size_t k = 0; k + 1 < trajectory.samples.size(); ++k) {
+    const ToolSample &a = trajectory.samples[k], &b = trajectory.samples[k + 1];
+    for (int i = 0; i <= 50; ++i) {
+      const double x = xAt(trajectory, a.time + (b.time - a.time) * i / 50.0);
+      EXPECT_GE(x, std::min(a.position.x(), b.position.x()) - 1e-15);
+      EXPECT_LE(x, std::max(a.position.x(), b.position.x()) + 1e-15);
+    }
+  }
+  EXPECT_EQ(xAt(trajectory, 0.7), 0.5);
+}
+
+TEST(Trajectory, HasNoVelocityStepAtUnevenKeys) {
+  const Trajectory trajectory = keys({{0, 0}, {0.4, 0.1}, {0.5, 0.2}, {1.5, 0.3}, {2, 0.9}});
+  const double h = 1e-6;
+  for (const double key : {0.0, 0.4, 0.5, 1.5, 2.0}) {
+    const double before = (xAt(trajectory, key) - xAt(trajectory, key - h)) / h,
+                 after = (xAt(trajectory, key + h) - xAt(trajectory, key)) / h;
+    EXPECT_NEAR(before, after, 1e-4);
+  }
+}
+
+TEST(Trajectory, ADenseRecordingIsReproduced) {
+  std::vector<std::pair<double, double>> recording;
+  for (int k = 0; k <= 1000; ++k) recording.emplace_back(k * 0.01, std::sin(k * 0.01));
+  const Trajectory trajectory = keys(recording);
+  for (double t = 0.05; t < 9.9; t += 0.0137) EXPECT_NEAR(xAt(trajectory, t), std::sin(t), 1e-5);
+}
+
+TEST(Trajectory, TurnsEvenlyTheShortWayAndClosesLinearly) {
+  Trajectory trajectory = keys({{0, 0}, {2, 0}});
+  const Eigen::Quaterniond turned(Eigen::AngleAxisd(1, Eigen::Vector3d::UnitZ()));
+  trajectory.samples[1].worldFromTool = Eigen::Quaterniond(-turned.coeffs());
+  trajectory.samples[1].grip = 1;
+  const ToolSample sample = sampleTrajectory(trajectory, 0.5);
+  EXPECT_NEAR(sample.worldFromTool.angularDistance(Eigen::Quaterniond::Identity()), 0.25, 1e-7);
+  EXPECT_NEAR(sample.grip, 0.25, 1e-15);
+}
+
+}  // namespace medulla
