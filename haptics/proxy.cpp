@@ -249,6 +249,14 @@ static int nearestTriangle(Buckets& buckets, double alpha, const Vector3d& p, do
   return nearest;
 }
 
+// The half-space in which the whole tool is clear of a triangle, seen from where the proxy is.
+static void addClearance(const Buckets& buckets, double alpha, int triangle, double toolRadius, const Vector3d& centre,
+                         TouchedPlanes& touched) {
+  const Vector3d q = closestPoint(buckets.surface().triangle(triangle, alpha), centre).point;
+  const Vector3d normal = (centre - q).normalized();
+  addPlane(touched, {normal, normal.dot(q) + toolRadius + standOff}, triangle);
+}
+
 // Moves the proxy out to standOff beyond the tool's radius from every triangle, by the shortest way that the planes
 // found so far allow. Each move is swept with the clearance there is, so that pushing out of one surface never leads
 // through another; where no room is found the proxy keeps the clearance it has.
@@ -259,13 +267,12 @@ static void pushOut(Buckets& buckets, double alpha, double toolRadius, Proxy& pr
     proxy.radius = toolRadius;
     const int nearest = nearestTriangle(buckets, alpha, proxy.centre, proxy.radius);
     if (nearest < 0 || k == maxPushes) return;
-    const Vector3d q = closestPoint(buckets.surface().triangle(nearest, alpha), proxy.centre).point;
-    const Vector3d normal = (proxy.centre - q).normalized();
-    addPlane(touched, {normal, normal.dot(q) + toolRadius + standOff}, nearest);
+    addClearance(buckets, alpha, nearest, toolRadius, proxy.centre, touched);
     Vector3d target;
     if (!nearestInHalfSpaces(start, touched.planes.data(), touched.count, target, touched.pressure)) return;
     SurfaceHit hit;
-    moveTo(buckets, alpha, target, proxy, hit);
+    if (moveTo(buckets, alpha, target, proxy, hit))
+      addClearance(buckets, alpha, hit.triangle, toolRadius, proxy.centre, touched);
   }
 }
 

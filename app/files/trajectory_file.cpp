@@ -21,6 +21,7 @@ namespace medulla {
 static constexpr std::array<std::string_view, 12> columnNames = {"t[s]", "x[m]", "y[m]", "z[m]",  "qw",    "qx",
                                                                  "qy",   "qz",   "grip", "fx[N]", "fy[N]", "fz[N]"};
 static constexpr std::size_t requiredColumns = 9;
+static constexpr std::string_view requiredHeader = "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip";
 enum Column { time, x, y, z, qw, qx, qy, qz, grip };
 
 static std::string_view trimmed(std::string_view text) {
@@ -40,21 +41,17 @@ static void splitRow(std::string_view row, std::vector<std::string_view>& cells)
 }
 
 static void checkHeader(const std::vector<std::string_view>& cells, const std::string& name, int line) {
-  const std::string expected =
-      "expected " + fmt::format("{}", fmt::join(columnNames.begin(), columnNames.begin() + requiredColumns, ","));
-  const auto present = [&](std::string_view column) {
-    return std::find(cells.begin(), cells.end(), column) != cells.end();
-  };
   for (std::size_t k = 0; k < requiredColumns; ++k)
-    if (!present(columnNames[k]))
-      throw inputError(name, line, fmt::format("column {} is missing, {}", columnNames[k], expected));
+    if (std::find(cells.begin(), cells.end(), columnNames[k]) == cells.end())
+      throw inputError(name, line, fmt::format("column {} is missing, expected {}", columnNames[k], requiredHeader));
   for (std::size_t k = 0; k < std::min(cells.size(), columnNames.size()); ++k)
     if (cells[k] != columnNames[k])
-      throw inputError(name, line,
-                       fmt::format("column {} is '{}', {}", k + 1, cells[k], expected + "[,fx[N],fy[N],fz[N]]"));
+      throw inputError(
+          name, line,
+          fmt::format("column {} is '{}', expected {}[,fx[N],fy[N],fz[N]]", k + 1, cells[k], requiredHeader));
   if (cells.size() != requiredColumns && cells.size() != columnNames.size())
     throw inputError(name, line,
-                     fmt::format("{} columns, {} or all of {}", cells.size(), expected, columnNames.size()));
+                     fmt::format("{} columns, expected {}[,fx[N],fy[N],fz[N]]", cells.size(), requiredHeader));
 }
 
 static double parseNumber(std::string_view cell, std::string_view column, const std::string& name, int line) {
@@ -113,10 +110,7 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name) {
                                    trajectory.samples.back().time));
     trajectory.samples.push_back(sample);
   }
-  if (columns == 0)
-    throw inputError(name, 0,
-                     fmt::format("no header, expected {}",
-                                 fmt::join(columnNames.begin(), columnNames.begin() + requiredColumns, ",")));
+  if (columns == 0) throw inputError(name, 0, fmt::format("no header, expected {}", requiredHeader));
   if (trajectory.samples.empty()) throw inputError(name, 0, "no rows after the header, expected at least one");
   return trajectory;
 }
