@@ -6,7 +6,7 @@ namespace medulla {
 using Eigen::Vector3d;
 
 double cavity(const Vector3d& p) {
-  return ellipsoid(p, {-15, -15, 60}, {215, 165, 190}) + 22 * noise(p, 90) + 7 * noise(p, 35);
+  return ellipsoid(p, {-15, -15, 50}, {215, 165, 205}) + 22 * noise(p, 90) + 7 * noise(p, 35);
 }
 
 }  // namespace medulla

@@ -17,7 +17,7 @@ double liver(const Vector3d& p) {
 
   const double visceralRadius = 240;
   const Vector3d visceralNormal = Vector3d(0.2, -0.69, -0.69).normalized();
-  const Vector3d visceralCentre = Vector3d(-48, -20, 10) + visceralRadius * visceralNormal;
+  const Vector3d visceralCentre = Vector3d(-48, -22.5, 7.5) + visceralRadius * visceralNormal;
   d = smoothMax(d, visceralRadius - (p - visceralCentre).norm(), 5);
 
   // Falciform fissure: a slot through the border, left of the midline, that narrows and fades upwards.
@@ -26,7 +26,8 @@ double liver(const Vector3d& p) {
   d = smoothMax(d, 4 - std::sqrt(sideways * sideways + above * above), 8);
 
   d += 2.4 * noise(p, 45) + 0.6 * noise(p, 12);
-  if (d > 25) return d;                          // the gallbladder cannot matter
+  if (d > 25) return d;  // the neighbours cannot matter
+  d = smoothMax(d, 1 - stomach(p), 10);
   return smoothMax(d, 0.5 - gallbladder(p), 8);  // fossa, 0.5 mm clear of the gallbladder
 }
 

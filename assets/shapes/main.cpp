@@ -32,9 +32,9 @@ static std::vector<MeshRecipe> recipes() {
   return {{"gallbladder", "gallbladder", gallbladder, gallbladderBox, 1.0, {466, 15, 0.4}},
           {"gallbladder", "gallbladder_fine", gallbladder, gallbladderBox, 0.8, {20000, 15, 0.4}},
           {"scenery", "liver", liver, {{-175, -65, -105}, {140, 145, 75}}, 2.5, {9000, 40, 0.4}},
-          {"scenery", "stomach", stomach, {{-55, -135, -80}, {145, 120, 75}}, 2.5, {5000, 30, 0.5}},
+          {"scenery", "stomach", stomach, {{-55, -135, -125}, {150, 125, 75}}, 2.5, {5000, 30, 0.5}},
           {"scenery", "fat", fat, {{-220, -240, -125}, {190, -20, 150}}, 2.5, {6000, 15, 0.6}},
-          {"scenery", "wall", cavity, {{-270, -220, -170}, {240, 190, 290}}, 9, {4000, 60, 0.6}, true}};
+          {"scenery", "wall", cavity, {{-270, -220, -195}, {240, 190, 295}}, 9, {4000, 60, 0.6}, true}};
 }
 
 static void makeMesh(const MeshRecipe& recipe, const std::filesystem::path& directory) {

@@ -131,7 +131,7 @@ static void collapseShortEdges(Remeshing& r) {
 // Flips where the worse of the two triangles gains, or where valences come nearer to six at little loss.
 static bool flipIsGood(const Remeshing& r, const EdgeSides& sides, int a, int b) {
   const EditableMesh& mesh = r.mesh;
-  const auto [c, d] = sides.opposite;
+  const int c = sides.opposite[0], d = sides.opposite[1];
   const auto& x = mesh.positions;
   const Vector3d normal0 = areaVector(mesh, sides.triangle[0]).normalized();
   const Vector3d normal1 = areaVector(mesh, sides.triangle[1]).normalized();

@@ -8,12 +8,12 @@ using Eigen::Vector3d;
 
 // J shape; a tube flattened front to back. The small blend towards the duodenum keeps the groove of the pylorus.
 double stomach(const Vector3d& p) {
-  static const Tube body = makeTube({{88, 66, -34, 37},  // fundus
-                                     {91, 48, -30, 43},
-                                     {93, 22, -18, 44},  // body
-                                     {91, -4, -4, 42},
-                                     {83, -30, 8, 39},
-                                     {65, -52, 19, 35},
+  static const Tube body = makeTube({{84, 66, -74, 37},  // fundus
+                                     {89, 48, -66, 43},
+                                     {93, 22, -46, 44},  // body
+                                     {92, -4, -22, 42},
+                                     {84, -30, 1, 39},
+                                     {66, -52, 17, 35},
                                      {42, -63, 27, 30.5},  // antrum
                                      {20, -65, 29, 26},
                                      {4, -60, 26, 20.5},
