@@ -1,0 +1,75 @@
+#include "app/files/text_lines.h"
+
+#include <charconv>
+#include <cmath>
+#include <system_error>
+
+#include "app/files/input_error.h"
+
+namespace medulla {
+
+// True when the line is continued on the next one.
+bool TextLines::splitLine() {
+  const std::size_t end = rest_.find('\n');
+  std::string_view text = rest_.substr(0, end);
+  rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+  ++line_;
+  const std::size_t comment = text.find('#');
+  text = text.substr(0, comment);
+  const std::size_t last = text.find_last_not_of(" \t\r");
+  const bool continued = comment == std::string_view::npos && last != std::string_view::npos && text[last] == '\\';
+  if (continued) text = text.substr(0, last);
+  for (;;) {
+    const std::size_t begin = text.find_first_not_of(" \t\r");
+    if (begin == std::string_view::npos) return continued;
+    text.remove_prefix(begin);
+    const std::size_t length = std::min(text.find_first_of(" \t\r"), text.size());
+    words_.push_back(text.substr(0, length));
+    text.remove_prefix(length);
+  }
+}
+
+bool TextLines::next() {
+  words_.clear();
+  while (!rest_.empty()) {
+    const bool continued = splitLine();
+    if (!words_.empty() && !continued) return true;
+  }
+  return !words_.empty();
+}
+
+// from_chars knows no leading plus sign, which files do use.
+static std::string_view withoutPlus(std::string_view word) {
+  return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;
+}
+
+double TextLines::number(std::string_view word) const {
+  const std::string_view digits = withoutPlus(word);
+  double value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error == std::errc::result_out_of_range) fail(quoted(word) + " does not fit a double precision number");
+  if (error != std::errc() || end != digits.data() + digits.size()) fail("expected a number, found " + quoted(word));
+  if (!std::isfinite(value)) fail("expected a finite number, found " + quoted(word));
+  return value;
+}
+
+long long TextLines::integer(std::string_view word) const {
+  const std::string_view digits = withoutPlus(word);
+  long long value = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (error != std::errc() || end != digits.data() + digits.size()) fail("expected an integer, found " + quoted(word));
+  return value;
+}
+
+void TextLines::fail(const std::string& message) const {
+  throw inputError(name_, line_, message);
+}
+
+std::string quoted(std::string_view word) {
+  constexpr std::size_t kLongest = 40;
+  std::string out = "'";
+  for (const char c : word.substr(0, kLongest)) out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
+  return out + (word.size() > kLongest ? "...'" : "'");
+}
+
+}  // namespace medulla

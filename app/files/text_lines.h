@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace medulla {
+
+// Walks a text line by line and splits it into words, for formats whose errors must name the line. Lines end in LF or
+// CRLF; # starts a comment; a backslash at the end of a line joins the next one (OBJ).
+class TextLines {
+ public:
+  // `text` must outlive this object; `name` is the path that errors begin with.
+  TextLines(std::string_view text, std::string name) : rest_(text), name_(std::move(name)) {}
+
+  // Moves to the next line that holds a word. False at the end.
+  bool next();
+
+  const std::vector<std::string_view>& words() const { return words_; }
+  int line() const { return line_; }  // 1-based
+
+  // Exact (std::from_chars). NaN, infinity and what does not fit a double are refused.
+  double number(std::string_view word) const;
+  long long integer(std::string_view word) const;
+
+  // Throws "NAME:LINE: message".
+  [[noreturn]] void fail(const std::string& message) const;
+
+ private:
+  bool splitLine();
+
+  std::string_view rest_;
+  std::string name_;
+  int line_ = 0;
+  std::vector<std::string_view> words_;
+};
+
+// A word as it may appear in an error message: shortened, and free of control characters.
+std::string quoted(std::string_view word);
+
+}  // namespace medulla
