@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 namespace medulla {
 
@@ -30,6 +31,15 @@ std::vector<Side> sortedSides(const TriangleMesh& mesh) {
   }
   std::sort(sides.begin(), sides.end());
   return sides;
+}
+
+// Calls visit(sides of one edge) for every edge.
+template <typename Visit>
+void forEachEdge(const std::vector<Side>& sides, const Visit& visit) {
+  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
+    while (end < sides.size() && sides[end].low == sides[begin].low && sides[end].high == sides[begin].high) ++end;
+    visit(std::span(sides.data() + begin, end - begin));
+  }
 }
 
 // Counting sort of (list, item) pairs: items keep their order within a list.
@@ -78,17 +88,20 @@ IndexLists neighboursOfVertices(const TriangleMesh& mesh) {
 
 std::vector<std::array<int, 3>> adjacentTriangles(const TriangleMesh& mesh) {
   std::vector<std::array<int, 3>> adjacent(mesh.triangles.size(), {-1, -1, -1});
-  const std::vector<Side> sides = sortedSides(mesh);
-  for (std::size_t i = 0; i < sides.size();) {
-    std::size_t end = i + 1;
-    while (end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high) ++end;
-    if (end - i == 2) {
-      adjacent[sides[i].triangle][sides[i].corner] = sides[i + 1].triangle;
-      adjacent[sides[i + 1].triangle][sides[i + 1].corner] = sides[i].triangle;
-    }
-    i = end;
-  }
+  forEachEdge(sortedSides(mesh), [&adjacent](std::span<const Side> sides) {
+    if (sides.size() != 2) return;
+    adjacent[sides[0].triangle][sides[0].corner] = sides[1].triangle;
+    adjacent[sides[1].triangle][sides[1].corner] = sides[0].triangle;
+  });
   return adjacent;
+}
+
+std::vector<std::array<int, 3>> trianglesOnEdges(const TriangleMesh& mesh) {
+  std::vector<std::array<int, 3>> count(mesh.triangles.size());
+  forEachEdge(sortedSides(mesh), [&count](std::span<const Side> sides) {
+    for (const Side& side : sides) count[side.triangle][side.corner] = static_cast<int>(sides.size());
+  });
+  return count;
 }
 
 double surfaceArea(const TriangleMesh& mesh) {
@@ -143,12 +156,12 @@ std::vector<int> componentOfTriangles(const TriangleMesh& mesh, int& components)
     while (parent[t] != t) t = parent[t] = parent[parent[t]];
     return t;
   };
-  const std::vector<Side> sides = sortedSides(mesh);
-  for (std::size_t i = 1; i < sides.size(); ++i) {
-    if (sides[i].low != sides[i - 1].low || sides[i].high != sides[i - 1].high) continue;
-    const int a = root(sides[i - 1].triangle), b = root(sides[i].triangle);
-    parent[std::max(a, b)] = std::min(a, b);
-  }
+  forEachEdge(sortedSides(mesh), [&parent, &root](std::span<const Side> sides) {
+    for (const Side& side : sides) {
+      const int a = root(sides[0].triangle), b = root(side.triangle);
+      parent[std::max(a, b)] = std::min(a, b);
+    }
+  });
   components = 0;
   std::vector<int> component(parent.size());
   for (int t = 0; t < static_cast<int>(parent.size()); ++t) {
@@ -158,15 +171,17 @@ std::vector<int> componentOfTriangles(const TriangleMesh& mesh, int& components)
   return component;
 }
 
+double solidAngle(const TriangleMesh& mesh, const std::array<int, 3>& triangle, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d a = mesh.vertices[triangle[0]] - point, b = mesh.vertices[triangle[1]] - point,
+                        c = mesh.vertices[triangle[2]] - point;
+  const double la = a.norm(), lb = b.norm(), lc = c.norm();
+  return 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+}
+
 double windingNumber(const TriangleMesh& mesh, const Eigen::Vector3d& point) {
-  double solidAngle = 0;
-  for (const auto& t : mesh.triangles) {
-    const Eigen::Vector3d a = mesh.vertices[t[0]] - point, b = mesh.vertices[t[1]] - point,
-                          c = mesh.vertices[t[2]] - point;
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    solidAngle += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return solidAngle / (4 * std::numbers::pi);
+  double sum = 0;
+  for (const auto& t : mesh.triangles) sum += solidAngle(mesh, t, point);
+  return sum / (4 * std::numbers::pi);
 }
 
 }  // namespace medulla

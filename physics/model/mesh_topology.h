@@ -35,6 +35,10 @@ inline Eigen::Vector3d areaVector(const TriangleMesh& mesh, const std::array<int
   return 0.5 * (mesh.vertices[triangle[1]] - a).cross(mesh.vertices[triangle[2]] - a);
 }
 
+// How many triangles share each triangle's edges: entry k counts those on (corner k, corner k + 1), itself included.
+// 1 at an opening, 2 on a manifold edge.
+std::vector<std::array<int, 3>> trianglesOnEdges(const TriangleMesh& mesh);
+
 // m2; the whole surface.
 double surfaceArea(const TriangleMesh& mesh);
 
@@ -53,8 +57,12 @@ double boundsDiagonal(const TriangleMesh& mesh);
 // Component of every triangle, connected through shared edges, numbered by its first triangle; count in `components`.
 std::vector<int> componentOfTriangles(const TriangleMesh& mesh, int& components);
 
-// Signed turns of the surface around a point (Van Oosterom and Strackee 1983): 1 inside a closed outward surface, 0
-// outside or in a cavity. O(triangles).
+// Solid angle under which a point sees one triangle (Van Oosterom and Strackee 1983), signed by the winding: positive
+// from behind. In steradian.
+double solidAngle(const TriangleMesh& mesh, const std::array<int, 3>& triangle, const Eigen::Vector3d& point);
+
+// Signed turns of the surface around a point: 1 inside a closed outward surface, 0 outside or in a cavity.
+// O(triangles).
 double windingNumber(const TriangleMesh& mesh, const Eigen::Vector3d& point);
 
 }  // namespace medulla
