@@ -28,8 +28,8 @@ constexpr double kFlatExtent = 1e-5;
 constexpr double kFlatThickness = 1e-4;
 
 // Total length of the cuts, as a fraction of the diagonal, up to which they are a local flaw: a fold of a few
-// triangles stays below, one limb through another makes two rings.
-constexpr double kSmallCuts = 0.25;
+// triangles stays below, a limb of a fortieth of the diagonal that runs into another place of the body does not.
+constexpr double kSmallCuts = 0.15;
 
 double quantile(std::vector<double> values, double fraction) {
   const std::size_t index = static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1));

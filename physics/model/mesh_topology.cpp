@@ -1,6 +1,5 @@
 #include "physics/model/mesh_topology.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>

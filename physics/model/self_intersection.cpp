@@ -134,7 +134,7 @@ double cutLength(const TriangleMesh& mesh, int triangle0, int triangle1) {
   if (line.norm() < kOnPlane) return 0;
   const Vector3d along = line.normalized();
   const Interval ia = intervalOnLine(a, da, along), ib = intervalOnLine(b, db, along);
-  // Lying with an edge on the other's edge is touching; one of the two must reach through the other's plane.
+  // Two edges that lie on each other only touch: one of the two must reach through the other's plane.
   if (!ia.straddles && !ib.straddles) return 0;
   const double length = std::min(ia.high, ib.high) - std::max(ia.low, ib.low);
   return length > kTouch * size ? length : 0;

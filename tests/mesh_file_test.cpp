@@ -1,0 +1,236 @@
+#include "app/files/mesh_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "app/files/obj_reader.h"
+#include "app/files/off_reader.h"
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+static const std::string kTetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+static const std::string kFaces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+
+template <typename Action>
+static std::string refusal(const Action& action) {
+  try {
+    action();
+  } catch (const std::runtime_error& e) {
+    EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
+    return e.what();
+  }
+  return "accepted";
+}
+
+static std::string objRefusal(const std::string& text) {
+  return refusal([&] { parseObj(text, "a.obj"); });
+}
+
+static std::string offRefusal(const std::string& text) {
+  return refusal([&] { parseOff(text, "a.off"); });
+}
+
+// A file that lives as long as the test.
+class MeshFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              (std::string("medulla_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::string write(const std::string& name, const std::string& content) const {
+    const std::string path = (folder_ / name).string();
+    std::ofstream(path, std::ios::binary) << content;
+    return path;
+  }
+  std::filesystem::path folder_;
+};
+
+TEST(ObjReader, KeepsOrderAndDoubles) {
+  const TriangleMesh mesh = parseObj(
+      "# comment\nmtllib a.mtl\no body\nv 0.1 -2.5e-3 +3\r\nv 1 0 0 1.0\nvn 0 0 1\nvt 0 0\n\nv 0 1 0 0.5 0.5 0.5\n"
+      "v 7 8 9 # unused\ns off\nusemtl x\nf 3 1 2\n",
+      "a.obj");
+  ASSERT_EQ(mesh.vertices.size(), 4u);
+  EXPECT_EQ(mesh.vertices[0], Vector3d(0.1, -2.5e-3, 3));  // the same doubles as the compiler makes of these digits
+  EXPECT_EQ(mesh.vertices[3], Vector3d(7, 8, 9));
+  EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{2, 0, 1}}));
+}
+
+TEST(ObjReader, EveryFormOfFace) {
+  const std::string vertices = kTetrahedron + "vt 0 0\nvn 0 0 1\n";
+  const std::vector<std::array<int, 3>> expected{{0, 2, 1}};
+  for (const std::string face : {"f 1 3 2", "f 1/1 3/1 2/1", "f 1//1 3//1 2//1", "f 1/1/1 3/1/1 2/1/1", "f -4 -2 -3",
+                                 "f -4/-1/-1 -2/-1/-1 -3/-1/-1", "  f\t1  3 \\\n 2", "f 1 3 2 # end"}) {
+    EXPECT_EQ(parseObj(vertices + face, "a.obj").triangles, expected) << face;
+  }
+  // A face may come before its vertices, but counting back starts where it stands.
+  EXPECT_EQ(parseObj("f 1 3 2\n" + vertices, "a.obj").triangles, expected);
+  EXPECT_EQ(objRefusal("v 0 0 0\nf -1 -2 -3\n" + vertices).substr(0, 8), "a.obj:2:");
+}
+
+TEST(ObjReader, PolygonsBecomeFans) {
+  const TriangleMesh mesh = parseObj("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv -1 0.5 0\nf 1 2 3 4 5\n", "a.obj");
+  EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
+}
+
+TEST(ObjReader, NotANumberAndInfinityAreRefusedWithTheirLine) {
+  for (const std::string bad : {"nan", "NaN", "-nan", "inf", "-inf", "Infinity", "nan(1)"}) {
+    EXPECT_EQ(objRefusal("v 0 0 0\n\nv 1 " + bad + " 0\n"), "a.obj:3: expected a finite number, found '" + bad + "'");
+  }
+  EXPECT_EQ(objRefusal("v 0 0 1e999\n"), "a.obj:1: '1e999' does not fit a double precision number");
+}
+
+TEST(ObjReader, MalformedLinesAreRefusedWithTheirLine) {
+  EXPECT_EQ(objRefusal("v 0 0\n"), "a.obj:1: expected 'v x y z'");
+  EXPECT_EQ(objRefusal("v 0 0 1,5\n"), "a.obj:1: expected a number, found '1,5'");
+  EXPECT_EQ(objRefusal("v 0 0 +-1\n"), "a.obj:1: expected a number, found '+-1'");
+  EXPECT_EQ(objRefusal(kTetrahedron + "f 1 2\n"), "a.obj:5: expected a face of at least 3 corners");
+  EXPECT_EQ(objRefusal(kTetrahedron + "f 1 2 x\n"), "a.obj:5: expected an integer, found 'x'");
+  EXPECT_EQ(objRefusal(kTetrahedron + "f 1 2 /3\n"), "a.obj:5: expected an integer, found ''");
+  EXPECT_EQ(objRefusal(kTetrahedron + "f 1 2 3.5\n"), "a.obj:5: expected an integer, found '3.5'");
+  EXPECT_EQ(objRefusal(kTetrahedron + "f 1 2 3/a\n"),
+            "a.obj:5: expected a face corner v, v/vt, v//vn or v/vt/vn, found '3/a'");
+}
+
+TEST(ObjReader, IndicesOutOfRangeAreRefusedWithTheirLine) {
+  EXPECT_EQ(objRefusal(kTetrahedron + kFaces + "f 1 2 5\n"),
+            "a.obj:9: face refers to vertex 5, but the file has only 4");
+  EXPECT_EQ(objRefusal(kTetrahedron + "f 0 1 2\n"), "a.obj:5: vertex 0 in a face: OBJ counts from 1");
+  EXPECT_EQ(objRefusal(kTetrahedron + "f 1 2 -5\n"), "a.obj:5: vertex '-5' in a face, but only 4 before");
+  EXPECT_EQ(objRefusal(kTetrahedron + "f 1 2 2147483648\n").substr(0, 8), "a.obj:5:");
+  EXPECT_EQ(objRefusal(kTetrahedron + "f 1 2 99999999999999999999\n").substr(0, 8), "a.obj:5:");
+  EXPECT_EQ(objRefusal(kTetrahedron), "a.obj: no triangles in this OBJ file");
+}
+
+TEST(OffReader, HeaderVariants) {
+  const std::string body = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+  for (const std::string header : {"OFF\n4 4 6\n", "OFF 4 4 6\n", "OFF4 4 6\n", "# c\nOFF # d\n\n4 4\n",
+                                   "OFF\r\n4 4 0\r\n", "COFF\n4 4 0\n", "NOFF 4 4 0\n", "STCNOFF 4 4 0\n"}) {
+    const TriangleMesh mesh = parseOff(header + body, "a.off");
+    ASSERT_EQ(mesh.vertices.size(), 4u) << header;
+    EXPECT_EQ(mesh.vertices[3], Vector3d(0, 0, 1));
+    EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}));
+  }
+  EXPECT_EQ(offRefusal("4OFF\n4 4 6\n" + body), "a.off:1: expected an OFF header, found '4OFF'");
+  EXPECT_EQ(offRefusal("OFFS\n4 4 6\n" + body), "a.off:1: expected an OFF header, found 'OFFS'");
+  EXPECT_EQ(offRefusal("OFF BINARY\n"), "a.off:1: binary OFF is not supported, expected text");
+}
+
+TEST(OffReader, PolygonsColoursAndComments) {
+  const TriangleMesh mesh = parseOff(
+      "COFF 4 1 0\n0 0 0 255 0 0\n1 0 0 255 0 0 # red\n\n1 1 0 1 1 1\n0 1 0 1 1 1\n4 0 1 2 3 0.5 0.5 0.5\n", "a.off");
+  EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}, {0, 2, 3}}));
+}
+
+TEST(OffReader, LyingCountsAreRefused) {
+  EXPECT_EQ(offRefusal("OFF\n2000000000 2000000000 0\n0 0 0\n").substr(0, 48),
+            "a.off:2: the header counts 2000000000 vertices a");
+  EXPECT_EQ(offRefusal("OFF\n-1 4 0\n"), "a.off:2: expected counts that are not negative");
+  EXPECT_EQ(offRefusal("OFF\n3 1 0\n0 0 0\n1 0 0\n"), "a.off:4: the file ends after 2 of 3 vertices");
+  EXPECT_EQ(offRefusal("OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"), "a.off:6: the file ends after 1 of 2 faces");
+  EXPECT_EQ(offRefusal("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 2 1\n"),
+            "a.off:7: expected the end of the file after the faces that the header counts");
+  EXPECT_EQ(offRefusal("OFF\n"), "a.off:1: expected the numbers of vertices, faces and edges");
+  EXPECT_EQ(offRefusal("OFF\n0 0 0\n"), "a.off: no triangles in this OFF file");
+}
+
+TEST(OffReader, BadValuesAreRefusedWithTheirLine) {
+  EXPECT_EQ(offRefusal("OFF\n3 1 0\n0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n"),
+            "a.off:4: expected a finite number, found 'nan'");
+  EXPECT_EQ(offRefusal("OFF\n3 1 0\n0 0 0\n1 0 -inf\n0 1 0\n3 0 1 2\n"),
+            "a.off:4: expected a finite number, found '-inf'");
+  EXPECT_EQ(offRefusal("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
+            "a.off:6: face refers to vertex 3, expected 0 to 2");
+  EXPECT_EQ(offRefusal("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n"),
+            "a.off:6: face refers to vertex -1, expected 0 to 2");
+  EXPECT_EQ(offRefusal("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n"),
+            "a.off:6: the face announces 4 corners but lists 3");
+  EXPECT_EQ(offRefusal("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n"),
+            "a.off:6: expected a face of at least 3 corners, found '2'");
+}
+
+TEST_F(MeshFile, UnitsScaleToMetres) {
+  EXPECT_EQ(metresPerUnit("m"), 1);
+  EXPECT_EQ(metresPerUnit("cm"), 0.01);
+  EXPECT_EQ(metresPerUnit("mm"), 0.001);
+  EXPECT_EQ(metresPerUnit("inch"), 0.0254);
+  EXPECT_EQ(refusal([] { metresPerUnit("feet"); }), "unknown unit 'feet', expected m, cm, mm or inch");
+  const TriangleMesh mesh = readMesh(write("a.OBJ", kTetrahedron + kFaces), metresPerUnit("mm"));
+  EXPECT_EQ(mesh.vertices[1], Vector3d(0.001, 0, 0));
+}
+
+TEST_F(MeshFile, PathsThatHoldNoMeshAreRefusedInOneLine) {
+  const auto read = [](const std::string& path) { return refusal([&] { readMesh(path); }); };
+  const std::string missing = (folder_ / "missing.obj").string();
+  EXPECT_EQ(read(missing), missing + ": cannot be read: No such file or directory");
+  EXPECT_EQ(read(folder_.string()), folder_.string() + ": is a directory, expected a mesh file");
+  EXPECT_EQ(read("/dev/null"), "/dev/null: is not a file, expected a mesh file");
+  std::string path = write("empty.obj", "");
+  EXPECT_EQ(read(path), path + ": is empty");
+  path = write("a.txt", "hello");
+  EXPECT_TRUE(read(path).starts_with(path + ": unknown mesh format '.txt', expected ")) << read(path);
+  path = write("plain", "hello");
+  EXPECT_TRUE(read(path).starts_with(path + ": unknown mesh format '', expected ")) << read(path);
+}
+
+TEST_F(MeshFile, ErrorsNameFileAndLine) {
+  const std::string path = write("bad.obj", kTetrahedron + "v 0 nan 0\n" + kFaces);
+  EXPECT_EQ(refusal([&] { readMesh(path); }), path + ":5: expected a finite number, found 'nan'");
+}
+
+static std::string asciiStl() {
+  const std::array<std::array<const char*, 3>, 4> faces{{{"0 0 0", "0 1 0", "1 0 0"},
+                                                         {"0 0 0", "1 0 0", "0 0 1"},
+                                                         {"1 0 0", "0 1 0", "0 0 1"},
+                                                         {"0 0 0", "0 0 1", "0 1 0"}}};
+  std::string text = "solid a\n";
+  for (const auto& face : faces) {
+    text += "facet normal 0 0 1\nouter loop\n";
+    for (const char* v : face) text += std::string("vertex ") + v + "\n";
+    text += "endloop\nendfacet\n";
+  }
+  return text + "endsolid a\n";
+}
+
+TEST_F(MeshFile, StlAndPlyComeThroughAssimpWithTheirCornersJoined) {
+  const TriangleMesh stl = readMesh(write("a.stl", asciiStl()), 0.01);
+  EXPECT_EQ(stl.vertices.size(), 4u);
+  EXPECT_EQ(stl.triangles.size(), 4u);
+  EXPECT_NEAR(stl.vertices[1].norm(), 0.01, 1e-9);
+  const TriangleMesh ply =
+      readMesh(write("a.ply",
+                     "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+                     "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+                     "end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"));
+  EXPECT_EQ(ply.vertices.size(), 4u);
+  EXPECT_EQ(ply.triangles.size(), 2u);
+}
+
+TEST_F(MeshFile, BadAssimpFilesAreRefusedInOneLine) {
+  for (const std::string name : {"a.stl", "a.ply", "a.gltf", "a.3ds", "a.dae", "a.x"}) {
+    const std::string path = write(name, "this is no mesh\nat all\n");
+    EXPECT_TRUE(refusal([&] { readMesh(path); }).starts_with(path + ": ")) << name;
+  }
+  std::string text = asciiStl();
+  text.replace(text.find("vertex 1 0 0"), 12, "vertex nan 0 0");
+  const std::string path = write("nan.stl", text);
+  EXPECT_TRUE(refusal([&] { readMesh(path); }).starts_with(path + ": "));
+}
+
+TEST_F(MeshFile, AssimpFileWithoutTrianglesIsRefused) {
+  const std::string path = write("points.ply",
+                                 "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+                                 "y\nproperty float z\nend_header\n0 0 0\n");
+  EXPECT_TRUE(refusal([&] { readMesh(path); }).starts_with(path + ": "));
+}
+
+}  // namespace medulla
