@@ -160,7 +160,8 @@ void lightVertices(const SceneMesh& mesh, const Viewpoint& view, const Light& li
   out.picture.resize(n);
   out.shade.assign(n, Shade::lit);
   out.glinting.assign(n, 1);
-  const float cone = std::atan(2 * kRimOuter * view.tangent);
+  const float corner = view.round ? 2 * kRimOuter : 1.6f * std::sqrt(1 + view.aspect * view.aspect);
+  const float cone = std::atan(corner * view.tangent);
   const Surroundings s{view, light, lightView, std::cos(0.40f * cone), std::cos(std::min(1.07f * cone, 1.5f))};
   for (const MeshPart& part : mesh.parts) {
     const Look& look = *part.look;

@@ -30,8 +30,8 @@ TEST(Blend, EndsAreExactAndTheMiddleIsBetween) {
 TEST(Blend, OppositeQuaternionsOfOneOrientationDoNotTurn) {
   const Eigen::Quaterniond q(Eigen::AngleAxisd(1, Eigen::Vector3d::UnitX()));
   DynamicsFrame out;
-  blendFrames(oneBody(0, Eigen::Vector3d::Zero(), q), oneBody(1, Eigen::Vector3d::Zero(), Eigen::Quaterniond(-q.coeffs())),
-              0.5, out);
+  blendFrames(oneBody(0, Eigen::Vector3d::Zero(), q),
+              oneBody(1, Eigen::Vector3d::Zero(), Eigen::Quaterniond(-q.coeffs())), 0.5, out);
   EXPECT_NEAR(out.bodies[0].spheres[0].worldFromSphere.angularDistance(q), 0, 1e-7);
 }
 

@@ -1,0 +1,160 @@
+#include "render/video_writer.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include "render/yuv.h"
+
+namespace medulla {
+namespace {
+
+namespace fs = std::filesystem;
+
+class VideoWriterTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() /
+              ("medulla_video_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    path_ = std::getenv("PATH");
+  }
+  void TearDown() override {
+    setenv("PATH", path_.c_str(), 1);
+    fs::remove_all(folder_);
+  }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::size_t filesInFolder() const {
+    return std::size_t(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+  // A program of the name ffmpeg that does what the script says, and nothing else in PATH but the shell's tools.
+  void replaceFfmpeg(const std::string& script) {
+    fs::create_directories(folder_ / "bin");
+    std::ofstream(path("bin/ffmpeg")) << "#!/bin/sh\n" << script << "\n";
+    fs::permissions(path("bin/ffmpeg"), fs::perms::owner_all);
+    setenv("PATH", (path("bin") + ":/bin").c_str(), 1);
+  }
+  static std::string outputOf(const std::string& command) {
+    std::string text;
+    FILE* pipe = popen(command.c_str(), "r");
+    for (char buffer[4096]; const std::size_t n = fread(buffer, 1, sizeof buffer, pipe);) text.append(buffer, n);
+    pclose(pipe);
+    return text;
+  }
+  fs::path folder_;
+  std::string path_;
+};
+
+Image flat(int width, int height, std::uint8_t r, std::uint8_t g, std::uint8_t b) {
+  Image image{width, height, std::vector<std::uint8_t>(4ul * width * height, 255)};
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+    image.pixels[i] = r;
+    image.pixels[i + 1] = g;
+    image.pixels[i + 2] = b;
+  }
+  return image;
+}
+
+std::string messageOf(const std::function<void()>& f) {
+  try {
+    f();
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+// ITU-R BT.709, table 4: the corners of the RGB cube in limited range.
+TEST_F(VideoWriterTest, I420FollowsBt709) {
+  const struct {
+    std::uint8_t r, g, b;
+    int y, u, v;
+  } cases[] = {{255, 255, 255, 235, 128, 128}, {0, 0, 0, 16, 128, 128},   {255, 0, 0, 63, 102, 240},
+               {0, 255, 0, 173, 42, 26},       {0, 0, 255, 32, 240, 118}, {255, 255, 0, 219, 16, 138}};
+  for (const auto& c : cases) {
+    std::vector<std::uint8_t> planes;
+    rgbaToI420(flat(4, 2, c.r, c.g, c.b), planes);
+    ASSERT_EQ(planes.size(), 12u);
+    EXPECT_NEAR(planes[0], c.y, 1);
+    EXPECT_NEAR(planes[7], c.y, 1);
+    EXPECT_NEAR(planes[8], c.u, 1);
+    EXPECT_NEAR(planes[10], c.v, 1);
+  }
+}
+
+TEST_F(VideoWriterTest, FilmHasEveryPictureRightColoursAndTags) {
+  {
+    VideoWriter writer(path("a.mp4"), 64, 32, 30);
+    for (int k = 0; k < 20; ++k) writer.write(flat(64, 32, 200, 60, 40));
+    EXPECT_FALSE(fs::exists(path("a.mp4")));
+    writer.finish();
+  }
+  ASSERT_TRUE(fs::exists(path("a.mp4")));
+  EXPECT_EQ(filesInFolder(), 1u);
+  const std::string raw = outputOf("ffmpeg -v error -i " + path("a.mp4") + " -f rawvideo -pix_fmt rgb24 -");
+  ASSERT_EQ(raw.size(), 20u * 64 * 32 * 3);
+  const std::size_t middle = (16 * 64 + 32) * 3;
+  EXPECT_NEAR(std::uint8_t(raw[middle]), 200, 4);
+  EXPECT_NEAR(std::uint8_t(raw[middle + 1]), 60, 4);
+  EXPECT_NEAR(std::uint8_t(raw[middle + 2]), 40, 4);
+  const std::string tags =
+      outputOf("ffprobe -v error -show_entries stream=pix_fmt,color_space,color_range,r_frame_rate -of csv=p=0 " +
+               path("a.mp4"));
+  EXPECT_EQ(tags, "yuv420p,tv,bt709,30/1\n");
+}
+
+TEST_F(VideoWriterTest, UnfinishedFilmLeavesNothingAndKeepsTheEarlierOne) {
+  std::ofstream(path("a.mp4")) << "earlier";
+  {
+    VideoWriter writer(path("a.mp4"), 64, 32, 30);
+    writer.write(flat(64, 32, 1, 2, 3));
+  }
+  EXPECT_EQ(filesInFolder(), 1u);
+  std::string text;
+  std::getline(std::ifstream(path("a.mp4")), text);
+  EXPECT_EQ(text, "earlier");
+}
+
+TEST_F(VideoWriterTest, MissingFfmpegNamesThePackageBeforeAnythingIsWritten) {
+  setenv("PATH", path("empty").c_str(), 1);
+  EXPECT_EQ(messageOf([&] { VideoWriter(path("a.mp4"), 64, 32, 30); }),
+            "ffmpeg not found: install the Debian package ffmpeg");
+  EXPECT_EQ(filesInFolder(), 0u);
+}
+
+TEST_F(VideoWriterTest, DyingFfmpegIsReportedWithItsWords) {
+  replaceFfmpeg("echo 'no codec for this' >&2; exit 1");
+  const std::string message = messageOf([&] {
+    VideoWriter writer(path("a.mp4"), 640, 320, 30);
+    for (int k = 0; k < 50; ++k) writer.write(flat(640, 320, 1, 2, 3));
+    writer.finish();
+  });
+  EXPECT_NE(message.find("no codec for this"), std::string::npos) << message;
+  EXPECT_NE(message.find("a.mp4"), std::string::npos);
+  EXPECT_FALSE(fs::exists(path("a.mp4")));
+}
+
+TEST_F(VideoWriterTest, FfmpegThatFailsAtTheEndLeavesNothing) {
+  replaceFfmpeg("for last; do :; done; cat > \"$last\"; exit 3");
+  EXPECT_NE(messageOf([&] {
+              VideoWriter writer(path("a.mp4"), 64, 32, 30);
+              writer.write(flat(64, 32, 1, 2, 3));
+              writer.finish();
+            }),
+            "");
+  EXPECT_EQ(filesInFolder(), 1u);  // the folder with the false ffmpeg
+}
+
+TEST_F(VideoWriterTest, UnwritableTargetIsRefusedAtOnce) {
+  EXPECT_NE(messageOf([&] { VideoWriter(path("none/a.mp4"), 64, 32, 30); }).find("no such folder"), std::string::npos);
+  fs::create_directories(path("b.mp4"));
+  EXPECT_NE(messageOf([&] { VideoWriter(path("b.mp4"), 64, 32, 30); }).find("folder"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace medulla
