@@ -41,6 +41,7 @@ void DepthMap::rasterize(glm::vec3 a, glm::vec3 b, glm::vec3 c) {
   const int x1 = int(std::min(last, std::floor(std::max({a.x, b.x, c.x}) - 0.5f)));
   const int y0 = int(std::max(0.f, std::ceil(std::min({a.y, b.y, c.y}) - 0.5f)));
   const int y1 = int(std::min(last, std::floor(std::max({a.y, b.y, c.y}) - 0.5f)));
+  if (x0 > x1 || y0 > y1) return;  // most triangles of a fine mesh fall between texel centres
   const float dzdx = ((b.z - a.z) * (c.y - a.y) - (c.z - a.z) * (b.y - a.y)) / area;
   const float dzdy = ((c.z - a.z) * (b.x - a.x) - (b.z - a.z) * (c.x - a.x)) / area;
   const float px = float(x0) + 0.5f;

@@ -88,21 +88,26 @@ class VesselPainter {
   std::vector<float> opacity_;
 };
 
-float mottling(float u, float v, int seed, float cellShare) {
+// Lobules: distance to the border between cells whose grid is warped, so that no cell looks like its neighbour.
+float lobule(float u, float v, int cells) {
+  const float warpU = 0.9f / float(cells) * tiledNoise(u * 14, v * 14, 14, 61),
+              warpV = 0.9f / float(cells) * tiledNoise(u * 14, v * 14, 14, 62);
+  return smoothStep(0, 0.5f, tiledCells((u + warpU) * float(cells), (v + warpV) * float(cells), cells, 77));
+}
+
+float mottling(float u, float v, int seed, const DetailPattern& pattern) {
   float sum = 0, amplitude = 0.5f;
   for (int octave = 0, period = 4; octave < 6; ++octave, period *= 2, amplitude *= 0.5f)
     sum += amplitude * tiledNoise(u * float(period), v * float(period), period, octave + 31 * seed);
-  if (cellShare <= 0) return sum;
-  const float warpU = 0.012f * tiledNoise(u * 14, v * 14, 14, 61), warpV = 0.012f * tiledNoise(u * 14, v * 14, 14, 62);
-  const float lobule = smoothStep(0, 0.5f, tiledCells((u + warpU) * 74, (v + warpV) * 74, 74, 77));
-  return sum * (1 - cellShare) + lobule * cellShare;
+  if (pattern.cells == 0) return sum;
+  return glm::mix(sum, lobule(u, v, pattern.cells), pattern.cellContrast);
 }
 
-float relief(float u, float v, int seed) {
+float relief(float u, float v, int seed, const DetailPattern& pattern) {
   float sum = 0, amplitude = 0.5f;
   for (int octave = 0, period = 20; octave < 4; ++octave, period *= 2, amplitude *= 0.5f)
     sum += amplitude * tiledNoise(u * float(period) + 0.3f, v * float(period), period, 17 + octave + 31 * seed);
-  return sum;
+  return pattern.cellRelief > 0 ? sum + pattern.cellRelief * lobule(u, v, pattern.cells) : sum;
 }
 
 std::uint8_t toByte(float v) {
@@ -116,18 +121,18 @@ std::vector<std::uint8_t> makeDetailTexture(const DetailPattern& pattern, int se
   const VesselPainter vessels(pattern, seed + 3);
   std::vector<float> height(n * n);
   // Vessels stand out a little, but not among lobules: there they read as scratches.
-  const float vesselHeight = pattern.cells > 0 ? 0.f : 0.05f;
+  const float vesselHeight = pattern.cellContrast > 0 ? 0.f : 0.05f;
   for (int y = 0; y < n; ++y)
     for (int x = 0; x < n; ++x)
       height[y * n + x] =
-          relief(float(x) / float(n), float(y) / float(n), seed) + vesselHeight * vessels.opacity()[y * n + x];
+          relief(float(x) / float(n), float(y) / float(n), seed, pattern) + vesselHeight * vessels.opacity()[y * n + x];
   const auto at = [&](int x, int y) { return height[((y + n) % n) * n + (x + n) % n]; };
   const float slope = 6 * float(n) / 512;
   std::vector<std::uint8_t> out(4ul * n * n);
   for (int y = 0; y < n; ++y)
     for (int x = 0; x < n; ++x) {
       std::uint8_t* texel = &out[4ul * (y * n + x)];
-      texel[0] = toByte(mottling(float(x) / float(n), float(y) / float(n), seed, pattern.cells));
+      texel[0] = toByte(mottling(float(x) / float(n), float(y) / float(n), seed, pattern));
       texel[1] = toByte(vessels.opacity()[y * n + x]);
       texel[2] = toByte((at(x + 1, y) - at(x - 1, y)) * slope * 0.5f + 0.5f);
       texel[3] = toByte((at(x, y + 1) - at(x, y - 1)) * slope * 0.5f + 0.5f);

@@ -10,7 +10,7 @@ using glm::vec3;
 // Tool frame, m: the tip of the closed jaws at the origin, shaft along +z, jaws open about x at the hinge.
 constexpr float kHinge = 0.0200f, kShaftRadius = 0.0026f, kShaftStart = 0.0275f, kShaftEnd = 0.42f;
 constexpr float kJawHalfWidth = 0.0021f, kJawHeight = 0.0021f;
-constexpr int kAround = 24, kTeeth = 13;
+constexpr int kAround = 18, kTeeth = 13;
 constexpr float kTau = 6.2831853f;
 constexpr vec3 kSteel(0.50f, 0.50f, 0.52f), kSheath(0.020f, 0.020f, 0.022f);
 
@@ -89,7 +89,7 @@ void addShaft(Builder& b) {
         kSteel);
   // Light is computed per vertex and interpolated without perspective: rings stay close.
   std::vector<Ring> sheath = {{kShaftStart, 0.0023f}, {kShaftStart + 0.0001f, r - 0.0001f}, {kShaftStart + 0.0004f, r}};
-  for (float z = kShaftStart + 0.003f; z < kShaftEnd; z += 0.004f) sheath.push_back({z, r});
+  for (float z = kShaftStart + 0.003f; z < kShaftEnd; z += 0.006f) sheath.push_back({z, r});
   lathe(b, sheath, kSheath);
 }
 
@@ -99,8 +99,10 @@ struct JawSection {
 };
 JawSection jawSection(float t) {
   const float end = t > 0.88f ? std::sqrt(std::max(1 - (t - 0.88f) * (t - 0.88f) / 0.0145f, 0.f)) : 1.f;
-  return {kHinge * (1 - t), kJawHalfWidth * (1 - 0.22f * t) * (0.12f + 0.88f * end),
-          kJawHeight * (1 - 0.45f * t) * (0.25f + 0.75f * end)};
+  // Slim at the hinge, where both jaws lie inside the clevis.
+  const float root = 0.45f + 0.55f * std::min(t / 0.16f, 1.f);
+  return {kHinge * (1 - t), kJawHalfWidth * root * (1 - 0.22f * t) * (0.12f + 0.88f * end),
+          kJawHeight * root * (1 - 0.45f * t) * (0.25f + 0.75f * end)};
 }
 
 // side = +1: the jaw above the xz plane; the other is its mirror image, so that its faces turn the other way.
@@ -111,7 +113,7 @@ void addJaw(Builder& b, float side, float angle) {
     return vec3(x, c * dy - s * dz, kHinge + s * dy + c * dz);
   };
   const auto turned = [&](vec3 n) { return vec3(n.x, c * n.y * side - s * n.z, s * n.y * side + c * n.z); };
-  constexpr int kSlices = 4 * kTeeth, kArc = 12;
+  constexpr int kSlices = 2 * kTeeth, kArc = 10;
   std::uint32_t previous = 0;
   for (int k = 0; k <= kSlices; ++k) {
     const float t = float(k) / kSlices;

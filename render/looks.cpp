@@ -22,30 +22,31 @@ Look liver() {
   l.mottle = 0.95f;
   l.vessels = 0.10f;
   l.vesselTint = {1.3f, 0.6f, 0.6f};
-  l.bump = 0.62f;
+  l.bump = 0.44f;
+  l.specular = 0.8f;
   l.detailScale = 11;
-  l.detail = {1024, 3, 1.2f, 0.4f, 0.10f};
+  l.detail = {1024, 3, 1.2f, 0.4f, 74, 0.10f, 0};
   return l;
 }
 
 Look gallbladder() {
   Look l;
   l.name = "gallbladder";
-  l.albedoLow = {0.072f, 0.088f, 0.034f};
-  l.albedoHigh = {0.185f, 0.175f, 0.070f};
+  l.albedoLow = {0.070f, 0.098f, 0.048f};
+  l.albedoHigh = {0.215f, 0.212f, 0.105f};
   l.mottleFrequency = 22;
-  l.patches[0] = {{0.24f, 0.115f, 0.065f}, 42, 21, 1, {}, 0.42f, 0.70f, 0.55f};               // olive-brown blotches
+  l.patches[0] = {{0.30f, 0.165f, 0.105f}, 42, 21, 1, {}, 0.42f, 0.68f, 0.60f};               // olive-brown blotches
   l.patches[1] = {{0.30f, 0.125f, 0.075f}, 66, 9, 0.22f, {0, 1.1f, 0}, 0.55f, 1.10f, 0.85f};  // red neck
   l.patches[2] = {{0.62f, 0.40f, 0.13f}, 54, 40, 1, {0, 0.22f, 0}, 0.66f, 0.80f, 0.75f};      // fat
   l.wrap = {0.34f, 0.22f, 0.12f};
   l.roughness = 0.37f;
   l.wetRoughness = 0.17f;
   l.mottle = 0.70f;
-  l.vessels = 0.55f;
+  l.vessels = 0.85f;
   l.vesselTint = {1.9f, 0.36f, 0.45f};
   l.bump = 0.30f;
   l.detailScale = 16;
-  l.detail = {512, 6, 1.5f, -1.3f, 0};
+  l.detail = {512, 6, 2.4f, -1.3f, 0, 0, 0};
   return l;
 }
 
@@ -64,7 +65,7 @@ Look stomach() {
   l.vesselTint = {0.78f, 0.16f, 0.25f};
   l.bump = 0.50f;
   l.detailScale = 8.4f;
-  l.detail = {1024, 7, 2.6f, -0.6f, 0};
+  l.detail = {1024, 7, 2.6f, -0.6f, 0, 0, 0};
   return l;
 }
 
@@ -92,11 +93,13 @@ Look fat() {
   l.mottle = 0.75f;
   l.vessels = 0.55f;
   l.vesselTint = {0.75f, 0.16f, 0.20f};
-  l.bump = 0.60f;
+  l.bump = 0.85f;
+  l.specular = 1.3f;
   l.detailScale = 12;
+  l.unrollRadius = 0.006f;
   l.unrollTilt = 0.96f;  // lies flat, seen from above its front
   l.castsShadow = false;
-  l.detail = {512, 7, 2.0f, 0.9f, 0};
+  l.detail = {512, 7, 2.0f, 0.9f, 19, 0.13f, 0.30f};
   return l;
 }
 
@@ -113,11 +116,12 @@ Look wall() {
   l.mottle = 0.60f;
   l.vessels = 0.60f;
   l.vesselTint = {0.75f, 0.20f, 0.25f};
-  l.bump = 0.40f;
-  l.detailScale = 3.2f;
+  l.bump = 0.30f;
+  l.specular = 0.35f;
+  l.detailScale = 5.0f;
   l.castsShadow = false;
   l.encloses = true;
-  l.detail = {512, 6, 2.2f, 0.4f, 0};
+  l.detail = {1024, 6, 2.2f, 0.4f, 0, 0, 0};
   return l;
 }
 
@@ -134,7 +138,7 @@ Look dolphin() {
   l.mottle = 0.20f;
   l.bump = 0.08f;
   l.detailScale = 1.5f;
-  l.detail = {256, 0, 0, 0, 0};
+  l.detail = {256, 0, 0, 0, 0, 0, 0};
   return l;
 }
 
@@ -149,7 +153,7 @@ Look steel() {
   l.bump = 0.06f;
   l.detailScale = 40;
   l.metal = true;
-  l.detail = {256, 0, 0, 0, 0};
+  l.detail = {256, 0, 0, 0, 0, 0, 0};
   return l;
 }
 
@@ -159,7 +163,7 @@ Look matte() {
   l.name = "matte";
   l.specular = 0;
   l.ambient = 0;
-  l.detail = {16, 0, 0, 0, 0};
+  l.detail = {16, 0, 0, 0, 0, 0, 0};
   return l;
 }
 

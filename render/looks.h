@@ -27,7 +27,9 @@ struct DetailPattern {
   int vesselTrees = 0;      // per tile
   float vesselWidth = 2;    // texels of a 512 tile, of the widest trunk
   float vesselHeading = 0;  // rad, mean direction
-  float cells = 0;          // 0..1, lobules (liver)
+  int cells = 0;            // lobules along a tile's side
+  float cellContrast = 0;   // 0..1, share of the mottling they make
+  float cellRelief = 0;     // 0..1, how far they bulge
 };
 
 struct Look {
@@ -44,6 +46,7 @@ struct Look {
   glm::vec3 vesselTint{1};    // factor on the albedo where a vessel runs
   float bump = 0;             // slope of the wet film's micro relief
   float detailScale = 10;     // tiles per m
+  float unrollRadius = 0;     // m, of the bumps the texture follows; 0: from the surface's volume and area
   float unrollTilt = 0;       // rad about x, of the axis the texture is unrolled around (0: +z)
   float ambient = 1;          // share of the cavity's light
   bool metal = false;         // mirrors the cavity instead of scattering

@@ -30,8 +30,9 @@ float fractalNoise(glm::vec3 p) {
   return sum / 0.9375f;
 }
 
+// Lattice points lie at most two cells outside the tile: cheaper than two divisions.
 static int wrap(int v, int period) {
-  return ((v % period) + period) % period;
+  return v < 0 ? v + period : v >= period ? v - period : v;
 }
 
 float tiledNoise(float x, float y, int period, int seed) {

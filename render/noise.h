@@ -10,7 +10,7 @@ float latticeHash(std::int32_t x, std::int32_t y, std::int32_t z);  // 0..1
 float valueNoise(glm::vec3 p);                                      // 0..1, one lattice cell per unit, C1
 float fractalNoise(glm::vec3 p);                                    // 0..1, four octaves of valueNoise
 
-// Tileable in [0, period)^2; `seed` picks the pattern.
+// Tileable; x and y within a cell of [0, period], period > 2; `seed` picks the pattern.
 float tiledNoise(float x, float y, int period, int seed);  // 0..1
 float tiledCells(float x, float y, int period, int seed);  // Worley F2 - F1: 0 on cell borders
 

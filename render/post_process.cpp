@@ -9,35 +9,63 @@
 namespace medulla {
 namespace {
 
-// FXAA's settings: contrast that counts as an edge (of 255, and relative to the brightest neighbour), and the farthest
-// a tap reaches, px.
+// Contrast that counts as an edge: of 255, and relative to the brightest neighbour (an eighth).
 constexpr int kEdgeThreshold = 9, kRelativeShift = 3;
-constexpr float kReach = 8, kReduce = 1.f / 32, kReduceMinimum = 2;
-constexpr int kMargin = 9;  // rows and columns without smoothing: no tap leaves the picture
-
-struct Colour {
-  float r, g, b;
-};
-
-Colour bilinear(const Image& image, float x, float y) {
-  const int xi = int(x), yi = int(y);
-  const float u = x - float(xi), v = y - float(yi);
-  const std::uint8_t *p = &image.pixels[4ul * (std::size_t(yi) * image.width + xi)], *q = p + 4ul * image.width;
-  const auto channel = [&](int c) {
-    const float top = float(p[c]) + (float(p[c + 4]) - float(p[c])) * u;
-    const float bottom = float(q[c]) + (float(q[c + 4]) - float(q[c])) * u;
-    return top + (bottom - top) * v;
-  };
-  return {channel(0), channel(1), channel(2)};
-}
-
-Colour mean(Colour a, Colour b) {
-  return {(a.r + b.r) / 2, (a.g + b.g) / 2, (a.b + b.b) / 2};
-}
+constexpr int kSearch = 14;           // px along an edge to either side
+constexpr float kSubpixel = 0.5f;     // how strongly single pixels that stick out are softened
+constexpr int kMargin = kSearch + 2;  // rows and columns without smoothing: no step leaves the picture
 
 // Rec. 601 luma, 7 bits of fraction.
 int luma(int r, int g, int b) {
   return (38 * r + 75 * g + 15 * b) >> 7;
+}
+
+struct Blend {
+  std::ptrdiff_t neighbour;  // px from here
+  float share;               // 0..0.5 of the neighbour's colour
+};
+
+// Steps along the edge until the mean of the two rows beside it changes: that is where the edge jumps a row.
+struct EdgeEnd {
+  int distance;
+  bool above;  // the mean rose
+};
+EdgeEnd followEdge(const std::uint8_t* here, std::ptrdiff_t across, std::ptrdiff_t along, int twiceMean, int limit) {
+  for (int k = 1; k < kSearch; ++k) {
+    const std::ptrdiff_t at = k * along;
+    const int d = here[at] + here[at + across] - twiceMean;
+    if (std::abs(d) >= limit) return {k, d > 0};
+  }
+  return {kSearch, here[kSearch * along] + here[kSearch * along + across] > twiceMean};
+}
+
+// FXAA 3.11 (Lottes 2011): which neighbour the edge runs beside, and how much of it a straight edge between the two
+// jumps would let into this pixel.
+Blend findBlend(const std::uint8_t* m, std::ptrdiff_t stride) {
+  const int n = m[-stride], s = m[stride], w = m[-1], e = m[1], here = m[0];
+  const int nw = m[-stride - 1], ne = m[-stride + 1], sw = m[stride - 1], se = m[stride + 1];
+  const int horizontal = std::abs(nw + sw - 2 * w) + 2 * std::abs(n + s - 2 * here) + std::abs(ne + se - 2 * e);
+  const int vertical = std::abs(nw + ne - 2 * n) + 2 * std::abs(w + e - 2 * here) + std::abs(sw + se - 2 * s);
+  const bool level = horizontal >= vertical;
+  const int before = level ? n : w, after = level ? s : e;
+  const std::ptrdiff_t step = level ? stride : 1, along = level ? 1 : stride;
+  const bool towardsBefore = std::abs(before - here) >= std::abs(after - here);
+  const std::ptrdiff_t across = towardsBefore ? -step : step;
+  const int other = towardsBefore ? before : after, contrast = std::abs(other - here);
+
+  const int twiceMean = here + other, limit = std::max(contrast / 2, 1);
+  const EdgeEnd left = followEdge(m, across, -along, twiceMean, limit),
+                right = followEdge(m, across, along, twiceMean, limit);
+  const EdgeEnd nearest = left.distance < right.distance ? left : right;
+  const bool darker = 2 * here < twiceMean;
+  const float span = float(left.distance + right.distance);
+  const float straight = darker == nearest.above ? 0.5f - float(nearest.distance) / span : 0.f;
+
+  const int low = std::min({n, s, w, e, here}), high = std::max({n, s, w, e, here});
+  const float mean = float(2 * (n + s + w + e) + nw + ne + sw + se) / 12;
+  const float alone = std::min(std::abs(mean - float(here)) / float(std::max(high - low, 1)), 1.f);
+  const float soft = alone * alone * (3 - 2 * alone);
+  return {across, std::max(straight, soft * soft * kSubpixel)};
 }
 
 }  // namespace
@@ -83,19 +111,12 @@ void PostProcess::smoothRow(const Image& image, int y) {
   }
   for (int x = kMargin; x < end; ++x) {
     if (!edge[x]) continue;
-    const float nw = above[x - 1], ne = above[x + 1], sw = below[x - 1], se = below[x + 1];
-    float dx = (sw + se) - (nw + ne), dy = (nw + sw) - (ne + se);
-    const float reduce = std::max((nw + ne + sw + se) * kReduce, kReduceMinimum);
-    const float scale = 1 / (std::min(std::abs(dx), std::abs(dy)) + reduce);
-    dx = std::clamp(dx * scale, -kReach, kReach);
-    dy = std::clamp(dy * scale, -kReach, kReach);
-    const auto tap = [&](float t) { return bilinear(image, float(x) + dx * t, float(y) + dy * t); };
-    const Colour narrow = mean(tap(-1.f / 6), tap(1.f / 6)), wide = mean(narrow, mean(tap(-0.5f), tap(0.5f)));
-    const float low = std::min({nw, ne, sw, se, float(here[x])}), high = std::max({nw, ne, sw, se, float(here[x])});
-    const auto wideLuma = float(luma(int(wide.r), int(wide.g), int(wide.b)));
-    const Colour& best = wideLuma < low || wideLuma > high ? narrow : wide;
-    const auto byte = [](float v) { return std::uint8_t(v + 0.5f); };
-    smoothed_.push_back({std::uint32_t(y * width_ + x), {byte(best.r), byte(best.g), byte(best.b)}});
+    const std::size_t at = std::size_t(y) * width_ + x;
+    const Blend blend = findBlend(&luma_[at], width_);
+    const std::uint8_t *p = &image.pixels[4 * at], *q = p + 4 * blend.neighbour;
+    Smoothed s{std::uint32_t(at), {}};
+    for (int c = 0; c < 3; ++c) s.rgb[c] = std::uint8_t(float(p[c]) + (float(q[c]) - float(p[c])) * blend.share + 0.5f);
+    smoothed_.push_back(s);
   }
 }
 

@@ -12,7 +12,7 @@ class PostProcess {
  public:
   PostProcess(int width, int height);
   void fadeRim(Image& image) const;  // darkens towards the endoscope's rim; black outside
-  void smoothEdges(Image& image);    // FXAA (Lottes 2009, the short variant) on pixels of high local contrast
+  void smoothEdges(Image& image);    // FXAA (Lottes 2011) on pixels of high local contrast
 
  private:
   struct RimPixel {

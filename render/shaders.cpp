@@ -56,13 +56,13 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 directGloss;
 layout(location = 2) in vec4 ambientRadius;
 layout(location = 3) in vec4 halfwayBias;
-layout(location = 4) in vec2 uv;
+layout(location = 4) in vec3 uvVessels;
 uniform mat4 clipFromWorld, shadowFromWorld;
 uniform vec4 lobes, tint;
 noperspective out vec4 vDirect;
 noperspective out vec4 vAmbient;
 noperspective out vec3 vHalfway;
-noperspective out vec2 vUv;
+noperspective out vec3 vUv;
 #if SHADE == 1
 out vec4 vShadow;
 #endif
@@ -71,7 +71,7 @@ void main() {
   vDirect = directGloss;
   vAmbient = ambientRadius;
   vHalfway = halfwayBias.xyz;
-  vUv = uv;
+  vUv = uvVessels;
 #ifdef DULL
   float x = halfwayBias.z * halfwayBias.z, d1 = x * lobes.x + 1., d2 = x * lobes.z + 1.;
   vDirect.w *= lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), tint.w);
@@ -88,7 +88,7 @@ const char* const kTissueFragmentShader = R"(
 noperspective in vec4 vDirect;
 noperspective in vec4 vAmbient;
 noperspective in vec3 vHalfway;
-noperspective in vec2 vUv;
+noperspective in vec3 vUv;
 out vec4 pixel;
 uniform sampler2D detail;
 uniform vec4 surface, lobes, tint;
@@ -98,19 +98,20 @@ in vec4 vShadow;
 uniform sampler2DShadow shadowMap;
 uniform float texel;
 
-// Nine taps on two turned squares. A rotation per pixel would hide their steps better but leaves a pattern.
+// Taps on three turned squares. A rotation per pixel would hide their steps better but leaves a pattern.
 float softShadow(vec3 q, float radius) {
   float r = radius * texel;
 #define TAP(X, Y) texture(shadowMap, q + vec3(X * r, Y * r, 0))
-  float inner = TAP(-.42, -.20) + TAP(.20, -.42) + TAP(.42, .20) + TAP(-.20, .42);
-  float outer = TAP(-.35, -.88) + TAP(.88, -.35) + TAP(.35, .88) + TAP(-.88, .35);
-  return (TAP(0., 0.) + inner + outer) / 9.;
+  float inner = TAP(-.33, -.10) + TAP(.10, -.33) + TAP(.33, .10) + TAP(-.10, .33);
+  float middle = TAP(-.60, .32) + TAP(-.32, -.60) + TAP(.60, -.32) + TAP(.32, .60);
+  float outer = TAP(-.40, -.90) + TAP(.90, -.40) + TAP(.40, .90) + TAP(-.90, .40);
+  return (TAP(0., 0.) + inner + middle + outer) / 13.;
 }
 #endif
 
 void main() {
-  vec4 t = texture(detail, vUv);
-  vec3 detailColour = mix(vec3(1. + surface.x * (t.x - .5)), tint.rgb, t.y * surface.y);
+  vec4 t = texture(detail, vUv.xy);
+  vec3 detailColour = mix(vec3(1. + surface.x * (t.x - .5)), tint.rgb, t.y * surface.y * vUv.z);
 #if SHADE == 2
   vec3 colour = detailColour * vAmbient.rgb;
 #else
@@ -180,10 +181,10 @@ void main() {
   vec3 key = normalize(.45 * up - .35 * right + .8 * back);
   float wrap = max((dot(n, key) + .35) / 1.35, 0.);
   float facing = max(dot(n, v), 0.);
-  vec3 fill = mix(vec3(.20, .22, .27), vec3(.42, .42, .40), dot(n, up) * .5 + .5);
+  vec3 fill = mix(vec3(.13, .14, .17), vec3(.27, .27, .26), dot(n, up) * .5 + .5);
   float gloss = pow(max(dot(n, normalize(key + v)), 0.), 60.);
   float outline = smoothstep(0., .55, facing);
-  vec3 c = vColour.rgb * (fill + .85 * wrap * wrap) * mix(.55, 1., outline) + .22 * gloss;
+  vec3 c = vColour.rgb * (fill + .55 * wrap * wrap) * mix(.5, 1., outline) + .16 * gloss;
   pixel = vec4(toneCurve(c), mix(min(1., vColour.a * 1.8), vColour.a, outline));
 }
 )";

@@ -117,7 +117,8 @@ void gatherDirection(const SceneMesh& mesh, vec3 centre, float radius, vec3 dire
 }  // namespace
 
 void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
-  const float radius = meanRadius(mesh, part), c = std::cos(part.look->unrollTilt), s = std::sin(part.look->unrollTilt);
+  const float c = std::cos(part.look->unrollTilt), s = std::sin(part.look->unrollTilt);
+  const float radius = part.look->unrollRadius > 0 ? part.look->unrollRadius : meanRadius(mesh, part);
   const auto tilted = [c, s](vec3 v) { return vec3(v.x, c * v.y - s * v.z, s * v.y + c * v.z); };
   for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
     mesh.uv[i] = unroll(tilted(mesh.position[i]), tilted(mesh.normal[i]), radius) * part.look->detailScale;

@@ -80,12 +80,12 @@ void lightMetal(const Shading& v, LitVertex& out) {
   const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
   const vec3 mirrored = 2.f * v.normal * facing - v.toEye;
   const float above = mirrored.y * 0.5f + 0.5f;
-  const float band = 0.9f * smoothStep(0.55f, 0.95f, glm::dot(mirrored, v.toEye)) +
-                     0.5f * smoothStep(-0.75f, -0.35f, mirrored.x) * smoothStep(0.15f, -0.3f, mirrored.x);
+  const float band = 0.55f * smoothStep(0.80f, 0.99f, glm::dot(mirrored, v.toEye)) +
+                     0.45f * smoothStep(-0.75f, -0.35f, mirrored.x) * smoothStep(0.15f, -0.3f, mirrored.x);
   const vec3 cavity =
       vec3(0.05f, 0.018f, 0.014f) + vec3(0.16f, 0.085f, 0.07f) * (above * above) + vec3(0.55f, 0.53f, 0.50f) * band;
   const float edge = facing < 0 ? 0.f : fresnelEdge(v);
-  out.direct = v.albedo * (std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 0.39f * visible);
+  out.direct = v.albedo * (std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 0.16f * visible);
   out.ambient = (v.albedo * 1.1f + 0.010f + 0.06f * edge) * cavity * (v.openness * visible * std::min(v.falloff, 1.4f));
 }
 
@@ -170,6 +170,7 @@ void lightVertices(const SceneMesh& mesh, const Viewpoint& view, const Light& li
       LitVertex& o = out.vertices[i];
       o.position = mesh.position[i];
       o.uv = mesh.uv[i];
+      o.vessels = 1 - mesh.blanch[i];
       out.picture[i] = pictureFromWorld(view, mesh.position[i]);
       const Shading v = shadingOf(mesh, i, out.picture[i], s);
       if (look.metal)
