@@ -23,7 +23,8 @@ void blendFrames(const DynamicsFrame& from, const DynamicsFrame& to, double alph
     for (std::size_t i = 0; i < f.nodes.size(); ++i) o.nodes[i] = blendPoint(f.nodes[i], t.nodes[i], alpha);
     for (std::size_t i = 0; i < f.spheres.size(); ++i) {
       o.spheres[i].position = blendPoint(f.spheres[i].position, t.spheres[i].position, alpha);
-      o.spheres[i].worldFromSphere = blendOrientation(f.spheres[i].worldFromSphere, t.spheres[i].worldFromSphere, alpha);
+      o.spheres[i].worldFromSphere =
+          blendOrientation(f.spheres[i].worldFromSphere, t.spheres[i].worldFromSphere, alpha);
     }
   }
 }

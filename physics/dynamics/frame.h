@@ -26,7 +26,8 @@ struct DynamicsFrame {
 inline Eigen::Vector3d blendPoint(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double alpha) {
   return (1 - alpha) * from + alpha * to;
 }
-// Nodes linearly, orientations by normalised linear interpolation along the shorter arc. `out` is resized once and reused.
+// Nodes linearly, orientations by normalised linear interpolation along the shorter arc. `out` is resized once and
+// reused.
 void blendFrames(const DynamicsFrame& from, const DynamicsFrame& to, double alpha, DynamicsFrame& out);
 
 }  // namespace medulla

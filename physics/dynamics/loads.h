@@ -15,12 +15,12 @@ struct ToolSpring {
   int tool = 0;  // whose reaction this is
   int body = 0;
   std::array<int, 3> nodes{};
-  std::array<double, 3> weights{};            // barycentric, sum 1
-  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  // m, world, at the end of the frame
+  std::array<double, 3> weights{};                           // barycentric, sum 1
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();          // m, world, at the end of the frame
   Eigen::Vector3d anchorVelocity = Eigen::Vector3d::Zero();  // m/s; inside the frame the anchor moves with it
-  Eigen::Vector3d outward = Eigen::Vector3d::UnitZ();  // unit surface normal at the contact
-  double stiffness = 0;                       // N/m
-  double damping = 0;                         // N s/m
+  Eigen::Vector3d outward = Eigen::Vector3d::UnitZ();        // unit surface normal at the contact
+  double stiffness = 0;                                      // N/m
+  double damping = 0;                                        // N s/m
 };
 
 // A grabbed node: the same spring on one node, pulling and pushing.

@@ -14,10 +14,10 @@ namespace medulla {
 
 // What a body is made of. Stiffnesses of links and springs follow from it and from the mesh's own sections.
 struct Tissue {
-  double young = 5e3;      // Pa, > 0; more is stiffer and needs smaller substeps
-  double poisson = 0.45;   // 0 <= nu < 0.5
-  double density = 1040;   // kg/m3, > 0
-  double damping = 0.1;    // ratio to critical of the body's lowest bending mode, >= 0; 0 swings for ever
+  double young = 5e3;     // Pa, > 0; more is stiffer and needs smaller substeps
+  double poisson = 0.45;  // 0 <= nu < 0.5
+  double density = 1040;  // kg/m3, > 0
+  double damping = 0.1;   // ratio to critical of the body's lowest bending mode, >= 0; 0 swings for ever
 };
 
 // Dimensionless steering of the three ways a link deforms (paper 2.2); 1 keeps the material's value.
@@ -74,9 +74,9 @@ class World {
 
   const std::vector<BodyDescription>& bodies() const;
   int substepsPerFrame() const;
-  double substep() const;      // s
+  double substep() const;        // s
   double stableSubstep() const;  // s, the estimate of the largest stable step
-  double time() const;         // s
+  double time() const;           // s
 
   // One dynamics frame: substeps under gravity and `loads`. Throws std::runtime_error naming body, time and cause when
   // the state stops being finite.

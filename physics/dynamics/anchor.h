@@ -1,0 +1,70 @@
+#pragma once
+
+#include "physics/dynamics/angles.h"
+#include "physics/dynamics/world_data.h"
+
+// Where the skeleton carries a surface node (paper 2.3), four nodes of one host at a time, and how fast.
+namespace medulla {
+
+struct Anchor {
+  Lanes3 offset, position, velocity;  // m from the host's centre line or centre, m, m/s
+};
+
+// One link's frame, the same in all lanes.
+struct LinkHost {
+  Lanes3 origin, line, originVelocity, lineVelocity, n, axisU, axisV, turning;
+  Lanes spin0, spinAlong, twist;
+};
+
+inline LinkHost linkHost(const WorldData& d, int link) {
+  const LinkFrame& f = d.links.frames[link / 4];
+  const int lane = link % 4;
+  LinkHost h;
+  h.origin = splatLane(f.origin, lane);
+  h.line = splatLane(f.line, lane);
+  h.originVelocity = splatLane(f.originVelocity, lane);
+  h.lineVelocity = splatLane(f.lineVelocity, lane);
+  h.n = splatLane(f.n, lane);
+  h.axisU = splatLane(f.axisU, lane);
+  h.axisV = splatLane(f.axisV, lane);
+  h.turning = splatLane(f.turning, lane);
+  h.spin0 = splat(f.spin0[lane]);
+  h.spinAlong = splat(f.spinAlong[lane]);
+  h.twist = splat(f.twist[lane]);
+  return h;
+}
+
+// The point at `along` of the centre line, slid with its stretch, plus the offset in the frame of sphere 0 carried onto
+// the line and twisted by along * twist: the torsion is shared along the link.
+inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
+  Lanes c, s;
+  cosineSine(g.along * h.twist, c, s);
+  Anchor a;
+  a.offset =
+      fma(fnma(g.restOffset.z, s, g.restOffset.y * c), h.axisU, fma(g.restOffset.y, s, g.restOffset.z * c) * h.axisV);
+  a.position = fma(g.along, h.line, h.origin) + a.offset;
+  const Lanes3 omega = fma(fma(g.along, h.spinAlong, h.spin0), h.n, h.turning);
+  a.velocity = fma(g.along, h.lineVelocity, h.originVelocity) + cross(omega, a.offset);
+  return a;
+}
+
+struct SphereHost {
+  Lanes3 position, velocity, angularVelocity;
+  Rotation rotation;
+};
+
+inline SphereHost sphereHost(const WorldData& d, int i) {
+  const Spheres& s = d.spheres;
+  return {splat(s.position[i]), splat(s.velocity[i]), splat(s.angularVelocity[i]),
+          rotationOf(splat(s.orientation[i]), splat(s.orientation[i].v[3]))};
+}
+
+inline Anchor anchorOnSphere(const SphereHost& h, const NodeGroup& g) {
+  Anchor a;
+  a.offset = rotate(h.rotation, g.restOffset);
+  a.position = h.position + a.offset;
+  a.velocity = h.velocity + cross(h.angularVelocity, a.offset);
+  return a;
+}
+
+}  // namespace medulla

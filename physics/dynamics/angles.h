@@ -1,0 +1,93 @@
+#pragma once
+
+#include "physics/dynamics/simd.h"
+
+// Angles from sines and cosines and back, by polynomials: accurate to 1e-15, the same on every machine.
+namespace medulla {
+
+// r(x) with asin(sqrt(x)) = sqrt(x) (1 + x r(x)) on 0 <= x <= 1/4. Interpolated at Chebyshev nodes from asin's power
+// series in exact arithmetic; error of asin 7e-17.
+inline Lanes arcSineRemainder(Lanes x) {
+  Lanes r = splat(0.028540834429984487);
+  for (double c : {-0.011237244215539824, 0.016311748922541877, 0.007714874347447517, 0.011892875834833392,
+                   0.013927457312716163, 0.017355437344723182, 0.022372038738232097, 0.030381947625840226,
+                   0.04464285709958662, 0.07500000000022967, 0.16666666666666646})
+    r = fma(r, x, splat(c));
+  return r;
+}
+
+struct AngleOverSine {
+  Lanes value;  // f = theta / sin(theta)
+  Lanes slope;  // h = -df/dcos(theta) = (1 - f cos(theta)) / sin(theta)^2
+};
+
+// Beyond 170 degrees the sine is floored: f grows without bound towards 180 and no explicit step would survive it.
+// There alone the measure is no longer exact.
+constexpr double kSmallestSine = 0.17;
+
+// From cos(theta), theta in 0..180 degrees. With x = sin^2(theta/2), w = cos(theta/2): f = asin(sqrt x) / (sqrt x w),
+// and h without cancellation where theta is small: (2 - 1/(1+w) - r (1-2x)) / (4 w^3). Lanes do not influence each
+// other.
+inline AngleOverSine angleOverSine(Lanes cosine) {
+  const Lanes zero = splat(0), one = splat(1), half = splat(0.5), quarter = splat(0.25), two = splat(2);
+  const Lanes x = larger(half * (one - cosine), zero);
+  const Lanes w = squareRoot(larger(one - x, zero));
+  const Lanes isLarge = isLess(quarter, x);  // beyond 60 degrees
+  const bool anyLarge = any(isLarge);
+  const Lanes xSmall = anyLarge ? select(isLarge, quarter, x) : x;
+  const Lanes wSmall = anyLarge ? select(isLarge, one, w) : w;
+  const Lanes r = arcSineRemainder(xSmall);
+  const Lanes inverse = one / wSmall;
+  AngleOverSine out;
+  out.value = fma(xSmall, r, one) * inverse;
+  out.slope = (two - one / (one + wSmall) - r * fnma(two, xSmall, one)) * (quarter * inverse * inverse * inverse);
+  if (!anyLarge) return out;
+  // asin(sqrt x) = pi/2 - 2 asin(sqrt y), y = (1 - sqrt x) / 2
+  const Lanes root = squareRoot(x);
+  const Lanes y = larger(select(isLarge, half * (one - root), zero), zero);
+  const Lanes arc = fnma(two * squareRoot(y), fma(y, arcSineRemainder(y), one), splat(1.57079632679489661923));
+  const Lanes sine = larger(two * root * w, splat(kSmallestSine));
+  const Lanes value = two * arc / sine;
+  out.value = select(isLarge, value, out.value);
+  out.slope = select(isLarge, fnma(value, cosine, one) / (sine * sine), out.slope);
+  return out;
+}
+
+// The angle of the unit vector (cosine, sine), -180..180 degrees.
+inline Lanes angleOf(Lanes cosine, Lanes sine) {
+  const Lanes zero = splat(0), one = splat(1), half = splat(0.5), quarter = splat(0.25), two = splat(2);
+  const Lanes x = larger(half * (one - magnitude(cosine)), zero);  // up to 90 degrees, then mirrored
+  const Lanes isLarge = isLess(quarter, x);
+  const Lanes xSmall = select(isLarge, zero, x);
+  Lanes angle = magnitude(sine) * fma(xSmall, arcSineRemainder(xSmall), one) / squareRoot(one - xSmall);
+  if (any(isLarge)) {
+    const Lanes y = select(isLarge, half * (one - squareRoot(x)), zero);
+    const Lanes arc = fnma(two * squareRoot(y), fma(y, arcSineRemainder(y), one), splat(1.57079632679489661923));
+    angle = select(isLarge, two * arc, angle);
+  }
+  angle = select(isLess(cosine, zero), splat(3.14159265358979323846) - angle, angle);
+  return withSignOf(angle, sine);
+}
+
+constexpr double kTurn = 6.28318530717958647693;
+
+// Cosine and sine of any angle: reduced to half a turn either side, the power series on a quarter of it, doubled twice.
+inline void cosineSine(Lanes angle, Lanes& cosine, Lanes& sine) {
+  const Lanes one = splat(1), two = splat(2);
+  const Lanes q = splat(0.25) * fnma(nearest(angle * splat(1 / kTurn)), splat(kTurn), angle);
+  const Lanes q2 = q * q;
+  Lanes s = splat(-1.0 / 1307674368000.0);
+  for (double c : {1.0 / 6227020800.0, -1.0 / 39916800.0, 1.0 / 362880.0, -1.0 / 5040.0, 1.0 / 120.0, -1.0 / 6.0})
+    s = fma(s, q2, splat(c));
+  s = fma(s * q2, q, q);
+  Lanes versine = splat(1.0 / 20922789888000.0);  // 1 - cos: keeps the doubling from losing small angles
+  for (double c :
+       {-1.0 / 87178291200.0, 1.0 / 479001600.0, -1.0 / 3628800.0, 1.0 / 40320.0, -1.0 / 720.0, 1.0 / 24.0, -0.5})
+    versine = fma(versine, q2, splat(c));
+  const Lanes c1 = fma(versine, q2, one);
+  const Lanes s2 = two * s * c1, c2 = fnma(two * s, s, one);
+  sine = two * s2 * c2;
+  cosine = fnma(two * s2, s2, one);
+}
+
+}  // namespace medulla

@@ -1,0 +1,243 @@
+#include "physics/dynamics/layout.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "physics/dynamics/stages.h"
+
+namespace medulla {
+
+namespace {
+
+using Eigen::Vector3d;
+
+// Forces of a link divide by no less than this share of its rest length: two spheres pushed into one point stay finite.
+constexpr double kSmallestLength = 0.05;
+
+void setLane(Lanes3& to, int lane, const Vector3d& a) {
+  to.x[lane] = a.x();
+  to.y[lane] = a.y();
+  to.z[lane] = a.z();
+}
+
+void addSpheres(WorldData& d, const BodyDescription& body, const BodyMechanics& mechanics) {
+  Spheres& s = d.spheres;
+  const Eigen::Quaterniond q = Eigen::Quaterniond(body.worldFromModel.rotation()).normalized();
+  for (std::size_t i = 0; i < body.model->spheres.size(); ++i) {
+    const int k = s.count++;
+    if (k % 4 == 0) {
+      SphereGroup empty{};
+      s.groups.push_back(empty);
+      for (std::vector<Quad>* a :
+           {&s.position, &s.velocity, &s.angularMomentum, &s.angularVelocity, &s.force, &s.torque})
+        a->resize(k + 4);
+      s.orientation.resize(k + 4, Quad{{0, 0, 0, 1}});
+    }
+    s.position[k] = quadOf(body.worldFromModel * body.model->spheres[i].restFrame);
+    s.orientation[k] = {{q.x(), q.y(), q.z(), q.w()}};
+    SphereGroup& g = s.groups[k / 4];
+    const int l = k % 4;
+    g.mass[l] = mechanics.sphereMass[i];
+    g.inverseMass[l] = mechanics.moves[i] ? 1 / mechanics.sphereMass[i] : 0;
+    g.freeToTurn[l] = mechanics.turns[i] ? 1 : 0;
+    const Eigen::Matrix3d inverse = mechanics.sphereInertia[i].inverse();
+    const double entries[6] = {inverse(0, 0), inverse(1, 1), inverse(2, 2),
+                               inverse(0, 1), inverse(0, 2), inverse(1, 2)};
+    for (int e = 0; e < 6; ++e) g.inverseInertia[e][l] = entries[e];
+  }
+}
+
+void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& mechanics, int firstSphere) {
+  const SoftBodyModel& m = *body.model;
+  for (std::size_t i = 0; i < m.links.size(); ++i) {
+    const int k = d.links.count++, lane = k % 4;
+    if (lane == 0) d.links.groups.emplace_back();
+    LinkGroup& g = d.links.groups.back();
+    const ElasticLink& link = m.links[i];
+    const Vector3d line = m.spheres[link.sphere1].restFrame - m.spheres[link.sphere0].restFrame;
+    const double length = line.norm();
+    const Vector3d t = line / length, u = (link.restU - t * t.dot(link.restU)).normalized();
+    // The rest of the group becomes copies, overwritten by the links that follow.
+    for (int l = lane; l < 4; ++l) {
+      g.sphere0[l] = static_cast<std::uint32_t>(firstSphere + link.sphere0);
+      g.sphere1[l] = static_cast<std::uint32_t>(firstSphere + link.sphere1);
+      setLane(g.restT, l, t);
+      setLane(g.restU, l, u);
+      g.restLength[l] = length;
+      g.smallestLength[l] = kSmallestLength * length;
+      g.elongation[l] = mechanics.links[i].elongation;
+      g.flexionU[l] = mechanics.links[i].flexionU;
+      g.flexionV[l] = mechanics.links[i].flexionV;
+      g.torsion[l] = mechanics.links[i].torsion;
+      g.relaxation[l] = mechanics.linkRelaxation;
+    }
+  }
+}
+
+struct NodeOrder {  // one entry per padded place: which node of which body, -1 on pads
+  std::vector<int> body, node;
+};
+
+// Appends the nodes of `b` that hang on links (or spheres) in the order of their hosts, each host's range padded to
+// four.
+void appendNodes(NodeOrder& order, Nodes& nodes, const BodyMechanics& mechanics, int b, bool onLink, int firstHost,
+                 std::vector<HostRange>& ranges) {
+  std::vector<int> sorted;
+  for (std::size_t i = 0; i < mechanics.attachments.size(); ++i)
+    if (mechanics.attachments[i].onLink == onLink) sorted.push_back(static_cast<int>(i));
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [&](int i, int j) { return mechanics.attachments[i].host < mechanics.attachments[j].host; });
+  for (std::size_t k = 0; k < sorted.size();) {
+    const int host = mechanics.attachments[sorted[k]].host;
+    HostRange range{firstHost + host, static_cast<int>(order.node.size()) / 4, 0};
+    for (; k < sorted.size() && mechanics.attachments[sorted[k]].host == host; ++k) {
+      order.body.push_back(b);
+      order.node.push_back(sorted[k]);
+    }
+    while (order.node.size() % 4 != 0) {
+      order.body.push_back(b);
+      order.node.push_back(-1);
+    }
+    range.endGroup = static_cast<int>(order.node.size()) / 4;
+    nodes.groupHosts.resize(range.endGroup, {range.host, onLink});
+    ranges.push_back(range);
+  }
+}
+
+NodeOrder orderNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
+  NodeOrder order;
+  const auto append = [&](SurfaceMode mode, bool onLink, std::vector<HostRange>& ranges) {
+    for (std::size_t b = 0; b < d.bodies.size(); ++b) {
+      if (d.bodies[b].surface != mode) continue;
+      const BodyRange& r = d.ranges[b];
+      appendNodes(order, d.nodes, mechanics[b], static_cast<int>(b), onLink, onLink ? r.firstLink : r.firstSphere,
+                  ranges);
+    }
+  };
+  append(SurfaceMode::full, true, d.nodes.onLinks);
+  append(SurfaceMode::full, false, d.nodes.onSpheres);
+  d.nodes.dynamicEnd = static_cast<int>(order.node.size());
+  append(SurfaceMode::skin, true, d.nodes.skinOnLinks);
+  append(SurfaceMode::skin, false, d.nodes.skinOnSpheres);
+  return order;
+}
+
+void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
+  const NodeOrder order = orderNodes(d, mechanics);
+  Nodes& n = d.nodes;
+  n.count = static_cast<int>(order.node.size());
+  n.position.resize(n.count);
+  n.velocity.resize(n.count);
+  n.force.resize(n.count);
+  n.mass.resize(n.count, 0);
+  n.inverseMass.resize(n.count, 0);
+  n.groups.resize(n.count / 4, NodeGroup{});
+  for (int i = 0; i < n.count; ++i) {
+    if (order.node[i] < 0) continue;
+    const int b = order.body[i], k = order.node[i], lane = i % 4;
+    const BodyDescription& body = d.bodies[b];
+    const Attachment& a = mechanics[b].attachments[k];
+    d.ranges[b].node[k] = i;
+    n.position[i] = quadOf(body.worldFromModel * body.model->restNodes[k]);
+    n.mass[i] = mechanics[b].nodeMass[k];
+    n.inverseMass[i] = n.mass[i] > 0 ? 1 / n.mass[i] : 0;
+    NodeGroup& g = n.groups[i / 4];
+    g.stiffness[lane] = mechanics[b].attachmentStiffness[k];
+    g.damping[lane] = mechanics[b].surfaceRelaxation * mechanics[b].attachmentStiffness[k];
+    if (!a.onLink) {
+      setLane(g.restOffset, lane, a.restOffset);
+      continue;
+    }
+    const int link = d.ranges[b].firstLink + a.host, l = link % 4;
+    const Vector3d t = vectorOf(d.links.groups[link / 4].restT, l), u = vectorOf(d.links.groups[link / 4].restU, l);
+    g.along[lane] = a.along;
+    setLane(g.restOffset, lane, {0, a.restOffset.dot(u), a.restOffset.dot(t.cross(u))});
+  }
+}
+
+void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
+  Springs& s = d.springs;
+  std::vector<std::vector<SpringEnd>> ends(d.nodes.dynamicEnd);
+  for (std::size_t b = 0; b < d.bodies.size(); ++b) {
+    const SoftBodyModel& m = *d.bodies[b].model;
+    if (d.bodies[b].surface != SurfaceMode::full) continue;
+    for (std::size_t e = 0; e < m.edges.size(); ++e) {
+      const int k = s.count++, lane = k % 4;
+      if (lane == 0) s.groups.emplace_back();
+      SpringGroup& g = s.groups.back();
+      const int n0 = d.ranges[b].node[m.edges[e][0]], n1 = d.ranges[b].node[m.edges[e][1]];
+      const auto offset0 = static_cast<std::uint32_t>(n0 * sizeof(Quad)),
+                 offset1 = static_cast<std::uint32_t>(n1 * sizeof(Quad));
+      for (int l = lane; l < 4; ++l) {
+        g.node0[l] = offset0;
+        g.node1[l] = offset1;
+        g.restLength[l] = (m.restNodes[m.edges[e][1]] - m.restNodes[m.edges[e][0]]).norm();
+        g.stiffness[l] = mechanics[b].edgeStiffness[e];
+        g.damping[l] = mechanics[b].surfaceRelaxation * mechanics[b].edgeStiffness[e];
+      }
+      ends[n0].push_back({offset1, static_cast<std::uint32_t>(k)});
+      ends[n1].push_back({offset0, static_cast<std::uint32_t>(k)});
+    }
+  }
+  s.tensionOverLength.resize(4 * s.groups.size());
+  s.firstEnd.push_back(0);
+  for (const std::vector<SpringEnd>& of : ends) {
+    s.ends.insert(s.ends.end(), of.begin(), of.end());
+    s.firstEnd.push_back(static_cast<std::uint32_t>(s.ends.size()));
+  }
+}
+
+void listSlots(WorldData& d) {
+  std::vector<std::vector<int>> slots(d.spheres.count);
+  for (int k = 0; k < d.links.count; ++k) {
+    slots[d.links.groups[k / 4].sphere0[k % 4]].push_back(2 * k);
+    slots[d.links.groups[k / 4].sphere1[k % 4]].push_back(2 * k + 1);
+  }
+  d.spheres.firstSlot.push_back(0);
+  for (const std::vector<int>& of : slots) {
+    d.spheres.slot.insert(d.spheres.slot.end(), of.begin(), of.end());
+    d.spheres.firstSlot.push_back(static_cast<int>(d.spheres.slot.size()));
+  }
+}
+
+double enclosedVolume(const SoftBodyModel& m) {
+  double sum = 0;
+  for (const auto& t : m.triangles) sum += m.restNodes[t[0]].dot(m.restNodes[t[1]].cross(m.restNodes[t[2]])) / 6;
+  return sum;
+}
+
+}  // namespace
+
+std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<BodyDescription> bodies,
+                                  const std::vector<BodyMechanics>& mechanics) {
+  auto out = std::make_unique<WorldData>();
+  WorldData& d = *out;
+  d.settings = settings;
+  d.gravity = quadOf(settings.gravity);
+  d.bodies = std::move(bodies);
+  for (std::size_t b = 0; b < d.bodies.size(); ++b) {
+    const SoftBodyModel& m = *d.bodies[b].model;
+    BodyRange r;
+    r.firstSphere = d.spheres.count;
+    r.sphereCount = static_cast<int>(m.spheres.size());
+    r.firstLink = d.links.count;
+    r.linkCount = static_cast<int>(m.links.size());
+    r.node.resize(m.restNodes.size());
+    r.restVolume = enclosedVolume(m);
+    d.ranges.push_back(r);
+    addSpheres(d, d.bodies[b], mechanics[b]);
+    addLinks(d, d.bodies[b], mechanics[b], r.firstSphere);
+  }
+  d.links.frames.resize(d.links.groups.size());
+  d.links.unwoundTwist.resize(d.links.groups.size());
+  d.links.slots.resize(8 * d.links.groups.size());
+  addNodes(d, mechanics);
+  addSprings(d, mechanics);
+  listSlots(d);
+  refreshAngularVelocities(d);
+  evaluateLinks(d);
+  placeSkin(d);
+  return out;
+}
+
+}  // namespace medulla

@@ -1,0 +1,295 @@
+#include "physics/dynamics/rest_modes.h"
+
+#include <Eigen/Dense>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace medulla {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+// Freedoms: 6 per sphere (velocity, angular velocity), then 3 per node. One link measure's rate at rest:
+// line . (v1 - v0) + turn0 . w0 + turn1 . w1.
+struct MeasureRow {
+  int sphere0, sphere1;
+  Vector3d line, turn0, turn1;
+  double stiffness;
+};
+
+std::vector<MeasureRow> measureRows(const SoftBodyModel& m, const BodyMechanics& b) {
+  std::vector<MeasureRow> rows;
+  const Vector3d none = Vector3d::Zero();
+  for (std::size_t k = 0; k < m.links.size(); ++k) {
+    const ElasticLink& l = m.links[k];
+    const Vector3d d = m.spheres[l.sphere1].restFrame - m.spheres[l.sphere0].restFrame;
+    const double length = d.norm();
+    const Vector3d t = d / length, u = (l.restU - t * t.dot(l.restU)).normalized(), v = t.cross(u);
+    const LinkStiffness& s = b.links[k];
+    const auto add = [&](const Vector3d& line, const Vector3d& turn0, const Vector3d& turn1, double stiffness) {
+      rows.push_back({l.sphere0, l.sphere1, line, turn0, turn1, stiffness});
+    };
+    add(t, none, none, s.elongation);
+    add(u / length, -v, none, s.flexionV);
+    add(u / length, none, -v, s.flexionV);
+    add(v / length, u, none, s.flexionU);
+    add(v / length, none, u, s.flexionU);
+    add(none, -t, t, s.torsion);
+  }
+  return rows;
+}
+
+class RestModel {
+ public:
+  RestModel(const BodyDescription& body, const BodyMechanics& mechanics)
+      : model_(*body.model),
+        mechanics_(mechanics),
+        rows_(measureRows(*body.model, mechanics)),
+        spheres_(static_cast<int>(mechanics.sphereMass.size())),
+        nodes_(body.surface == SurfaceMode::full ? static_cast<int>(mechanics.attachments.size()) : 0) {
+    for (const Matrix3d& i : mechanics.sphereInertia) inverseInertia_.push_back(i.inverse());
+  }
+
+  int size() const { return 6 * spheres_ + 3 * nodes_; }
+
+  // y = (links * K_links + surface * K_surface) x
+  VectorXd stiffnessTimes(const VectorXd& x, double links, double surface) const {
+    VectorXd y = VectorXd::Zero(size());
+    for (const MeasureRow& r : rows_) {
+      const int i0 = 6 * r.sphere0, i1 = 6 * r.sphere1;
+      const double rate = r.line.dot(x.segment<3>(i1) - x.segment<3>(i0)) + r.turn0.dot(x.segment<3>(i0 + 3)) +
+                          r.turn1.dot(x.segment<3>(i1 + 3));
+      const double f = links * r.stiffness * rate;
+      y.segment<3>(i1) += f * r.line;
+      y.segment<3>(i0) -= f * r.line;
+      y.segment<3>(i0 + 3) += f * r.turn0;
+      y.segment<3>(i1 + 3) += f * r.turn1;
+    }
+    if (nodes_ == 0) return y;
+    for (int i = 0; i < nodes_; ++i) addAttachment(i, x, y, surface);
+    for (std::size_t e = 0; e < model_.edges.size(); ++e) {
+      const int a = node(model_.edges[e][0]), b = node(model_.edges[e][1]);
+      const Vector3d d = (model_.restNodes[model_.edges[e][1]] - model_.restNodes[model_.edges[e][0]]).normalized();
+      const Vector3d f = surface * mechanics_.edgeStiffness[e] * d.dot(x.segment<3>(b) - x.segment<3>(a)) * d;
+      y.segment<3>(b) += f;
+      y.segment<3>(a) -= f;
+    }
+    return y;
+  }
+
+  // The largest eigenvalue of M^-1 K by power iteration from a fixed start; it is approached from below, within about 2
+  // %.
+  double largestEigenvalue(double links, double surface) const {
+    constexpr int kIterations = 150;
+    VectorXd x(size());
+    for (int i = 0; i < size(); ++i) x[i] = startValue(i);
+    x = divideByMass(x);
+    double eigenvalue = 0;
+    for (int k = 0; k < kIterations; ++k) {
+      const double norm = std::sqrt(x.dot(timesMass(x)));
+      if (!(norm > 0)) return 0;
+      x /= norm;
+      const VectorXd force = stiffnessTimes(x, links, surface);
+      eigenvalue = x.dot(force);
+      x = divideByMass(force);
+    }
+    return eigenvalue;
+  }
+
+  // A repeatable, structureless start vector: the fractional parts of multiples of the golden ratio.
+  static double startValue(int i) {
+    const double a = 0.6180339887498949 * (i + 1);
+    return a - std::floor(a) - 0.5;
+  }
+
+ private:
+  int node(int i) const { return 6 * spheres_ + 3 * i; }
+
+  void addAttachment(int i, const VectorXd& x, VectorXd& y, double scale) const {
+    const Attachment& a = mechanics_.attachments[i];
+    const double k = scale * mechanics_.attachmentStiffness[i];
+    const Vector3d& r = a.restOffset;
+    if (!a.onLink) {
+      const int s = 6 * a.host;
+      const Vector3d f = k * (x.segment<3>(s) + x.segment<3>(s + 3).cross(r) - x.segment<3>(node(i)));
+      y.segment<3>(s) += f;
+      y.segment<3>(s + 3) += r.cross(f);
+      y.segment<3>(node(i)) -= f;
+      return;
+    }
+    const ElasticLink& l = model_.links[a.host];
+    const int s0 = 6 * l.sphere0, s1 = 6 * l.sphere1;
+    const Vector3d d = model_.spheres[l.sphere1].restFrame - model_.spheres[l.sphere0].restFrame;
+    const double length = d.norm();
+    const Vector3d n = d / length, dv = x.segment<3>(s1) - x.segment<3>(s0);
+    const double spin = n.dot((1 - a.along) * x.segment<3>(s0 + 3) + a.along * x.segment<3>(s1 + 3));
+    const Vector3d omega = n.cross(dv) / length + spin * n;
+    const Vector3d f = k * (x.segment<3>(s0) + a.along * dv + omega.cross(r) - x.segment<3>(node(i)));
+    const Vector3d moment = r.cross(f), swing = moment.cross(n) / length;
+    y.segment<3>(s0) += (1 - a.along) * f - swing;
+    y.segment<3>(s1) += a.along * f + swing;
+    y.segment<3>(s0 + 3) += (1 - a.along) * n.dot(moment) * n;
+    y.segment<3>(s1 + 3) += a.along * n.dot(moment) * n;
+    y.segment<3>(node(i)) -= f;
+  }
+
+  VectorXd timesMass(const VectorXd& x) const {
+    VectorXd y = x;
+    for (int i = 0; i < spheres_; ++i) {
+      y.segment<3>(6 * i) *= mechanics_.sphereMass[i];
+      y.segment<3>(6 * i + 3) = mechanics_.sphereInertia[i] * x.segment<3>(6 * i + 3);
+    }
+    for (int i = 0; i < nodes_; ++i) y.segment<3>(node(i)) *= mechanics_.nodeMass[i];
+    return y;
+  }
+
+  // Fixed freedoms have no inverse mass.
+  VectorXd divideByMass(const VectorXd& x) const {
+    VectorXd y = x;
+    for (int i = 0; i < spheres_; ++i) {
+      y.segment<3>(6 * i) *= mechanics_.moves[i] ? 1 / mechanics_.sphereMass[i] : 0;
+      y.segment<3>(6 * i + 3) = (mechanics_.turns[i] ? 1.0 : 0.0) * (inverseInertia_[i] * x.segment<3>(6 * i + 3));
+    }
+    for (int i = 0; i < nodes_; ++i) y.segment<3>(node(i)) /= mechanics_.nodeMass[i];
+    return y;
+  }
+
+  const SoftBodyModel& model_;
+  const BodyMechanics& mechanics_;
+  std::vector<MeasureRow> rows_;
+  std::vector<Matrix3d> inverseInertia_;
+  int spheres_, nodes_;
+};
+
+// Whole cells: what a sphere and its share of the surface weigh together.
+struct CellMasses {
+  std::vector<double> mass;
+  std::vector<Matrix3d> inertia;
+};
+
+CellMasses cellMasses(const BodyDescription& body) {
+  CellMasses out;
+  for (const FillingSphere& s : body.model->spheres) {
+    out.mass.push_back(body.tissue.density * s.volume);
+    out.inertia.push_back(body.tissue.density * (s.secondMoment.trace() * Matrix3d::Identity() - s.secondMoment));
+  }
+  return out;
+}
+
+// The rigid motions that the fixed freedoms allow, one per column, over the free freedoms.
+MatrixXd freeRigidMotions(const SoftBodyModel& m, const std::vector<int>& freedom, int freeCount) {
+  MatrixXd all = MatrixXd::Zero(6 * static_cast<int>(m.spheres.size()), 6);
+  const Vector3d centre = m.spheres[0].restFrame;
+  for (std::size_t i = 0; i < m.spheres.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      all(6 * i + k, k) = 1;
+      all.block<3, 1>(6 * i, 3 + k) = Vector3d::Unit(k).cross(m.spheres[i].restFrame - centre);
+      all(6 * i + 3 + k, 3 + k) = 1;
+    }
+  }
+  MatrixXd fixed(all.rows() - freeCount, 6), free(freeCount, 6);
+  for (int i = 0, f = 0; i < all.rows(); ++i) {
+    if (freedom[i] >= 0) free.row(freedom[i]) = all.row(i);
+    if (freedom[i] < 0) fixed.row(f++) = all.row(i);
+  }
+  if (fixed.rows() == 0) return free;
+  const double size = std::max(1e-12, all.leftCols(6).cwiseAbs().maxCoeff());
+  const Eigen::JacobiSVD<MatrixXd> svd(fixed.transpose() * fixed, Eigen::ComputeFullV);
+  MatrixXd out(freeCount, 0);
+  for (int k = 0; k < 6; ++k) {
+    if (svd.singularValues()[k] > 1e-12 * size * size) continue;
+    out.conservativeResize(Eigen::NoChange, out.cols() + 1);
+    out.rightCols(1) = free * svd.matrixV().col(k);
+  }
+  return out;
+}
+
+}  // namespace
+
+double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics) {
+  const SoftBodyModel& m = *body.model;
+  const int spheres = static_cast<int>(m.spheres.size());
+  std::vector<int> freedom(6 * spheres, -1);
+  int count = 0;
+  for (int i = 0; i < spheres; ++i)
+    for (int k = 0; k < 6; ++k)
+      if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) freedom[6 * i + k] = count++;
+  if (count == 0 || m.links.empty()) return 0;
+
+  const CellMasses cells = cellMasses(body);
+  using Triplet = Eigen::Triplet<double>;
+  std::vector<Triplet> stiffness, mass;
+  const auto put = [&](std::vector<Triplet>& to, int i, int j, double value) {
+    if (freedom[i] >= 0 && freedom[j] >= 0) to.emplace_back(freedom[i], freedom[j], value);
+  };
+  for (const MeasureRow& r : measureRows(m, mechanics)) {
+    std::array<int, 12> index;
+    Eigen::Matrix<double, 12, 1> row;
+    row << -r.line, r.turn0, r.line, r.turn1;
+    for (int k = 0; k < 12; ++k) index[k] = k < 6 ? 6 * r.sphere0 + k : 6 * r.sphere1 + k - 6;
+    for (int i = 0; i < 12; ++i)
+      for (int j = 0; j < 12; ++j) put(stiffness, index[i], index[j], r.stiffness * row[i] * row[j]);
+  }
+  for (int i = 0; i < spheres; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      put(mass, 6 * i + k, 6 * i + k, cells.mass[i]);
+      for (int l = 0; l < 3; ++l) put(mass, 6 * i + 3 + k, 6 * i + 3 + l, cells.inertia[i](k, l));
+    }
+  }
+  Eigen::SparseMatrix<double> k(count, count), mm(count, count);
+  k.setFromTriplets(stiffness.begin(), stiffness.end());
+  mm.setFromTriplets(mass.begin(), mass.end());
+
+  // Inverse iteration, rigid motions projected out; a shift far below any mode keeps the factorisation regular.
+  MatrixXd rigid = freeRigidMotions(m, freedom, count);
+  for (int i = 0; i < rigid.cols(); ++i) {
+    for (int j = 0; j < i; ++j) rigid.col(i) -= rigid.col(j).dot(mm * rigid.col(i)) * rigid.col(j);
+    rigid.col(i) /= std::sqrt(rigid.col(i).dot(mm * rigid.col(i)));
+  }
+  if (rigid.cols() >= count) return 0;
+  VectorXd ratio = k.diagonal().cwiseQuotient(mm.diagonal());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(k + 1e-12 * ratio.maxCoeff() * mm);
+  VectorXd x(count);
+  for (int i = 0; i < count; ++i) x[i] = RestModel::startValue(i);
+  constexpr int kIterations = 40;
+  for (int i = 0; i < kIterations; ++i) {
+    for (int j = 0; j < rigid.cols(); ++j) x -= rigid.col(j).dot(mm * x) * rigid.col(j);
+    x /= std::sqrt(x.dot(mm * x));
+    if (i + 1 < kIterations) x = factor.solve(mm * x);
+  }
+  return std::sqrt(std::max(0.0, x.dot(k * x)));
+}
+
+double dampBody(const BodyDescription& body, BodyMechanics& mechanics) {
+  // Damping at the old velocity costs step: h^2 K + 2 h C <= 4 (largest eigenvalues over mass).
+  const auto stableStep = [](double stiffness, double damping) {
+    if (!(stiffness > 0)) return std::numeric_limits<double>::infinity();
+    return (std::sqrt(damping * damping + 4 * stiffness) - damping) / stiffness;
+  };
+  // The surface's own modes are fast and die within a few substeps even below their critical damping; giving them the
+  // body's beta would only cost step. Half critical at the fastest of them costs a third.
+  constexpr double kLargestSurfaceRatio = 0.5;
+  // The links get the beta that damps the lowest mode as asked, unless the step would shrink by more than this.
+  constexpr double kLargestCost = 8;
+
+  const RestModel rest(body, mechanics);
+  const double all = rest.largestEigenvalue(1, 1), links = rest.largestEigenvalue(1, 0),
+               surface = rest.largestEigenvalue(0, 1);
+  double lowest = lowestFrequency(body, mechanics);
+  if (!(lowest > 0)) lowest = std::sqrt(std::max(links, surface));
+  const double asked = lowest > 0 ? 2 * body.tissue.damping / lowest : 0;
+  mechanics.surfaceRelaxation = surface > 0 ? std::min(asked, 2 * kLargestSurfaceRatio / std::sqrt(surface)) : 0;
+  const double shortest = stableStep(all, 0) / kLargestCost;
+  const double largestDamping = (4 / shortest - shortest * all) / 2;
+  const double bound = links > 0 ? (largestDamping - mechanics.surfaceRelaxation * surface) / links : asked;
+  mechanics.linkRelaxation = std::min(asked, std::max(0.0, bound));
+  const double damping = rest.largestEigenvalue(mechanics.linkRelaxation, mechanics.surfaceRelaxation);
+  return stableStep(all, damping);
+}
+
+}  // namespace medulla

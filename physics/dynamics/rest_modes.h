@@ -1,0 +1,17 @@
+#pragma once
+
+#include "physics/dynamics/body_mechanics.h"
+
+// A body linearised at rest: how slowly its links swing and how fast its stiffest parts do. The first sets the damping,
+// the second the step.
+namespace medulla {
+
+// Sets both relaxations of `mechanics` from the tissue's damping ratio and returns the largest stable substep (s) of
+// the body under semi-implicit Euler with damping taken at the old velocity.
+double dampBody(const BodyDescription& body, BodyMechanics& mechanics);
+
+// rad/s: the lowest mode of spheres and links that deforms the body, the surface's mass riding along; 0 where none
+// exists (a single sphere, everything fixed).
+double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics);
+
+}  // namespace medulla

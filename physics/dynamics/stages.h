@@ -1,0 +1,42 @@
+#pragma once
+
+#include "physics/dynamics/world_data.h"
+
+// The stages of a substep, in their order, each one loop over arrays. Forces are evaluated at the state at the
+// substep's beginning; velocities follow, then loads from tools, then positions (semi-implicit Euler).
+namespace medulla {
+
+void evaluateLinks(WorldData&);           // link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
+void evaluateSpringTensions(WorldData&);  // surface.cpp: edge springs, one number each
+void sumNodeForces(WorldData&);           // weight and edge springs of every node
+void evaluateAttachments(WorldData&);     // pulls between nodes and hosts; sums of them per host
+void returnLinkForces(WorldData&);        // link_force.cpp: links and what hangs on them, to their two spheres
+void sumSphereForces(WorldData&);         // spheres.cpp
+void stepVelocities(WorldData&);          // spheres and nodes
+// loads.cpp: tool springs and held nodes, implicitly against the velocities of this substep, so that their stiffness
+// does not bound the step. `remaining` is the time (s) from the substep's end to the frame's. Adds N s to
+// `toolImpulse`.
+void applyLoads(WorldData&, const Loads& loads, double remaining, std::vector<Eigen::Vector3d>& toolImpulse);
+void stepPositions(WorldData&);
+
+// All forces of the current state, left in Spheres::force, torque and Nodes::force.
+inline void evaluateForces(WorldData& d) {
+  evaluateLinks(d);
+  evaluateSpringTensions(d);
+  sumNodeForces(d);
+  evaluateAttachments(d);
+  returnLinkForces(d);
+  sumSphereForces(d);
+}
+
+// Skin nodes to where their hosts carry them; needs evaluateLinks at the current state.
+void placeSkin(WorldData&);
+
+// Angular velocity from orientation and angular momentum.
+void refreshAngularVelocities(WorldData&);
+
+// J: elastic energies of the current state.
+double linkEnergy(const WorldData&);
+double surfaceEnergy(const WorldData&);  // edge springs and attachments; needs evaluateLinks at the current state
+
+}  // namespace medulla

@@ -1,0 +1,173 @@
+#include <cstddef>
+
+#include "physics/dynamics/anchor.h"
+#include "physics/dynamics/stages.h"
+
+// The surface (paper 2.3): point masses on the nodes, damped springs on the edges, elastic attachments to the skeleton.
+namespace medulla {
+
+namespace {
+
+const Quad& at(const std::vector<Quad>& nodes, std::uint32_t byteOffset) {
+  return *reinterpret_cast<const Quad*>(reinterpret_cast<const char*>(nodes.data()) + byteOffset);
+}
+
+constexpr double kSmallestSquaredLength = 1e-30;  // m2; a spring whose ends coincide has no direction and pulls nowhere
+
+Lanes3 gatherNodes(const std::vector<Quad>& q, int i) {
+  return gather(q[i], q[i + 1], q[i + 2], q[i + 3]);
+}
+
+void storeNodes(const Lanes3& v, std::vector<Quad>& q, int i) {
+  Lanes a = v.x, b = v.y, c = v.z, d = splat(0);
+  transpose(a, b, c, d);
+  store(q[i], a);
+  store(q[i + 1], b);
+  store(q[i + 2], c);
+  store(q[i + 3], d);
+}
+
+// Pull of the anchors on the four nodes of group g; adds it to their force.
+Lanes3 pullNodes(Nodes& n, const NodeGroup& group, const Anchor& anchor, int g) {
+  const Lanes3 stretch = anchor.position - gatherNodes(n.position, 4 * g);
+  const Lanes3 rate = anchor.velocity - gatherNodes(n.velocity, 4 * g);
+  const Lanes3 pull = fma(group.stiffness, stretch, group.damping * rate);
+  Lanes a = pull.x, b = pull.y, c = pull.z, d = splat(0);
+  transpose(a, b, c, d);
+  Quad* f = &n.force[4 * g];
+  store(f[0], load(f[0]) + a);
+  store(f[1], load(f[1]) + b);
+  store(f[2], load(f[2]) + c);
+  store(f[3], load(f[3]) + d);
+  return pull;
+}
+
+void evaluateOnLink(WorldData& d, const HostRange& range) {
+  const LinkHost host = linkHost(d, range.host);
+  const Lanes zero = splat(0);
+  Lanes3 sum{zero, zero, zero}, along = sum, moment = sum;
+  Lanes twist = zero;
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const NodeGroup& group = d.nodes.groups[g];
+    const Anchor anchor = anchorOnLink(host, group);
+    const Lanes3 pull = pullNodes(d.nodes, group, anchor, g);
+    const Lanes3 turning = cross(anchor.offset, pull);
+    sum = sum + pull;
+    along = fma(group.along, pull, along);
+    moment = moment + turning;
+    twist = fma(group.along, dot(host.n, turning), twist);
+  }
+  LinkFrame& f = d.links.frames[range.host / 4];
+  const int lane = range.host % 4;
+  const Lanes total = sumOfLanes(sum, twist), totalAlong = sumOfLanes(along, zero),
+              totalMoment = sumOfLanes(moment, zero);
+  const auto put = [lane](Lanes3& to, Lanes from) {
+    to.x[lane] = from[0];
+    to.y[lane] = from[1];
+    to.z[lane] = from[2];
+  };
+  put(f.loadSum, total);
+  put(f.loadAlong, totalAlong);
+  put(f.loadMoment, totalMoment);
+  f.loadTwist[lane] = total[3];
+}
+
+void evaluateOnSphere(WorldData& d, const HostRange& range) {
+  const SphereHost host = sphereHost(d, range.host);
+  const Lanes zero = splat(0);
+  Lanes3 sum{zero, zero, zero}, moment = sum;
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const Anchor anchor = anchorOnSphere(host, d.nodes.groups[g]);
+    const Lanes3 pull = pullNodes(d.nodes, d.nodes.groups[g], anchor, g);
+    sum = sum + pull;
+    moment = moment + cross(anchor.offset, pull);
+  }
+  store(d.spheres.force[range.host], zero - sumOfLanes(sum, zero));
+  store(d.spheres.torque[range.host], zero - sumOfLanes(moment, zero));
+}
+
+}  // namespace
+
+void evaluateSpringTensions(WorldData& d) {
+  const std::vector<Quad>&x = d.nodes.position, &v = d.nodes.velocity;
+  double* tension = d.springs.tensionOverLength.data();
+  for (const SpringGroup& s : d.springs.groups) {
+    Lanes line[4], rate[4];
+    for (int k = 0; k < 4; ++k) {
+      line[k] = load(at(x, s.node1[k])) - load(at(x, s.node0[k]));
+      rate[k] = (load(at(v, s.node1[k])) - load(at(v, s.node0[k]))) * line[k];
+    }
+    const Lanes squared = larger(dotOfFour(line[0] * line[0], line[1] * line[1], line[2] * line[2], line[3] * line[3]),
+                                 splat(kSmallestSquaredLength));
+    const Lanes lengthRate = dotOfFour(rate[0], rate[1], rate[2], rate[3]);  // times length
+    const Lanes length = squareRoot(squared);
+    const Lanes force = fma(s.stiffness * (length - s.restLength), length, s.damping * lengthRate);  // times length
+    _mm256_storeu_pd(tension, force / squared);
+    tension += 4;
+  }
+}
+
+void sumNodeForces(WorldData& d) {
+  Nodes& n = d.nodes;
+  const Lanes gravity = load(d.gravity);
+  const SpringEnd* end = d.springs.ends.data();
+  const double* tension = d.springs.tensionOverLength.data();
+  for (int i = 0; i < n.dynamicEnd; ++i) {
+    Lanes force = splat(n.mass[i]) * gravity;
+    const Lanes x = load(n.position[i]);
+    const SpringEnd* last = d.springs.ends.data() + d.springs.firstEnd[i + 1];
+    for (; end != last; ++end) force = fma(splat(tension[end->spring]), load(at(n.position, end->other)) - x, force);
+    store(n.force[i], force);
+  }
+}
+
+void evaluateAttachments(WorldData& d) {
+  const Lanes zero = splat(0);
+  for (std::size_t i = 0; i < d.spheres.force.size(); ++i) {
+    store(d.spheres.force[i], zero);
+    store(d.spheres.torque[i], zero);
+  }
+  for (const HostRange& range : d.nodes.onLinks) evaluateOnLink(d, range);
+  for (const HostRange& range : d.nodes.onSpheres) evaluateOnSphere(d, range);
+}
+
+void placeSkin(WorldData& d) {
+  const auto place = [&d](const Anchor& anchor, int g) {
+    storeNodes(anchor.position, d.nodes.position, 4 * g);
+    storeNodes(anchor.velocity, d.nodes.velocity, 4 * g);
+  };
+  for (const HostRange& range : d.nodes.skinOnLinks) {
+    const LinkHost host = linkHost(d, range.host);
+    for (int g = range.firstGroup; g < range.endGroup; ++g) place(anchorOnLink(host, d.nodes.groups[g]), g);
+  }
+  for (const HostRange& range : d.nodes.skinOnSpheres) {
+    const SphereHost host = sphereHost(d, range.host);
+    for (int g = range.firstGroup; g < range.endGroup; ++g) place(anchorOnSphere(host, d.nodes.groups[g]), g);
+  }
+}
+
+double surfaceEnergy(const WorldData& d) {
+  double sum = 0;
+  for (int k = 0; k < d.springs.count; ++k) {
+    const SpringGroup& s = d.springs.groups[k / 4];
+    const Eigen::Vector3d line =
+        vectorOf(at(d.nodes.position, s.node1[k % 4])) - vectorOf(at(d.nodes.position, s.node0[k % 4]));
+    const double stretch = line.norm() - s.restLength[k % 4];
+    sum += 0.5 * s.stiffness[k % 4] * stretch * stretch;
+  }
+  const auto add = [&](const Anchor& anchor, int g) {
+    const Lanes3 stretch = anchor.position - gatherNodes(d.nodes.position, 4 * g);
+    sum += 0.5 * sumOfLanes(d.nodes.groups[g].stiffness * dot(stretch, stretch));
+  };
+  for (const HostRange& range : d.nodes.onLinks) {
+    const LinkHost host = linkHost(d, range.host);
+    for (int g = range.firstGroup; g < range.endGroup; ++g) add(anchorOnLink(host, d.nodes.groups[g]), g);
+  }
+  for (const HostRange& range : d.nodes.onSpheres) {
+    const SphereHost host = sphereHost(d, range.host);
+    for (int g = range.firstGroup; g < range.endGroup; ++g) add(anchorOnSphere(host, d.nodes.groups[g]), g);
+  }
+  return sum;
+}
+
+}  // namespace medulla

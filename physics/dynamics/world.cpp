@@ -1,0 +1,227 @@
+#include "physics/dynamics/world.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <stdexcept>
+
+#include "physics/dynamics/layout.h"
+#include "physics/dynamics/rest_modes.h"
+#include "physics/dynamics/stages.h"
+
+namespace medulla {
+
+namespace {
+
+// The estimate is of the body at rest; bending, folding and compression stiffen it. The step is this share of it.
+constexpr double kStepSafety = 0.7;
+
+void checkSettings(const WorldSettings& s) {
+  if (!(s.frameDuration > 0) || !std::isfinite(s.frameDuration))
+    throw std::runtime_error(fmt::format("the dynamics frame lasts {} s: expected more than 0", s.frameDuration));
+  if (s.substeps < 0) throw std::runtime_error(fmt::format("{} substeps: expected 0 (automatic) or more", s.substeps));
+  if (!s.gravity.allFinite()) throw std::runtime_error("gravity is not finite");
+}
+
+void checkLoads(const WorldData& d, const Loads& loads) {
+  const auto checkNode = [&](int body, int node) {
+    assert(body >= 0 && body < static_cast<int>(d.ranges.size()));
+    assert(node >= 0 && node < static_cast<int>(d.ranges[body].node.size()));
+    (void)body, (void)node, (void)d;
+  };
+  for (const ToolSpring& t : loads.toolSprings)
+    for (int node : t.nodes) checkNode(t.body, node);
+  for (const HeldNode& held : loads.heldNodes) checkNode(held.body, held.node);
+}
+
+void step(WorldData& d, const Loads& loads, double remaining, FrameReport& report) {
+  evaluateLinks(d);
+  evaluateSpringTensions(d);
+  sumNodeForces(d);
+  evaluateAttachments(d);
+  returnLinkForces(d);
+  sumSphereForces(d);
+  stepVelocities(d);
+  applyLoads(d, loads, remaining, report.toolImpulse);
+  stepPositions(d);
+}
+
+bool isFinite(const WorldData& d, const BodyRange& r) {
+  double sum = 0;  // of zeros, unless something is not finite
+  const auto add = [&sum](const Quad& q) { sum += 0 * ((q.v[0] + q.v[1]) + (q.v[2] + q.v[3])); };
+  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+    add(d.spheres.position[i]);
+    add(d.spheres.velocity[i]);
+    add(d.spheres.orientation[i]);
+    add(d.spheres.angularMomentum[i]);
+  }
+  for (int i : r.node) {
+    add(d.nodes.position[i]);
+    add(d.nodes.velocity[i]);
+  }
+  return sum == 0;
+}
+
+void requireFinite(const WorldData& d, double time) {
+  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
+    if (isFinite(d, d.ranges[b])) continue;
+    const std::string cause =
+        d.substep > d.stableSubstep
+            ? fmt::format(
+                  "the substep of {:.3g} s is above the stable {:.3g} s: use more substeps, or lower Young's modulus "
+                  "or "
+                  "the damping ratio",
+                  d.substep, d.stableSubstep)
+            : fmt::format(
+                  "it was deformed beyond what substeps of {:.3g} s follow: use more substeps, or lower the tools' "
+                  "speed, stiffness or damping",
+                  d.substep);
+    throw std::runtime_error(fmt::format("body '{}' is not finite at {:.6g} s: {}", d.bodies[b].name, time, cause));
+  }
+}
+
+class Hash {  // FNV-1a
+ public:
+  void add(double x) {
+    const auto bits = std::bit_cast<std::uint64_t>(x);
+    for (int k = 0; k < 8; ++k) {
+      value_ ^= (bits >> (8 * k)) & 0xff;
+      value_ *= 0x100000001b3ULL;
+    }
+  }
+  void add(const Quad& q, int count) {
+    for (int k = 0; k < count; ++k) add(q.v[k]);
+  }
+  std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325ULL;
+};
+
+}  // namespace
+
+World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies) {
+  checkSettings(settings);
+  std::vector<BodyMechanics> mechanics;
+  double stable = std::numeric_limits<double>::infinity();
+  for (const BodyDescription& body : bodies) {
+    try {
+      mechanics.push_back(bodyMechanics(body));
+    } catch (const std::runtime_error& e) {
+      throw std::runtime_error(fmt::format("body '{}' cannot be simulated: {}", body.name, e.what()));
+    }
+    stable = std::min(stable, dampBody(body, mechanics.back()));
+  }
+  data_ = layOut(settings, std::move(bodies), mechanics);
+  data_->stableSubstep = stable;
+  data_->substeps = settings.substeps;
+  if (settings.substeps == 0)
+    data_->substeps = std::max(1, static_cast<int>(std::ceil(settings.frameDuration / (kStepSafety * stable))));
+  data_->substep = settings.frameDuration / data_->substeps;
+}
+
+World::~World() = default;
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+
+const std::vector<BodyDescription>& World::bodies() const {
+  return data_->bodies;
+}
+int World::substepsPerFrame() const {
+  return data_->substeps;
+}
+double World::substep() const {
+  return data_->substep;
+}
+double World::stableSubstep() const {
+  return data_->stableSubstep;
+}
+double World::time() const {
+  return static_cast<double>(data_->frame) * data_->settings.frameDuration;
+}
+
+FrameReport World::advance(const Loads& loads) {
+  WorldData& d = *data_;
+  checkLoads(d, loads);
+  FrameReport report;
+  int tools = 0;
+  for (const ToolSpring& t : loads.toolSprings) tools = std::max(tools, t.tool + 1);
+  for (const HeldNode& held : loads.heldNodes) tools = std::max(tools, held.tool + 1);
+  report.toolImpulse.assign(tools, Eigen::Vector3d::Zero());
+  d.loadForces.resize(loads.toolSprings.size() + loads.heldNodes.size());
+  for (int k = 1; k <= d.substeps; ++k) step(d, loads, (d.substeps - k) * d.substep, report);
+  ++d.frame;
+  // The frames that readers hang nodes on are those of the state at the end.
+  evaluateLinks(d);
+  placeSkin(d);
+  requireFinite(d, time());
+  return report;
+}
+
+void World::readFrame(DynamicsFrame& out) const {
+  const WorldData& d = *data_;
+  out.time = time();
+  out.bodies.resize(d.ranges.size());
+  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
+    const BodyRange& r = d.ranges[b];
+    BodyFrame& f = out.bodies[b];
+    f.nodes.resize(r.node.size());
+    f.spheres.resize(r.sphereCount);
+    for (std::size_t i = 0; i < r.node.size(); ++i) f.nodes[i] = vectorOf(d.nodes.position[r.node[i]]);
+    for (int i = 0; i < r.sphereCount; ++i) {
+      const Quad& q = d.spheres.orientation[r.firstSphere + i];
+      f.spheres[i].position = vectorOf(d.spheres.position[r.firstSphere + i]);
+      f.spheres[i].worldFromSphere = Eigen::Quaterniond(q.v[3], q.v[0], q.v[1], q.v[2]);
+    }
+  }
+}
+
+Energies World::energies() const {
+  const WorldData& d = *data_;
+  Energies e;
+  e.elastic = linkEnergy(d) + surfaceEnergy(d);
+  const Eigen::Vector3d g = vectorOf(d.gravity);
+  for (int i = 0; i < d.spheres.count; ++i) {
+    const double mass = d.spheres.groups[i / 4].mass[i % 4];
+    e.kinetic += 0.5 * mass * vectorOf(d.spheres.velocity[i]).squaredNorm() +
+                 0.5 * vectorOf(d.spheres.angularVelocity[i]).dot(vectorOf(d.spheres.angularMomentum[i]));
+    e.gravity -= mass * g.dot(vectorOf(d.spheres.position[i]));
+  }
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
+    e.kinetic += 0.5 * d.nodes.mass[i] * vectorOf(d.nodes.velocity[i]).squaredNorm();
+    e.gravity -= d.nodes.mass[i] * g.dot(vectorOf(d.nodes.position[i]));
+  }
+  return e;
+}
+
+double World::volumeRatio(int body) const {
+  const BodyRange& r = data_->ranges.at(body);
+  double volume = 0;
+  const auto x = [&](int node) { return vectorOf(data_->nodes.position[r.node[node]]); };
+  for (const auto& t : data_->bodies[body].model->triangles) volume += x(t[0]).dot(x(t[1]).cross(x(t[2]))) / 6;
+  return volume / r.restVolume;
+}
+
+std::uint64_t World::stateHash() const {
+  const WorldData& d = *data_;
+  Hash hash;
+  hash.add(time());
+  for (const BodyRange& r : d.ranges) {
+    for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+      hash.add(d.spheres.position[i], 3);
+      hash.add(d.spheres.velocity[i], 3);
+      hash.add(d.spheres.orientation[i], 4);
+      hash.add(d.spheres.angularMomentum[i], 3);
+    }
+    for (int k = r.firstLink; k < r.firstLink + r.linkCount; ++k) hash.add(d.links.unwoundTwist[k / 4].v[k % 4]);
+    for (int i : r.node) {
+      hash.add(d.nodes.position[i], 3);
+      hash.add(d.nodes.velocity[i], 3);
+    }
+  }
+  return hash.value();
+}
+
+}  // namespace medulla

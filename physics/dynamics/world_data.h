@@ -1,0 +1,148 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "physics/dynamics/simd.h"
+#include "physics/dynamics/world.h"
+
+// The arrays of a world, laid out for AVX2: gathers by index from arrays of quads, arithmetic on four links, springs or
+// nodes at once. All bodies share one set of arrays, body after body. Every sum has a fixed order.
+namespace medulla {
+
+// ---- Spheres: padded to a multiple of four; pads have no mass and no links.
+
+struct SphereGroup {        // constants of four spheres
+  Lanes mass, inverseMass;  // kg, 1/kg; inverse 0: translation fixed
+  Lanes freeToTurn;         // 1, or 0: rotation fixed
+  Lanes inverseInertia[6];  // 1/(kg m2), sphere frame: xx, yy, zz, xy, xz, yz
+};
+
+struct Spheres {
+  int count = 0;                         // without pads
+  std::vector<Quad> position, velocity;  // m, m/s
+  std::vector<Quad> orientation;         // worldFromSphere as x, y, z, w
+  std::vector<Quad> angularMomentum;     // kg m2/s, world: conserved to rounding, so this is the state
+  std::vector<Quad> angularVelocity;     // rad/s, world; follows from the two above
+  std::vector<Quad> force, torque;       // N, N m: sums of the current substep
+  std::vector<SphereGroup> groups;
+  std::vector<int> firstSlot, slot;  // the link ends of each sphere: indices into Links::slots, link after link
+};
+
+// ---- Links: four at a time; the last group is filled up with copies whose slots nobody reads.
+
+struct LinkGroup {  // constants of four links
+  std::uint32_t sphere0[4], sphere1[4];
+  Lanes3 restT, restU, restV;                     // centre line and section axes at rest, in both spheres' frames
+  Lanes restLength, smallestLength;               // m; forces divide by no less than the second
+  Lanes elongation, flexionU, flexionV, torsion;  // N/m, N m/rad about U, about V (each at either end), N m/rad
+  Lanes relaxation;                               // s, damping over stiffness (Rayleigh's beta)
+};
+
+// The four links as the surface sees them, and what the surface gives back.
+struct LinkFrame {
+  Lanes3 origin, line, originVelocity, lineVelocity;  // sphere 0; sphere 1 minus sphere 0
+  Lanes3 n, axisU, axisV;  // unit centre line; U, V of sphere 0 carried onto it by the smallest rotation
+  Lanes3 turning;          // rad/s, n x n'
+  Lanes spin0, spinAlong;  // rad/s about n at sphere 0, and its increase to sphere 1
+  Lanes twist;             // rad, from sphere 0 to sphere 1
+  Lanes inverseLength;     // 1/m
+  Lanes3 spinAxis0, spinAxis1, spinLever0, spinLever1;  // spin_i = spinAxis_i . omega_i - spinLever_i . n'
+  Lanes3 force1, torque0, torque1;        // N on sphere 1 (and minus it on sphere 0), N m: elongation and flexion
+  Lanes twistMoment;                      // N m, of torsion
+  Lanes3 loadSum, loadAlong, loadMoment;  // sums over the nodes of force, along * force, offset x force (on the nodes)
+  Lanes loadTwist;                        // sum of along * n . (offset x force)
+};
+
+struct Slot {
+  Quad force, torque;
+};
+
+struct Links {
+  int count = 0;
+  std::vector<LinkGroup> groups;
+  std::vector<LinkFrame> frames;
+  std::vector<Quad> unwoundTwist;  // rad per link, state: counts turns beyond 180 degrees
+  std::vector<Slot> slots;         // 2 per link: end 0, end 1
+};
+
+// ---- Surface nodes: sorted by host, each host's range padded to four.
+
+struct NodeGroup {           // constants of four nodes
+  Lanes along;               // 0..1 on a link
+  Lanes3 restOffset;         // m; on a link (0, component on U, component on V), on a sphere in its frame
+  Lanes stiffness, damping;  // N/m, N s/m of the attachment; 0 on pads
+};
+
+struct HostRange {
+  int host;                  // link or sphere
+  int firstGroup, endGroup;  // of its nodes
+};
+
+struct GroupHost {
+  int host;
+  bool onLink;
+};
+
+struct Nodes {
+  int count = 0;                          // with pads
+  std::vector<Quad> position, velocity;   // m, m/s
+  std::vector<Quad> force;                // N, of the current substep; dynamic nodes only
+  std::vector<double> mass, inverseMass;  // kg, 1/kg; 0 on pads and on skin
+  std::vector<NodeGroup> groups;
+  std::vector<GroupHost> groupHosts;
+  std::vector<HostRange> onLinks, onSpheres;          // dynamic nodes (SurfaceMode::full), first in the arrays
+  std::vector<HostRange> skinOnLinks, skinOnSpheres;  // massless nodes, behind them
+  int dynamicEnd = 0;                                 // nodes [0, dynamicEnd) are dynamic
+};
+
+// ---- Edge springs between dynamic nodes: two passes, tension per spring, then the sum per node.
+
+struct SpringGroup {
+  std::uint32_t node0[4], node1[4];      // byte offsets into Nodes::position
+  Lanes restLength, stiffness, damping;  // m, N/m, N s/m
+};
+
+struct SpringEnd {
+  std::uint32_t other;   // byte offset of the node at the other end
+  std::uint32_t spring;  // index
+};
+
+struct Springs {
+  int count = 0;
+  std::vector<SpringGroup> groups;
+  std::vector<double> tensionOverLength;  // N/m, of the current substep
+  std::vector<std::uint32_t> firstEnd;    // per dynamic node
+  std::vector<SpringEnd> ends;
+};
+
+// ---- A body's share of the arrays.
+
+struct BodyRange {
+  int firstSphere = 0, sphereCount = 0;
+  int firstLink = 0, linkCount = 0;
+  std::vector<int> node;  // index in Nodes of every model node
+  double restVolume = 0;  // m3, enclosed by the rest nodes
+};
+
+struct WorldData {
+  WorldSettings settings;
+  std::vector<BodyDescription> bodies;
+  std::vector<BodyRange> ranges;
+
+  Spheres spheres;
+  Links links;
+  Nodes nodes;
+  Springs springs;
+
+  // Force of each tool load in the current substep, tool springs first, then held nodes; sized once per frame.
+  std::vector<Eigen::Vector3d> loadForces;
+
+  Quad gravity;
+  int substeps = 1;
+  double substep = 0;        // s
+  double stableSubstep = 0;  // s
+  std::int64_t frame = 0;    // dynamics frames done; time = frame * frameDuration
+};
+
+}  // namespace medulla

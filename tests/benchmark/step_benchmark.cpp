@@ -1,0 +1,49 @@
+#include <benchmark/benchmark.h>
+
+#include "physics/dynamics/stages.h"
+#include "physics/dynamics/world_data.h"
+#include "tests/synthetic_model.h"
+
+// One explicit substep, links, edge springs and attachments with damping, surface full; CPU time per substep is the
+// benchmark's `substep` counter.
+namespace medulla {
+
+static void runSubsteps(benchmark::State& state, std::vector<BodyDescription> bodies) {
+  World world({}, std::move(bodies));
+  for (int i = 0; i < 3; ++i) world.advance({});
+  for ([[maybe_unused]] auto _ : state) world.advance({});
+  const WorldData& d = world.data();
+  state.counters["spheres"] = d.spheres.count;
+  state.counters["links"] = d.links.count;
+  state.counters["springs"] = d.springs.count;
+  state.counters["substeps"] = world.substepsPerFrame();
+  state.counters["stable_ms"] = 1e3 * world.stableSubstep();
+  state.counters["substep"] = benchmark::Counter(
+      world.substepsPerFrame(), benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+
+static void gallbladderSubstep(benchmark::State& state) {
+  runSubsteps(state, synthetic::gallbladderScene());
+}
+static void abdomenSubstep(benchmark::State& state) {
+  runSubsteps(state, synthetic::abdomenScene());
+}
+BENCHMARK(gallbladderSubstep);
+BENCHMARK(abdomenSubstep);
+
+static void runStage(benchmark::State& state, void (*stage)(WorldData&)) {
+  World world({}, synthetic::abdomenScene());
+  world.advance({});
+  evaluateForces(world.data());
+  for ([[maybe_unused]] auto _ : state) stage(world.data());
+}
+BENCHMARK_CAPTURE(runStage, links, evaluateLinks);
+BENCHMARK_CAPTURE(runStage, tensions, evaluateSpringTensions);
+BENCHMARK_CAPTURE(runStage, nodeSums, sumNodeForces);
+BENCHMARK_CAPTURE(runStage, attachments, evaluateAttachments);
+BENCHMARK_CAPTURE(runStage, returned, returnLinkForces);
+BENCHMARK_CAPTURE(runStage, sphereSums, sumSphereForces);
+BENCHMARK_CAPTURE(runStage, velocities, stepVelocities);
+BENCHMARK_CAPTURE(runStage, positions, stepPositions);
+
+}  // namespace medulla

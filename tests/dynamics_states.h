@@ -1,0 +1,108 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+
+#include "physics/dynamics/stages.h"
+#include "physics/dynamics/world_data.h"
+
+// States that no scene reaches, and sums over a world.
+namespace medulla::states {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+class Random {  // xorshift64*
+ public:
+  explicit Random(std::uint64_t seed) : state_(seed * 2654435769u + 1) {}
+  double uniform() {  // -1..1
+    state_ ^= state_ >> 12;
+    state_ ^= state_ << 25;
+    state_ ^= state_ >> 27;
+    return static_cast<double>((state_ * 2685821657736338717ULL) >> 11) / 4503599627370496.0 - 1;
+  }
+  Vector3d vector() {
+    const double x = uniform(), y = uniform(), z = uniform();
+    return {x, y, z};
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+inline Quaterniond orientation(const WorldData& d, int i) {
+  const Quad& q = d.spheres.orientation[i];
+  return {q.v[3], q.v[0], q.v[1], q.v[2]};
+}
+inline void setOrientation(WorldData& d, int i, const Quaterniond& q) {
+  d.spheres.orientation[i] = {{q.x(), q.y(), q.z(), q.w()}};
+}
+inline void turnBy(WorldData& d, int i, const Vector3d& rotation) {
+  if (rotation.norm() == 0) return;
+  setOrientation(d, i, Quaterniond(Eigen::AngleAxisd(rotation.norm(), rotation.normalized())) * orientation(d, i));
+}
+
+inline Eigen::Matrix3d inertia(const WorldData& d, int i) {  // world frame
+  const Lanes* e = d.spheres.groups[i / 4].inverseInertia;
+  const int l = i % 4;
+  Eigen::Matrix3d inverse;
+  inverse << e[0][l], e[3][l], e[4][l], e[3][l], e[1][l], e[5][l], e[4][l], e[5][l], e[2][l];
+  const Eigen::Matrix3d r = orientation(d, i).toRotationMatrix();
+  return r * inverse.inverse() * r.transpose();
+}
+inline void setAngularVelocity(WorldData& d, int i, const Vector3d& omega) {
+  d.spheres.angularMomentum[i] = quadOf(inertia(d, i) * omega);
+  d.spheres.angularVelocity[i] = quadOf(omega);
+}
+inline double sphereMass(const WorldData& d, int i) {
+  return d.spheres.groups[i / 4].mass[i % 4];
+}
+
+// Every sphere turned by up to `angle` (rad) and every sphere and node moved by up to `shift` (m), spun and thrown.
+inline void shake(WorldData& d, std::uint64_t seed, double angle, double shift, double speed) {
+  Random random(seed);
+  for (int i = 0; i < d.spheres.count; ++i) {
+    turnBy(d, i, angle * random.vector());
+    d.spheres.position[i] = quadOf(vectorOf(d.spheres.position[i]) + shift * random.vector());
+    d.spheres.velocity[i] = quadOf(speed * random.vector());
+    setAngularVelocity(d, i, 30 * speed * random.vector());
+  }
+  for (const BodyRange& r : d.ranges) {
+    for (int i : r.node) {
+      if (i >= d.nodes.dynamicEnd) continue;
+      d.nodes.position[i] = quadOf(vectorOf(d.nodes.position[i]) + shift * random.vector());
+      d.nodes.velocity[i] = quadOf(speed * random.vector());
+    }
+  }
+  evaluateLinks(d);
+}
+
+struct Momentum {
+  Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero();
+  double linearScale = 0, angularScale = 0;  // sums of magnitudes: what rounding is relative to
+};
+
+inline Momentum momentum(const WorldData& d) {
+  Momentum m;
+  const auto add = [&m](const Vector3d& x, const Vector3d& p, const Vector3d& spin) {
+    m.linear += p;
+    m.angular += x.cross(p) + spin;
+    m.linearScale += p.norm();
+    m.angularScale += x.norm() * p.norm() + spin.norm();
+  };
+  for (int i = 0; i < d.spheres.count; ++i)
+    add(vectorOf(d.spheres.position[i]), sphereMass(d, i) * vectorOf(d.spheres.velocity[i]),
+        vectorOf(d.spheres.angularMomentum[i]));
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+    add(vectorOf(d.nodes.position[i]), d.nodes.mass[i] * vectorOf(d.nodes.velocity[i]), Vector3d::Zero());
+  return m;
+}
+
+inline double elastic(WorldData& d) {
+  evaluateLinks(d);
+  return linkEnergy(d) + surfaceEnergy(d);
+}
+
+}  // namespace medulla::states
