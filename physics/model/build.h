@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -14,9 +15,11 @@ enum class BuildMethod {
   cover,     // inscribed medial balls chosen by set cover
 };
 
+constexpr int spheresMax = 2000;  // the choice of balls needs spheres^2 memory and time
+
 struct BuildSettings {
   BuildMethod method = BuildMethod::cover;
-  int spheres = 7;  // 1..10000; cover only: the skeleton's node count follows from the mesh
+  int spheres = 7;  // 1..spheresMax; cover only: the skeleton's node count follows from the mesh
   double surfaceMassFraction = 0.2;  // of the body's mass, carried by the surface nodes, 0..0.4; more allows larger substeps
   int renderLevels = 2;  // 0..4 Loop subdivisions of the physics mesh for the drawn surface
 };
@@ -34,8 +37,15 @@ struct BuildReport {
   double seconds = 0;
 };
 
+// FNV-1a over the bits of vertices and triangles. A model records that of its input file, before repair.
+std::uint64_t hashMesh(const TriangleMesh& mesh);
+
+// The settings as options of the build command that repeat them.
+std::string describeSettings(const BuildSettings& settings);
+
 // Builds a model (paper 2). `fine`, if given, is the detailed shape that the drawn surface follows. `progress`, if
 // given, is called now and then with 0..1. Deterministic to the byte, `seconds` apart.
+// `name` is left empty, and `meshHash` is that of the repaired mesh: whoever read the input knows the better ones.
 // Throws std::runtime_error on settings out of range and on meshes that hold no ball.
 SoftBodyModel buildModel(const RepairedMesh& mesh, const TriangleMesh* fine, const BuildSettings& settings,
                          BuildReport& report, const std::function<void(double)>& progress = {});

@@ -1,0 +1,104 @@
+#include "physics/model/attachment.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+namespace {
+
+struct Anchor {
+  double distance;
+  Attachment attachment;
+};
+
+// Every sphere, and every link whose interior holds the foot of the perpendicular, nearest first.
+std::vector<Anchor> anchorsOf(const Vector3d& node, const std::vector<FillingSphere>& spheres,
+                              const std::vector<ElasticLink>& links) {
+  std::vector<Anchor> anchors;
+  for (std::size_t i = 0; i < spheres.size(); ++i) {
+    Attachment a;
+    a.host = static_cast<int>(i);
+    a.restOffset = node - spheres[i].restFrame;
+    anchors.push_back({a.restOffset.norm(), a});
+  }
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    const Vector3d start = spheres[links[i].sphere0].restFrame, line = spheres[links[i].sphere1].restFrame - start;
+    const double along = (node - start).dot(line) / line.squaredNorm();
+    if (!(along > 0 && along < 1)) continue;
+    Attachment a;
+    a.onLink = true;
+    a.host = static_cast<int>(i);
+    a.along = along;
+    a.restOffset = node - (start + along * line);
+    anchors.push_back({a.restOffset.norm(), a});
+  }
+  std::stable_sort(anchors.begin(), anchors.end(),
+                   [](const Anchor& a, const Anchor& b) { return a.distance < b.distance; });
+  return anchors;
+}
+
+}  // namespace
+
+std::vector<Attachment> attachNodes(const TriangleMesh& mesh, const SurfaceTree& tree,
+                                    const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links) {
+  std::vector<Attachment> attachments;
+  attachments.reserve(mesh.vertices.size());
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
+    const Vector3d& node = mesh.vertices[n];
+    const std::vector<Anchor> anchors = anchorsOf(node, spheres, links);
+    const auto visible = std::find_if(anchors.begin(), anchors.end(), [&](const Anchor& a) {
+      return !segmentCrosses(tree, node - a.attachment.restOffset, node, static_cast<int>(n));
+    });
+    attachments.push_back(visible != anchors.end() ? visible->attachment : anchors.front().attachment);
+  }
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    const Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    const double third = (b - a).cross(c - a).norm() / 6;
+    for (const int corner : t) attachments[corner].area += third;
+  }
+  return attachments;
+}
+
+Vector3d restAnchor(const Attachment& a, const std::vector<FillingSphere>& spheres,
+                    const std::vector<ElasticLink>& links) {
+  const HostShares hosts = hostShares(a, links);
+  return hosts.share[0] * spheres[hosts.sphere[0]].restFrame + hosts.share[1] * spheres[hosts.sphere[1]].restFrame;
+}
+
+HostShares hostShares(const Attachment& a, const std::vector<ElasticLink>& links) {
+  if (!a.onLink) return {{a.host, a.host}, {1, 0}};
+  return {{links[a.host].sphere0, links[a.host].sphere1}, {1 - a.along, a.along}};
+}
+
+int countCrossings(const TriangleMesh& mesh, const SurfaceTree& tree, const std::vector<Attachment>& attachments,
+                   const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links) {
+  int crossings = 0;
+  for (std::size_t n = 0; n < attachments.size(); ++n) {
+    const Vector3d anchor = restAnchor(attachments[n], spheres, links);
+    crossings += segmentCrosses(tree, anchor, mesh.vertices[n], static_cast<int>(n)) ? 1 : 0;
+  }
+  return crossings;
+}
+
+std::vector<std::vector<int>> fillBuckets(const std::vector<std::array<int, 3>>& triangles,
+                                          const std::vector<Attachment>& attachments, int spheres,
+                                          const std::vector<ElasticLink>& links) {
+  const auto sphereOf = [&](int node) {
+    const HostShares hosts = hostShares(attachments[node], links);
+    if (hosts.share[0] == hosts.share[1]) return std::min(hosts.sphere[0], hosts.sphere[1]);
+    return hosts.sphere[hosts.share[0] > hosts.share[1] ? 0 : 1];
+  };
+  std::vector<std::vector<int>> buckets(spheres);
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    std::array<int, 3> s = {sphereOf(triangles[t][0]), sphereOf(triangles[t][1]), sphereOf(triangles[t][2])};
+    std::sort(s.begin(), s.end());
+    const int winner = s[1] == s[2] ? s[1] : s[0];  // a majority is the middle one; three different: the lowest
+    buckets[winner].push_back(static_cast<int>(t));
+  }
+  return buckets;
+}
+
+}  // namespace medulla

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <vector>
+
+#include "physics/model/soft_body_model.h"
+#include "physics/model/surface_queries.h"
+
+namespace medulla {
+
+// Hangs every surface node on the nearest point of the skeleton, a sphere's frame or a link's interior (paper 2.3),
+// among those that it sees: a segment through the surface would tie limbs together across the gap between them. A node
+// that sees none hangs on the nearest. Areas are a third of the triangles around the node; volumes are left at 0.
+std::vector<Attachment> attachNodes(const TriangleMesh& mesh, const SurfaceTree& tree,
+                                    const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links);
+
+// The point of the skeleton that an attachment hangs on at rest, m.
+Eigen::Vector3d restAnchor(const Attachment& attachment, const std::vector<FillingSphere>& spheres,
+                           const std::vector<ElasticLink>& links);
+
+// Spheres that carry an attachment and their shares, which sum to 1: the sphere alone, or the two ends of the link
+// with 1 - along and along.
+struct HostShares {
+  std::array<int, 2> sphere;
+  std::array<double, 2> share;
+};
+HostShares hostShares(const Attachment& attachment, const std::vector<ElasticLink>& links);
+
+// Nodes whose segment to the skeleton crosses the surface.
+int countCrossings(const TriangleMesh& mesh, const SurfaceTree& tree, const std::vector<Attachment>& attachments,
+                   const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links);
+
+// Buckets of the triangles (paper 4): each lies with the sphere that most of its nodes hang on, a node on a link with
+// the nearer end; ties go to the lower sphere. A bucket may be empty.
+std::vector<std::vector<int>> fillBuckets(const std::vector<std::array<int, 3>>& triangles,
+                                          const std::vector<Attachment>& attachments, int spheres,
+                                          const std::vector<ElasticLink>& links);
+
+}  // namespace medulla

@@ -1,0 +1,221 @@
+#include "physics/model/build.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <stdexcept>
+
+#include "physics/model/attachment.h"
+#include "physics/model/ball_cover.h"
+#include "physics/model/build_report.h"
+#include "physics/model/edge_collapse_skeleton.h"
+#include "physics/model/link_graph.h"
+#include "physics/model/link_sections.h"
+#include "physics/model/mass_properties.h"
+#include "physics/model/medial_balls.h"
+#include "physics/model/node_volumes.h"
+#include "physics/model/power_cells.h"
+#include "physics/model/render_surface.h"
+#include "physics/model/surface_samples.h"
+
+namespace medulla {
+
+using Eigen::Vector3d;
+using Progress = std::function<void(double)>;
+
+namespace {
+
+// What every stage measures against.
+struct Shape {
+  const TriangleMesh& mesh;
+  SurfaceTree tree;
+  MassProperties exact;
+  double diagonal = 0;  // m, of the bounding box
+};
+
+struct SpheresAndLinks {
+  std::vector<Ball> balls;
+  PowerCells cells;
+  SphereLinks links;
+};
+
+void checkSettings(const BuildSettings& s) {
+  if (s.spheres < 1 || s.spheres > spheresMax) {
+    throw std::runtime_error(fmt::format("{} spheres asked for; expected 1 to {}", s.spheres, spheresMax));
+  }
+  if (!(s.surfaceMassFraction >= 0 && s.surfaceMassFraction <= 0.4)) {
+    throw std::runtime_error(fmt::format("surface mass fraction {}; expected 0 to 0.4", s.surfaceMassFraction));
+  }
+  if (s.renderLevels < 0 || s.renderLevels > 4) {
+    throw std::runtime_error(fmt::format("{} render levels; expected 0 to 4", s.renderLevels));
+  }
+}
+
+Shape measureShape(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) throw std::runtime_error("the mesh has no triangles; expected a closed surface");
+  Shape shape{mesh, makeSurfaceTree(mesh), massProperties(mesh), 0};
+  shape.diagonal = (shape.tree.nodes[0].high - shape.tree.nodes[0].low).norm();
+  if (!(shape.exact.volume > 0)) throw std::runtime_error("the mesh encloses no volume; expected an outward surface");
+  return shape;
+}
+
+std::vector<Ball> chooseBalls(const Shape& shape, int count, const Progress& progress) {
+  const int candidates = std::max(2500, 3 * count), samples = std::max(3000, 3 * count);
+  const std::vector<Ball> medial =
+      medialBalls(shape.tree, sampleSurface(shape.mesh, candidates, 1), shape.diagonal);
+  if (static_cast<int>(medial.size()) < count) {
+    throw std::runtime_error(fmt::format("the mesh holds {} inscribed balls; {} spheres were asked for",
+                                         medial.size(), count));
+  }
+  std::vector<Vector3d> points;
+  for (const SurfaceSample& s : sampleSurface(shape.mesh, samples, 2)) points.push_back(s.point);
+  // Vertices stick out furthest; beyond a few thousand the samples lie as close.
+  if (shape.mesh.vertices.size() < 1500) {
+    points.insert(points.end(), shape.mesh.vertices.begin(), shape.mesh.vertices.end());
+  }
+  return coverWithBalls(shape.tree, medial, points, shape.diagonal, count, progress);
+}
+
+// Spheres without material of their own give theirs up to the rest; links to them pass to their nearest neighbour.
+void dropEmptyCells(const VoxelBody& voxels, double volume, SpheresAndLinks& s) {
+  for (;;) {
+    const auto empty = std::find_if(s.cells.cells.begin(), s.cells.cells.end(),
+                                    [](const MassProperties& c) { return c.volume <= 0; });
+    if (empty == s.cells.cells.end()) return;
+    if (s.balls.size() == 1) throw std::runtime_error("the mesh is too thin for a single sphere");
+    const int gone = static_cast<int>(empty - s.cells.cells.begin());
+    int heir = gone == 0 ? 1 : 0;
+    for (int k = 0; k < static_cast<int>(s.balls.size()); ++k) {
+      const auto distance = [&](int i) { return (s.balls[i].centre - s.balls[gone].centre).norm(); };
+      if (k != gone && distance(k) < distance(heir)) heir = k;
+    }
+    for (std::array<int, 2>& link : s.links) {
+      for (int& end : link) {
+        end = end == gone ? heir : end;
+        end -= end > gone ? 1 : 0;
+      }
+      if (link[0] > link[1]) std::swap(link[0], link[1]);
+    }
+    std::sort(s.links.begin(), s.links.end());
+    s.links.erase(std::unique(s.links.begin(), s.links.end()), s.links.end());
+    std::erase_if(s.links, [](const std::array<int, 2>& l) { return l[0] == l[1]; });
+    s.balls.erase(s.balls.begin() + gone);
+    s.cells = divideByPower(voxels, s.balls, volume);
+  }
+}
+
+// The paper's raw result: skeleton nodes are spheres of inscribed radius, skeleton edges are links.
+SpheresAndLinks spheresOfSkeleton(const Shape& shape, const Skeleton& skeleton, const VoxelBody& voxels) {
+  SpheresAndLinks s;
+  for (const Vector3d& node : skeleton.nodes) s.balls.push_back({node, inscribedRadius(shape.tree, node)});
+  for (const std::array<int, 2>& link : skeleton.links) s.links.push_back({link[0], link[1]});
+  s.cells = divideByPower(voxels, s.balls, shape.exact.volume);
+  dropEmptyCells(voxels, shape.exact.volume, s);
+  std::vector<Vector3d> centres;
+  for (const Ball& ball : s.balls) centres.push_back(ball.centre);
+  joinComponents(centres, s.links);
+  std::sort(s.links.begin(), s.links.end());
+  return s;
+}
+
+SpheresAndLinks spheresByCover(const Shape& shape, const Skeleton& skeleton, const VoxelBody& voxels, int count,
+                               const Progress& progress) {
+  SpheresAndLinks s;
+  s.balls = chooseBalls(shape, count, progress);
+  s.cells = divideByPower(voxels, s.balls, shape.exact.volume);
+  dropEmptyCells(voxels, shape.exact.volume, s);
+  s.links = linkCells(shape.tree, s.cells, s.balls, isTubular(shape.mesh, shape.tree, skeleton));
+  return s;
+}
+
+std::vector<FillingSphere> fillingSpheres(const SpheresAndLinks& s) {
+  std::vector<FillingSphere> spheres;
+  for (std::size_t i = 0; i < s.balls.size(); ++i) {
+    const MassProperties& cell = s.cells.cells[i];
+    spheres.push_back({s.balls[i].centre, s.balls[i].radius, cell.centroid, cell.volume, cell.secondMoment});
+  }
+  return spheres;
+}
+
+std::vector<std::array<int, 2>> edgesOf(const std::vector<std::array<int, 3>>& triangles) {
+  std::vector<std::array<int, 2>> edges;
+  for (const std::array<int, 3>& t : triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax(t[k], t[(k + 1) % 3]);
+      edges.push_back({low, high});
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
+}  // namespace
+
+std::uint64_t hashMesh(const TriangleMesh& mesh) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  const auto mix = [&](std::uint64_t bits) {
+    for (int byte = 0; byte < 8; ++byte) hash = (hash ^ (bits >> (8 * byte) & 255)) * 0x100000001b3u;
+  };
+  for (const Vector3d& v : mesh.vertices) {
+    for (int a = 0; a < 3; ++a) mix(std::bit_cast<std::uint64_t>(v[a]));
+  }
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    for (const int corner : t) mix(static_cast<std::uint64_t>(corner));
+  }
+  return hash;
+}
+
+std::string describeSettings(const BuildSettings& s) {
+  if (s.method == BuildMethod::skeleton) {
+    return fmt::format("--method skeleton --surface-mass {} --render-levels {}", s.surfaceMassFraction, s.renderLevels);
+  }
+  return fmt::format("--method cover --spheres {} --surface-mass {} --render-levels {}", s.spheres,
+                     s.surfaceMassFraction, s.renderLevels);
+}
+
+SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine, const BuildSettings& settings,
+                         BuildReport& report, const Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto done = [&](double part) {
+    if (progress) progress(part);
+  };
+  checkSettings(settings);
+  const Shape shape = measureShape(repaired.mesh);
+
+  SoftBodyModel model;
+  model.meshHash = hashMesh(repaired.mesh);
+  model.settings = describeSettings(settings);
+  model.nodeOfInputVertex = repaired.vertexOfInput;
+  model.restNodes = shape.mesh.vertices;
+  model.triangles = shape.mesh.triangles;
+  model.edges = edgesOf(shape.mesh.triangles);
+  model.skeleton = collapseEdges(shape.mesh);
+  done(0.05);
+
+  const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, std::max(60000, 300 * settings.spheres));
+  done(0.1);
+  const SpheresAndLinks s = settings.method == BuildMethod::skeleton
+                                ? spheresOfSkeleton(shape, model.skeleton, voxels)
+                                : spheresByCover(shape, model.skeleton, voxels, settings.spheres,
+                                                 [&](double part) { done(0.1 + 0.6 * part); });
+  done(0.7);
+  model.spheres = fillingSpheres(s);
+  model.links = measureLinks(shape.mesh, s.cells.sites, model.spheres, s.links);
+  model.attachments = attachNodes(shape.mesh, shape.tree, model.spheres, model.links);
+  setNodeVolumes(model.restNodes, shape.exact, settings.surfaceMassFraction, model.spheres, model.links,
+                 model.attachments);
+  model.buckets =
+      fillBuckets(model.triangles, model.attachments, static_cast<int>(model.spheres.size()), model.links);
+  done(0.8);
+  model.renderSurface = makeRenderSurface(shape.mesh, settings.renderLevels, fine);
+  done(0.9);
+  report = measureModel(model, shape.mesh, shape.tree, shape.exact, voxels, shape.diagonal);
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  done(1);
+  return model;
+}
+
+}  // namespace medulla

@@ -1,0 +1,17 @@
+#pragma once
+
+#include "physics/model/build.h"
+#include "physics/model/mass_properties.h"
+#include "physics/model/power_cells.h"
+#include "physics/model/surface_queries.h"
+
+namespace medulla {
+
+// Distance from p to the surface of a link cone, the hull of two balls; negative inside. m.
+double signedDistanceToCone(const Eigen::Vector3d& p, const Ball& a, const Ball& b);
+
+// Everything of a report but the build's seconds. `exact` are the mesh's own mass properties.
+BuildReport measureModel(const SoftBodyModel& model, const TriangleMesh& mesh, const SurfaceTree& tree,
+                         const MassProperties& exact, const VoxelBody& voxels, double diagonal);
+
+}  // namespace medulla

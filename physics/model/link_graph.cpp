@@ -1,0 +1,137 @@
+#include "physics/model/link_graph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "physics/model/plane_section.h"
+
+namespace medulla {
+
+namespace {
+
+struct Candidate {
+  double score;
+  std::array<int, 2> spheres;
+};
+
+int rootOf(std::vector<int>& parent, int a) {
+  while (parent[a] != a) a = parent[a] = parent[parent[a]];
+  return a;
+}
+
+bool unite(std::vector<int>& parent, int a, int b) {
+  const int ra = rootOf(parent, a), rb = rootOf(parent, b);
+  parent[std::max(ra, rb)] = std::min(ra, rb);
+  return ra != rb;
+}
+
+std::vector<int> singletons(int count) {
+  std::vector<int> parent(count);
+  std::iota(parent.begin(), parent.end(), 0);
+  return parent;
+}
+
+bool staysInside(const SurfaceTree& tree, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  for (int k = 1; k < 8; ++k) {
+    if (!isInside(tree, a + k / 8. * (b - a))) return false;
+  }
+  return true;
+}
+
+std::vector<Candidate> candidatesOf(const SurfaceTree& tree, const PowerCells& cells) {
+  std::vector<Candidate> candidates;
+  for (const auto& [pair, area] : cells.contactArea) {
+    const MassProperties &a = cells.cells[pair.first], &b = cells.cells[pair.second];
+    const double side = std::cbrt(std::min(a.volume, b.volume));
+    double score = area / (side * side);
+    if (!staysInside(tree, a.centroid, b.centroid)) score *= 1e-3;
+    candidates.push_back({score, {pair.first, pair.second}});
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+  return candidates;
+}
+
+}  // namespace
+
+SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const std::vector<Ball>& balls, bool treeOnly,
+                      int degreeMax) {
+  constexpr double contactRatioMin = 0.15;  // cells that only share a corner or an edge fall below
+  const std::vector<Candidate> candidates = candidatesOf(tree, cells);
+  SphereLinks links;
+  std::vector<Candidate> further;
+  std::vector<int> parent = singletons(static_cast<int>(balls.size())), degree(balls.size(), 0);
+  const auto add = [&](const std::array<int, 2>& pair) {
+    links.push_back(pair);
+    ++degree[pair[0]];
+    ++degree[pair[1]];
+  };
+  for (const Candidate& c : candidates) {
+    if (unite(parent, c.spheres[0], c.spheres[1])) {
+      add(c.spheres);
+    } else if (c.score > contactRatioMin && !treeOnly) {
+      further.push_back(c);
+    }
+  }
+  for (const Candidate& c : further) {
+    if (degree[c.spheres[0]] < degreeMax && degree[c.spheres[1]] < degreeMax) add(c.spheres);
+  }
+  std::vector<Eigen::Vector3d> centres;
+  for (const Ball& ball : balls) centres.push_back(ball.centre);
+  joinComponents(centres, links);
+  std::sort(links.begin(), links.end());
+  return links;
+}
+
+void joinComponents(const std::vector<Eigen::Vector3d>& centres, SphereLinks& links) {
+  const int count = static_cast<int>(centres.size());
+  std::vector<int> parent = singletons(count);
+  for (const std::array<int, 2>& link : links) unite(parent, link[0], link[1]);
+  for (;;) {
+    double shortest = std::numeric_limits<double>::infinity();
+    std::array<int, 2> best{};
+    for (int i = 0; i < count; ++i) {
+      for (int j = i + 1; j < count; ++j) {
+        const double length = (centres[i] - centres[j]).norm();
+        if (length < shortest && rootOf(parent, i) != rootOf(parent, j)) {
+          shortest = length;
+          best = {i, j};
+        }
+      }
+    }
+    if (!std::isfinite(shortest)) return;
+    links.push_back(best);
+    unite(parent, best[0], best[1]);
+  }
+}
+
+int countComponents(int spheres, const SphereLinks& links) {
+  std::vector<int> parent = singletons(spheres);
+  int components = spheres;
+  for (const std::array<int, 2>& link : links) components -= unite(parent, link[0], link[1]) ? 1 : 0;
+  return components;
+}
+
+bool isTubular(const TriangleMesh& mesh, const SurfaceTree& tree, const Skeleton& skeleton) {
+  constexpr double fillMin = 0.6;  // measured: tubes .7 to .95, a liver below .5
+  constexpr int stations = 5;
+  std::vector<double> fills;
+  for (const std::array<int, 2>& link : skeleton.links) {
+    const Eigen::Vector3d a = skeleton.nodes[link[0]], along = skeleton.nodes[link[1]] - a;
+    if (along.norm() == 0) continue;
+    for (int k = 0; k < stations; ++k) {
+      const Plane plane = planeAcross(a + (k + 0.5) / stations * along, along.normalized());
+      const SectionMoments section = planeSection(mesh, plane);
+      if (section.area <= 0) continue;
+      const double radius = inscribedRadius(
+          tree, plane.origin + section.centroid.x() * plane.u + section.centroid.y() * plane.v);
+      fills.push_back(3.14159265358979 * radius * radius / section.area);
+    }
+  }
+  if (fills.empty()) return false;
+  std::nth_element(fills.begin(), fills.begin() + fills.size() / 2, fills.end());
+  return fills[fills.size() / 2] > fillMin;
+}
+
+}  // namespace medulla

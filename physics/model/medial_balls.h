@@ -1,0 +1,25 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "physics/model/surface_queries.h"
+#include "physics/model/surface_samples.h"
+
+namespace medulla {
+
+struct Ball {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // m
+  double radius = 0;                                 // m
+};
+
+// The medial ball that touches the surface at p: a ball through p with its centre along `inward` (unit) shrinks until
+// nothing of the surface is inside it (Ma, Bae and Choi 2012), with the exact closest point in place of their point
+// cloud. Inscribed wherever its centre is inside.
+Ball shrinkBall(const SurfaceTree& tree, const Eigen::Vector3d& p, const Eigen::Vector3d& inward, double startRadius);
+
+// One inscribed medial ball per sample, without those smaller than 0.4 % of the diagonal (m): they sit in the convex
+// edges between triangles and say nothing of the shape.
+std::vector<Ball> medialBalls(const SurfaceTree& tree, const std::vector<SurfaceSample>& samples, double diagonal);
+
+}  // namespace medulla

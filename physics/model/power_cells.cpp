@@ -1,0 +1,212 @@
+#include "physics/model/power_cells.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+namespace {
+
+struct Bounds {
+  Vector3d low, high;
+};
+
+Bounds boundsOf(const TriangleMesh& mesh) {
+  Bounds b{mesh.vertices[mesh.triangles[0][0]], mesh.vertices[mesh.triangles[0][0]]};
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    for (const int corner : t) {
+      b.low = b.low.cwiseMin(mesh.vertices[corner]);
+      b.high = b.high.cwiseMax(mesh.vertices[corner]);
+    }
+  }
+  return b;
+}
+
+// Heights at which the vertical line through every column's centre meets the surface. Column centres sit off the
+// mesh's likely coordinates, and an edge belongs to the triangle on one side of it alone (top-left rule of
+// rasterisers): no crossing is counted twice or lost.
+struct Columns {
+  Vector3d origin;  // centre of the column (0, 0) at z of the lowest voxel's floor
+  double size;
+  int countX, countY;
+  std::vector<std::vector<double>> crossings;
+};
+
+bool insideHalfOpen(double value, double dx, double dy) {
+  return value > 0 || (value == 0 && (dy > 0 || (dy == 0 && dx < 0)));
+}
+
+void cutColumns(const std::array<Vector3d, 3>& corners, Columns& columns) {
+  std::array<Vector3d, 3> c = corners;
+  // Taken from the lexicographically lower end, so that both triangles at an edge see the same number, negated.
+  const auto doubleArea = [](const Vector3d& p, const Vector3d& q, double x, double y) {
+    const bool swap = q.x() < p.x() || (q.x() == p.x() && q.y() < p.y());
+    const Vector3d &a = swap ? q : p, &b = swap ? p : q;
+    const double area = (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x());
+    return swap ? -area : area;
+  };
+  double total = doubleArea(c[0], c[1], c[2].x(), c[2].y());
+  if (total == 0) return;
+  if (total < 0) {
+    std::swap(c[1], c[2]);
+    total = -total;
+  }
+  const auto range = [&](int axis, int count, int& first, int& last) {
+    const double low = std::min({c[0][axis], c[1][axis], c[2][axis]}) - columns.origin[axis];
+    const double high = std::max({c[0][axis], c[1][axis], c[2][axis]}) - columns.origin[axis];
+    first = std::max(0, static_cast<int>(std::floor(low / columns.size)));
+    last = std::min(count - 1, static_cast<int>(std::ceil(high / columns.size)));
+  };
+  int firstX = 0, lastX = 0, firstY = 0, lastY = 0;
+  range(0, columns.countX, firstX, lastX);
+  range(1, columns.countY, firstY, lastY);
+  for (int i = firstX; i <= lastX; ++i) {
+    for (int j = firstY; j <= lastY; ++j) {
+      const double x = columns.origin.x() + i * columns.size, y = columns.origin.y() + j * columns.size;
+      std::array<double, 3> w;  // barycentric, times `total`
+      bool inside = true;
+      for (int k = 0; k < 3 && inside; ++k) {
+        const Vector3d &p = c[(k + 1) % 3], &q = c[(k + 2) % 3];
+        w[k] = doubleArea(p, q, x, y);
+        inside = insideHalfOpen(w[k], q.x() - p.x(), q.y() - p.y());
+      }
+      if (!inside) continue;
+      columns.crossings[static_cast<std::size_t>(i) * columns.countY + j].push_back(
+          (w[0] * c[0].z() + w[1] * c[1].z() + w[2] * c[2].z()) / total);
+    }
+  }
+}
+
+void addSpan(VoxelBody& body, const Columns& columns, int i, int j, double low, double high) {
+  const double floor = columns.origin.z();
+  const int first = std::max(0, static_cast<int>(std::floor((low - floor) / body.size)));
+  const int last = std::min(body.count[2] - 1, static_cast<int>(std::floor((high - floor) / body.size)));
+  for (int k = first; k <= last; ++k) {
+    const double bottom = std::max(low, floor + k * body.size), top = std::min(high, floor + (k + 1) * body.size);
+    if (top <= bottom) continue;
+    int& at = body.pieceAt[(static_cast<std::size_t>(i) * body.count[1] + j) * body.count[2] + k];
+    if (at < 0) at = static_cast<int>(body.pieces.size());
+    body.pieces.push_back({{i, j, k},
+                           {columns.origin.x() + i * body.size, columns.origin.y() + j * body.size, (bottom + top) / 2},
+                           top - bottom});
+  }
+}
+
+}  // namespace
+
+VoxelBody voxelise(const TriangleMesh& mesh, double volume, int target) {
+  VoxelBody body;
+  body.size = std::cbrt(volume / target);
+  const Bounds bounds = boundsOf(mesh);
+  for (int a = 0; a < 3; ++a) body.count[a] = static_cast<int>((bounds.high[a] - bounds.low[a]) / body.size) + 2;
+  Columns columns{bounds.low - Vector3d(0.31, 0.27, 0.5) * body.size, body.size, body.count[0] + 1, body.count[1] + 1, {}};
+  body.count = {columns.countX, columns.countY, body.count[2] + 1};
+  columns.crossings.resize(static_cast<std::size_t>(columns.countX) * columns.countY);
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    cutColumns({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]}, columns);
+  }
+  body.pieceAt.assign(static_cast<std::size_t>(body.count[0]) * body.count[1] * body.count[2], -1);
+  for (int i = 0; i < columns.countX; ++i) {
+    for (int j = 0; j < columns.countY; ++j) {
+      std::vector<double>& z = columns.crossings[static_cast<std::size_t>(i) * columns.countY + j];
+      std::sort(z.begin(), z.end());
+      for (std::size_t s = 0; s + 1 < z.size(); s += 2) addSpan(body, columns, i, j, z[s], z[s + 1]);
+    }
+  }
+  return body;
+}
+
+static std::vector<int> leastPower(const VoxelBody& body, const PowerSites& sites) {
+  // |x - c|^2 - w = |x|^2 - 2 x.c + |c|^2 - w, of which |x|^2 is common to all. Relative to the first centre, against
+  // cancellation far from the origin.
+  const auto n = static_cast<Eigen::Index>(sites.centres.size());
+  const Vector3d origin = sites.centres[0];
+  Eigen::ArrayX3d twice(n, 3);
+  Eigen::ArrayXd constant(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Vector3d c = sites.centres[i] - origin;
+    twice.row(i) = 2 * c.transpose().array();
+    constant[i] = c.squaredNorm() - sites.weights[i];
+  }
+  std::vector<int> least(body.pieces.size());
+  Eigen::ArrayXd power(n);
+  for (std::size_t p = 0; p < body.pieces.size(); ++p) {
+    const Vector3d x = body.pieces[p].centre - origin;
+    power = constant - twice.col(0) * x.x() - twice.col(1) * x.y() - twice.col(2) * x.z();
+    power.minCoeff(&least[p]);
+  }
+  return least;
+}
+
+static std::vector<MassProperties> integrate(const VoxelBody& body, const std::vector<int>& cellOfPiece,
+                                             std::size_t count, double volume) {
+  std::vector<MassProperties> cells(count);
+  const double face = body.size * body.size;
+  double total = 0;
+  for (std::size_t p = 0; p < body.pieces.size(); ++p) {
+    const VoxelPiece& piece = body.pieces[p];
+    MassProperties& cell = cells[cellOfPiece[p]];
+    cell.volume += face * piece.height;
+    cell.centroid += face * piece.height * piece.centre;
+    total += face * piece.height;
+  }
+  for (MassProperties& cell : cells) {
+    if (cell.volume > 0) cell.centroid /= cell.volume;
+  }
+  for (std::size_t p = 0; p < body.pieces.size(); ++p) {
+    const VoxelPiece& piece = body.pieces[p];
+    MassProperties& cell = cells[cellOfPiece[p]];
+    const Vector3d r = piece.centre - cell.centroid;
+    const Vector3d own(face / 12, face / 12, piece.height * piece.height / 12);  // of a box about its centre
+    Eigen::Matrix3d moment = r * r.transpose();
+    moment.diagonal() += own;
+    cell.secondMoment += face * piece.height * moment;
+  }
+  for (MassProperties& cell : cells) {
+    cell.volume *= volume / total;
+    cell.secondMoment *= volume / total;
+  }
+  return cells;
+}
+
+static std::map<std::pair<int, int>, double> contactAreas(const VoxelBody& body, const std::vector<int>& cellOfPiece) {
+  std::map<std::pair<int, int>, double> areas;
+  const std::array<std::size_t, 3> stride = {static_cast<std::size_t>(body.count[1]) * body.count[2],
+                                             static_cast<std::size_t>(body.count[2]), 1};
+  for (std::size_t p = 0; p < body.pieces.size(); ++p) {
+    const VoxelPiece& piece = body.pieces[p];
+    const std::size_t at = piece.index[0] * stride[0] + piece.index[1] * stride[1] + piece.index[2];
+    if (body.pieceAt[at] != static_cast<int>(p)) continue;  // a second piece of the same voxel
+    for (int a = 0; a < 3; ++a) {
+      if (piece.index[a] + 1 >= body.count[a]) continue;
+      const int neighbour = body.pieceAt[at + stride[a]];
+      if (neighbour < 0 || cellOfPiece[neighbour] == cellOfPiece[p]) continue;
+      areas[std::minmax(cellOfPiece[p], cellOfPiece[neighbour])] += body.size * body.size;
+    }
+  }
+  return areas;
+}
+
+PowerCells divideByPower(const VoxelBody& body, const std::vector<Ball>& balls, double volume) {
+  PowerCells result;
+  const double smallest = 8 * body.size * body.size * body.size;  // below, a cell is no more than noise of the voxels
+  for (const double share : {1., 0.5, 0.25, 0.}) {
+    result.sites = {};
+    for (const Ball& ball : balls) {
+      result.sites.centres.push_back(ball.centre);
+      result.sites.weights.push_back(share * ball.radius * ball.radius);
+    }
+    result.cellOfPiece = leastPower(body, result.sites);
+    result.cells = integrate(body, result.cellOfPiece, balls.size(), volume);
+    if (std::all_of(result.cells.begin(), result.cells.end(),
+                    [&](const MassProperties& c) { return c.volume > smallest; })) {
+      break;
+    }
+  }
+  result.contactArea = contactAreas(body, result.cellOfPiece);
+  return result;
+}
+
+}  // namespace medulla

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "physics/model/mass_properties.h"
+#include "physics/model/medial_balls.h"
+
+namespace medulla {
+
+// A piece of a voxel inside the mesh: the whole of it in x and y, exact in z.
+struct VoxelPiece {
+  std::array<int, 3> index;  // of the voxel
+  Eigen::Vector3d centre;    // m
+  double height = 0;         // m, along z, at most the voxel's size
+};
+
+struct VoxelBody {
+  double size = 0;                 // m, edge of a voxel
+  std::array<int, 3> count{};
+  std::vector<VoxelPiece> pieces;  // by x, y, then z
+  std::vector<int> pieceAt;        // first piece of voxel (i * count[1] + j) * count[2] + k, -1 where empty
+};
+
+// The solid inside a closed mesh of that volume (m3) as about `target` voxels. Every column is cut exactly along z, so
+// that the volume converges faster than by counting voxels.
+VoxelBody voxelise(const TriangleMesh& mesh, double volume, int target);
+
+// Cell of a ball: the points whose power |x - centre|^2 - weight is least there (Aurenhammer 1987). Weight radius^2
+// gives the power diagram, 0 the Voronoi diagram.
+struct PowerSites {
+  std::vector<Eigen::Vector3d> centres;  // m
+  std::vector<double> weights;           // m2
+};
+
+struct PowerCells {
+  PowerSites sites;
+  std::vector<int> cellOfPiece;
+  std::vector<MassProperties> cells;                  // volumes scaled so that they sum to the mesh's
+  std::map<std::pair<int, int>, double> contactArea;  // m2, lower cell first; voxel faces between the two
+};
+
+// Cells of the balls within the body. Balls whose cell would be empty shrink their neighbours' weights for all: from
+// the power diagram towards the Voronoi diagram, in which every inner centre owns its surroundings. A cell can stay
+// empty (volume 0) where two centres share a voxel or one lies outside.
+PowerCells divideByPower(const VoxelBody& body, const std::vector<Ball>& balls, double volume);
+
+}  // namespace medulla
