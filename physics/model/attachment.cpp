@@ -1,7 +1,8 @@
 #include "physics/model/attachment.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
+
+#include "physics/model/mesh_topology.h"
 
 namespace medulla {
 
@@ -14,6 +15,11 @@ struct Anchor {
   Attachment attachment;
 };
 
+double footOnLink(const Vector3d& node, const ElasticLink& link, const std::vector<FillingSphere>& spheres) {
+  const Vector3d start = spheres[link.sphere0].restFrame, line = spheres[link.sphere1].restFrame - start;
+  return (node - start).dot(line) / line.squaredNorm();
+}
+
 // Every sphere, and every link whose interior holds the foot of the perpendicular, nearest first.
 std::vector<Anchor> anchorsOf(const Vector3d& node, const std::vector<FillingSphere>& spheres,
                               const std::vector<ElasticLink>& links) {
@@ -25,14 +31,13 @@ std::vector<Anchor> anchorsOf(const Vector3d& node, const std::vector<FillingSph
     anchors.push_back({a.restOffset.norm(), a});
   }
   for (std::size_t i = 0; i < links.size(); ++i) {
-    const Vector3d start = spheres[links[i].sphere0].restFrame, line = spheres[links[i].sphere1].restFrame - start;
-    const double along = (node - start).dot(line) / line.squaredNorm();
+    const double along = footOnLink(node, links[i], spheres);
     if (!(along > 0 && along < 1)) continue;
     Attachment a;
     a.onLink = true;
     a.host = static_cast<int>(i);
     a.along = along;
-    a.restOffset = node - (start + along * line);
+    a.restOffset = node - restAnchor(a, spheres, links);
     anchors.push_back({a.restOffset.norm(), a});
   }
   std::stable_sort(anchors.begin(), anchors.end(),
@@ -54,12 +59,26 @@ std::vector<Attachment> attachNodes(const TriangleMesh& mesh, const SurfaceTree&
     });
     attachments.push_back(visible != anchors.end() ? visible->attachment : anchors.front().attachment);
   }
-  for (const std::array<int, 3>& t : mesh.triangles) {
-    const Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
-    const double third = (b - a).cross(c - a).norm() / 6;
-    for (const int corner : t) attachments[corner].area += third;
-  }
+  const std::vector<double> areas = vertexAreas(mesh);
+  for (std::size_t n = 0; n < attachments.size(); ++n) attachments[n].area = areas[n];
   return attachments;
+}
+
+void reprojectAttachments(const TriangleMesh& mesh, const std::vector<FillingSphere>& spheres,
+                          const std::vector<ElasticLink>& links, std::vector<Attachment>& attachments) {
+  for (std::size_t n = 0; n < attachments.size(); ++n) {
+    Attachment& a = attachments[n];
+    if (a.onLink) {
+      const ElasticLink& link = links[a.host];
+      a.along = footOnLink(mesh.vertices[n], link, spheres);
+      if (a.along <= 0 || a.along >= 1) {
+        a.onLink = false;
+        a.host = a.along <= 0 ? link.sphere0 : link.sphere1;
+        a.along = 0;
+      }
+    }
+    a.restOffset = mesh.vertices[n] - restAnchor(a, spheres, links);
+  }
 }
 
 Vector3d restAnchor(const Attachment& a, const std::vector<FillingSphere>& spheres,

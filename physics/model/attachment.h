@@ -13,6 +13,11 @@ namespace medulla {
 std::vector<Attachment> attachNodes(const TriangleMesh& mesh, const SurfaceTree& tree,
                                     const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links);
 
+// Keeps what every node hangs on and renews where: the foot on its link after the frames have moved, or the link's end
+// where the foot has left it.
+void reprojectAttachments(const TriangleMesh& mesh, const std::vector<FillingSphere>& spheres,
+                          const std::vector<ElasticLink>& links, std::vector<Attachment>& attachments);
+
 // The point of the skeleton that an attachment hangs on at rest, m.
 Eigen::Vector3d restAnchor(const Attachment& attachment, const std::vector<FillingSphere>& spheres,
                            const std::vector<ElasticLink>& links);

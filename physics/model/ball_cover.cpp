@@ -10,8 +10,8 @@ namespace medulla {
 
 namespace {
 
-using Gaps = Eigen::ArrayXf;        // per sample, in % of the diagonal, 0 inside the ball
-using GapTable = Eigen::ArrayXXf;   // samples x candidates
+using Gaps = Eigen::ArrayXf;       // per sample, in % of the diagonal, 0 inside the ball
+using GapTable = Eigen::ArrayXXf;  // samples x candidates
 
 struct Samples {
   Eigen::Matrix3Xf points;  // % of the diagonal

@@ -15,6 +15,7 @@
 #include "physics/model/link_sections.h"
 #include "physics/model/mass_properties.h"
 #include "physics/model/medial_balls.h"
+#include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
 #include "physics/model/power_cells.h"
 #include "physics/model/render_surface.h"
@@ -56,18 +57,17 @@ void checkSettings(const BuildSettings& s) {
 Shape measureShape(const TriangleMesh& mesh) {
   if (mesh.triangles.empty()) throw std::runtime_error("the mesh has no triangles; expected a closed surface");
   Shape shape{mesh, makeSurfaceTree(mesh), massProperties(mesh), 0};
-  shape.diagonal = (shape.tree.nodes[0].high - shape.tree.nodes[0].low).norm();
+  shape.diagonal = boundsDiagonal(mesh);
   if (!(shape.exact.volume > 0)) throw std::runtime_error("the mesh encloses no volume; expected an outward surface");
   return shape;
 }
 
 std::vector<Ball> chooseBalls(const Shape& shape, int count, const Progress& progress) {
   const int candidates = std::max(2500, 3 * count), samples = std::max(3000, 3 * count);
-  const std::vector<Ball> medial =
-      medialBalls(shape.tree, sampleSurface(shape.mesh, candidates, 1), shape.diagonal);
+  const std::vector<Ball> medial = medialBalls(shape.tree, sampleSurface(shape.mesh, candidates, 1), shape.diagonal);
   if (static_cast<int>(medial.size()) < count) {
-    throw std::runtime_error(fmt::format("the mesh holds {} inscribed balls; {} spheres were asked for",
-                                         medial.size(), count));
+    throw std::runtime_error(
+        fmt::format("the mesh holds {} inscribed balls; {} spheres were asked for", medial.size(), count));
   }
   std::vector<Vector3d> points;
   for (const SurfaceSample& s : sampleSurface(shape.mesh, samples, 2)) points.push_back(s.point);
@@ -78,11 +78,11 @@ std::vector<Ball> chooseBalls(const Shape& shape, int count, const Progress& pro
   return coverWithBalls(shape.tree, medial, points, shape.diagonal, count, progress);
 }
 
-// Spheres without material of their own give theirs up to the rest; links to them pass to their nearest neighbour.
-void dropEmptyCells(const VoxelBody& voxels, double volume, SpheresAndLinks& s) {
+// Spheres without material of their own are dropped; links to them pass to the nearest other sphere.
+void dropEmptyCells(const VoxelBody& voxels, const MassProperties& exact, SpheresAndLinks& s) {
   for (;;) {
-    const auto empty = std::find_if(s.cells.cells.begin(), s.cells.cells.end(),
-                                    [](const MassProperties& c) { return c.volume <= 0; });
+    const auto empty =
+        std::find_if(s.cells.cells.begin(), s.cells.cells.end(), [](const MassProperties& c) { return c.volume <= 0; });
     if (empty == s.cells.cells.end()) return;
     if (s.balls.size() == 1) throw std::runtime_error("the mesh is too thin for a single sphere");
     const int gone = static_cast<int>(empty - s.cells.cells.begin());
@@ -102,7 +102,7 @@ void dropEmptyCells(const VoxelBody& voxels, double volume, SpheresAndLinks& s) 
     s.links.erase(std::unique(s.links.begin(), s.links.end()), s.links.end());
     std::erase_if(s.links, [](const std::array<int, 2>& l) { return l[0] == l[1]; });
     s.balls.erase(s.balls.begin() + gone);
-    s.cells = divideByPower(voxels, s.balls, volume);
+    s.cells = divideByPower(voxels, s.balls, exact);
   }
 }
 
@@ -111,8 +111,8 @@ SpheresAndLinks spheresOfSkeleton(const Shape& shape, const Skeleton& skeleton, 
   SpheresAndLinks s;
   for (const Vector3d& node : skeleton.nodes) s.balls.push_back({node, inscribedRadius(shape.tree, node)});
   for (const std::array<int, 2>& link : skeleton.links) s.links.push_back({link[0], link[1]});
-  s.cells = divideByPower(voxels, s.balls, shape.exact.volume);
-  dropEmptyCells(voxels, shape.exact.volume, s);
+  s.cells = divideByPower(voxels, s.balls, shape.exact);
+  dropEmptyCells(voxels, shape.exact, s);
   std::vector<Vector3d> centres;
   for (const Ball& ball : s.balls) centres.push_back(ball.centre);
   joinComponents(centres, s.links);
@@ -124,32 +124,34 @@ SpheresAndLinks spheresByCover(const Shape& shape, const Skeleton& skeleton, con
                                const Progress& progress) {
   SpheresAndLinks s;
   s.balls = chooseBalls(shape, count, progress);
-  s.cells = divideByPower(voxels, s.balls, shape.exact.volume);
-  dropEmptyCells(voxels, shape.exact.volume, s);
+  s.cells = divideByPower(voxels, s.balls, shape.exact);
+  dropEmptyCells(voxels, shape.exact, s);
   s.links = linkCells(shape.tree, s.cells, s.balls, isTubular(shape.mesh, shape.tree, skeleton));
   return s;
 }
 
-std::vector<FillingSphere> fillingSpheres(const SpheresAndLinks& s) {
-  std::vector<FillingSphere> spheres;
+// Where nodes hang depends on the frames, and the frames on the mass that hangs. Some rounds choose what every node
+// hangs on, the others only slide along: choosing to the end can swing between two hosts for ever.
+void hangNodesAndShareMass(const Shape& shape, const SpheresAndLinks& s, double massFraction, SoftBodyModel& model) {
+  constexpr int choosingRounds = 3, slidingRounds = 8;
   for (std::size_t i = 0; i < s.balls.size(); ++i) {
     const MassProperties& cell = s.cells.cells[i];
-    spheres.push_back({s.balls[i].centre, s.balls[i].radius, cell.centroid, cell.volume, cell.secondMoment});
+    model.spheres.push_back({s.balls[i].centre, s.balls[i].radius, cell.centroid, cell.volume, cell.secondMoment});
   }
-  return spheres;
-}
-
-std::vector<std::array<int, 2>> edgesOf(const std::vector<std::array<int, 3>>& triangles) {
-  std::vector<std::array<int, 2>> edges;
-  for (const std::array<int, 3>& t : triangles) {
-    for (int k = 0; k < 3; ++k) {
-      const auto [low, high] = std::minmax(t[k], t[(k + 1) % 3]);
-      edges.push_back({low, high});
+  for (const std::array<int, 2>& pair : s.links) {
+    model.links.emplace_back();
+    model.links.back().sphere0 = pair[0];
+    model.links.back().sphere1 = pair[1];
+  }
+  for (int round = 0; round < choosingRounds + slidingRounds; ++round) {
+    if (round < choosingRounds) {
+      model.attachments = attachNodes(shape.mesh, shape.tree, model.spheres, model.links);
+    } else {
+      reprojectAttachments(shape.mesh, model.spheres, model.links, model.attachments);
     }
+    shareOutMass(model.restNodes, s.cells.cells, massFraction, model.links, model.attachments, model.spheres);
   }
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-  return edges;
+  reprojectAttachments(shape.mesh, model.spheres, model.links, model.attachments);
 }
 
 }  // namespace
@@ -191,7 +193,7 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
   model.nodeOfInputVertex = repaired.vertexOfInput;
   model.restNodes = shape.mesh.vertices;
   model.triangles = shape.mesh.triangles;
-  model.edges = edgesOf(shape.mesh.triangles);
+  model.edges = uniqueEdges(shape.mesh);
   model.skeleton = collapseEdges(shape.mesh);
   done(0.05);
 
@@ -202,13 +204,9 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
                                 : spheresByCover(shape, model.skeleton, voxels, settings.spheres,
                                                  [&](double part) { done(0.1 + 0.6 * part); });
   done(0.7);
-  model.spheres = fillingSpheres(s);
-  model.links = measureLinks(shape.mesh, s.cells.sites, model.spheres, s.links);
-  model.attachments = attachNodes(shape.mesh, shape.tree, model.spheres, model.links);
-  setNodeVolumes(model.restNodes, shape.exact, settings.surfaceMassFraction, model.spheres, model.links,
-                 model.attachments);
-  model.buckets =
-      fillBuckets(model.triangles, model.attachments, static_cast<int>(model.spheres.size()), model.links);
+  hangNodesAndShareMass(shape, s, settings.surfaceMassFraction, model);
+  measureLinks(shape.mesh, s.cells.sites, model.spheres, model.links);
+  model.buckets = fillBuckets(model.triangles, model.attachments, static_cast<int>(model.spheres.size()), model.links);
   done(0.8);
   model.renderSurface = makeRenderSurface(shape.mesh, settings.renderLevels, fine);
   done(0.9);

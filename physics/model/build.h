@@ -20,16 +20,17 @@ constexpr int spheresMax = 2000;  // the choice of balls needs spheres^2 memory 
 struct BuildSettings {
   BuildMethod method = BuildMethod::cover;
   int spheres = 7;  // 1..spheresMax; cover only: the skeleton's node count follows from the mesh
-  double surfaceMassFraction = 0.2;  // of the body's mass, carried by the surface nodes, 0..0.4; more allows larger substeps
+  double surfaceMassFraction =
+      0.2;               // of the body's mass, carried by the surface nodes, 0..0.4; more allows larger substeps
   int renderLevels = 2;  // 0..4 Loop subdivisions of the physics mesh for the drawn surface
 };
 
 // How good the model is. Lengths in % of the bounding box's diagonal.
 struct BuildReport {
   int triangles = 0, skeletonNodes = 0, skeletonLinks = 0, spheres = 0, links = 0;
-  double gapMax = 0, gapMean = 0;      // surface to the nearest ball
-  double gapConesMax = 0;              // surface to the nearest ball or link cone
-  double cover = 0, coverCones = 0;    // % of the volume inside balls; inside balls and cones
+  double gapMax = 0, gapMean = 0;                           // surface to the nearest ball
+  double gapConesMax = 0;                                   // surface to the nearest ball or link cone
+  double cover = 0, coverCones = 0;                         // % of the volume inside balls; inside balls and cones
   double massError = 0, centreError = 0, inertiaError = 0;  // %, model against mesh (centre: of the diagonal)
   int components = 0, centresOutside = 0, attachmentsCrossing = 0;
   double attachmentMax = 0;

@@ -13,7 +13,8 @@ using Eigen::Vector3d;
 
 double signedDistanceToCone(const Vector3d& p, const Ball& a, const Ball& b) {
   // In the half plane through the axis: the cone's flank is the common tangent of the two circles. The distance to the
-  // nearest of the balls in between, at s in 0..1, is least where the line from p meets the axis at the tangent's slant.
+  // nearest of the balls in between, at s in 0..1, is least where the line from p meets the axis at the tangent's
+  // slant.
   const Vector3d axis = b.centre - a.centre;
   const double length = axis.norm(), shrink = a.radius - b.radius;
   if (length <= std::abs(shrink)) {  // one ball holds the other
@@ -82,9 +83,9 @@ void measureCover(const SoftBodyModel& model, const std::vector<Ball>& balls, co
 }
 
 void measureMasses(const SoftBodyModel& model, const MassProperties& exact, double diagonal, BuildReport& report) {
-  const std::vector<MassProperties> reduced =
-      reducedSpheres(model.restNodes, model.spheres, model.links, model.attachments);
-  const MassProperties total = totalOf(reduced, model.restNodes, model.attachments);
+  const std::vector<MassProperties> remaining =
+      remainingSpheres(model.restNodes, model.spheres, model.links, model.attachments);
+  const MassProperties total = totalOf(remaining, model.restNodes, model.attachments);
   report.massError = std::abs(total.volume / exact.volume - 1) * 100;
   report.centreError = (total.centroid - exact.centroid).norm() / diagonal * 100;
   const Eigen::Matrix3d expected = inertia(exact.secondMoment);

@@ -11,7 +11,9 @@ namespace {
 
 using Edge = std::pair<int, int>;  // lower node first
 
-Edge edgeOf(int a, int b) { return a < b ? Edge(a, b) : Edge(b, a); }
+Edge edgeOf(int a, int b) {
+  return a < b ? Edge(a, b) : Edge(b, a);
+}
 
 // The mesh on its way to a skeleton. Every edge with a triangle is in `queue`; every edge without is in `skeletal`.
 struct Complex {
@@ -50,7 +52,9 @@ Complex makeComplex(const TriangleMesh& mesh) {
   return c;
 }
 
-bool hasNode(const std::array<int, 3>& t, int node) { return t[0] == node || t[1] == node || t[2] == node; }
+bool hasNode(const std::array<int, 3>& t, int node) {
+  return t[0] == node || t[1] == node || t[2] == node;
+}
 
 bool edgeHasTriangle(const Complex& c, int a, int b) {
   return std::any_of(c.trianglesOf[a].begin(), c.trianglesOf[a].end(),
@@ -102,8 +106,7 @@ void collapse(Complex& c, int kept, int gone) {
     for (const int other : c.neighbours[end]) c.queue.erase(queueKey(c, end, other));
   }
   if (!c.fixed[kept]) {
-    c.positions[kept] =
-        c.fixed[gone] ? c.positions[gone] : ((c.positions[kept] + c.positions[gone]) / 2).eval();
+    c.positions[kept] = c.fixed[gone] ? c.positions[gone] : ((c.positions[kept] + c.positions[gone]) / 2).eval();
   }
   c.fixed[kept] = c.fixed[kept] | c.fixed[gone];
   c.alive[gone] = 0;

@@ -124,8 +124,8 @@ bool isTubular(const TriangleMesh& mesh, const SurfaceTree& tree, const Skeleton
       const Plane plane = planeAcross(a + (k + 0.5) / stations * along, along.normalized());
       const SectionMoments section = planeSection(mesh, plane);
       if (section.area <= 0) continue;
-      const double radius = inscribedRadius(
-          tree, plane.origin + section.centroid.x() * plane.u + section.centroid.y() * plane.v);
+      const double radius =
+          inscribedRadius(tree, plane.origin + section.centroid.x() * plane.u + section.centroid.y() * plane.v);
       fills.push_back(3.14159265358979 * radius * radius / section.area);
     }
   }

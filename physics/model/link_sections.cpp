@@ -26,23 +26,24 @@ static SectionMoments disc(double radius) {
 
 static std::vector<SectionMoments> sectionsAlong(const TriangleMesh& mesh, const PowerSites& sites,
                                                  const Eigen::Vector3d& start, const Eigen::Vector3d& end,
-                                                 const Plane& across, const std::array<int, 2>& pair) {
+                                                 const Plane& across, std::pair<int, int> pair) {
   std::vector<SectionMoments> sections;
   double largest = 0;
   for (int k = 0; k < stations; ++k) {
     const Plane plane{start + (k + 0.5) / stations * (end - start), across.u, across.v};
-    sections.push_back(planeSection(mesh, plane, &sites, {pair[0], pair[1]}));
+    sections.push_back(planeSection(mesh, plane, &sites, pair));
     largest = std::max(largest, sections.back().area);
   }
   std::erase_if(sections, [&](const SectionMoments& s) { return s.area <= 0.01 * largest; });
   return sections;
 }
 
-static ElasticLink measureLink(const TriangleMesh& mesh, const PowerSites& sites,
-                               const std::vector<FillingSphere>& spheres, const std::array<int, 2>& pair) {
-  const FillingSphere &s0 = spheres[pair[0]], &s1 = spheres[pair[1]];
+static void measureLink(const TriangleMesh& mesh, const PowerSites& sites, const std::vector<FillingSphere>& spheres,
+                        ElasticLink& link) {
+  const FillingSphere &s0 = spheres[link.sphere0], &s1 = spheres[link.sphere1];
   const Plane across = planeAcross(s0.restFrame, (s1.restFrame - s0.restFrame).normalized());
-  std::vector<SectionMoments> sections = sectionsAlong(mesh, sites, s0.restFrame, s1.restFrame, across, pair);
+  std::vector<SectionMoments> sections =
+      sectionsAlong(mesh, sites, s0.restFrame, s1.restFrame, across, {link.sphere0, link.sphere1});
   if (sections.empty()) sections.push_back(disc(std::min(s0.radius, s1.radius)));
 
   double stretch = 0, twist = 0;
@@ -53,9 +54,6 @@ static ElasticLink measureLink(const TriangleMesh& mesh, const PowerSites& sites
     bend += s.secondMoment.inverse();
   }
   const auto count = static_cast<double>(sections.size());
-  ElasticLink link;
-  link.sphere0 = pair[0];
-  link.sphere1 = pair[1];
   link.area = count / stretch;
   link.torsionConstant = count / twist;
   // Principal axes of the mean tensor. Bending about an axis is resisted by the extent across it.
@@ -64,15 +62,11 @@ static ElasticLink measureLink(const TriangleMesh& mesh, const PowerSites& sites
   link.restU = (axis.x() * across.u + axis.y() * across.v).normalized();
   link.bendingMomentU = principal.eigenvalues()[1];
   link.bendingMomentV = principal.eigenvalues()[0];
-  return link;
 }
 
-std::vector<ElasticLink> measureLinks(const TriangleMesh& mesh, const PowerSites& sites,
-                                      const std::vector<FillingSphere>& spheres, const SphereLinks& pairs) {
-  std::vector<ElasticLink> links;
-  links.reserve(pairs.size());
-  for (const std::array<int, 2>& pair : pairs) links.push_back(measureLink(mesh, sites, spheres, pair));
-  return links;
+void measureLinks(const TriangleMesh& mesh, const PowerSites& sites, const std::vector<FillingSphere>& spheres,
+                  std::vector<ElasticLink>& links) {
+  for (ElasticLink& link : links) measureLink(mesh, sites, spheres, link);
 }
 
 }  // namespace medulla

@@ -15,13 +15,26 @@ MassProperties massProperties(const TriangleMesh& mesh) {
     const double volume = a.dot(b.cross(c)) / 6;
     m.volume += volume;
     first += volume / 4 * sum;
-    m.secondMoment +=
-        volume / 20 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose());
+    m.secondMoment += volume / 20 * (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose());
   }
   const Eigen::Vector3d centroid = first / m.volume;
   m.secondMoment -= m.volume * centroid * centroid.transpose();
   m.centroid = origin + centroid;
   return m;
+}
+
+MassProperties combined(const std::vector<MassProperties>& parts) {
+  MassProperties total;
+  for (const MassProperties& part : parts) {
+    total.volume += part.volume;
+    total.centroid += part.volume * part.centroid;
+  }
+  total.centroid /= total.volume;
+  for (const MassProperties& part : parts) {
+    const Eigen::Vector3d r = part.centroid - total.centroid;
+    total.secondMoment += part.secondMoment + part.volume * r * r.transpose();
+  }
+  return total;
 }
 
 }  // namespace medulla

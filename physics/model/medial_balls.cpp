@@ -10,7 +10,8 @@ Ball shrinkBall(const SurfaceTree& tree, const Eigen::Vector3d& p, const Eigen::
   for (int k = 0; k < iterations; ++k) {
     const SurfacePoint nearest = closestPoint(tree, p + radius * inward);
     if (nearest.distance >= radius * (1 - 1e-6)) break;
-    // The ball through p and the nearest point q, tangent at p: |p + r n - q| = r gives r = |w|^2 / (-2 w.n), w = p - q.
+    // The ball through p and the nearest point q, tangent at p: |p + r n - q| = r gives r = |w|^2 / (-2 w.n), w = p -
+    // q.
     const Eigen::Vector3d w = p - nearest.point;
     const double denominator = -2 * w.dot(inward);
     if (denominator <= 0) break;

@@ -48,8 +48,8 @@ Interval cellInterval(const PowerSites& sites, int site, const Vector3d& start, 
     if (static_cast<int>(k) == site) continue;
     // power(a) - power(k) = at + slope t along the line
     const Vector3d towards = sites.centres[k] - a;
-    const double at = (start - a).squaredNorm() - sites.weights[site] - (start - sites.centres[k]).squaredNorm() +
-                      sites.weights[k];
+    const double at =
+        (start - a).squaredNorm() - sites.weights[site] - (start - sites.centres[k]).squaredNorm() + sites.weights[k];
     const double slope = 2 * towards.dot(along);
     if (slope > 0) {
       part.high = std::min(part.high, -at / slope);

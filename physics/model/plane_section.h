@@ -16,9 +16,9 @@ struct Plane {
 
 // Plane region: area, centroid and second moments, with the plane's u and v as axes.
 struct SectionMoments {
-  double area = 0;                                            // m2
-  Eigen::Vector2d centroid = Eigen::Vector2d::Zero();         // m
-  Eigen::Matrix2d secondMoment = Eigen::Matrix2d::Zero();     // m4, integral of r r^T about the centroid
+  double area = 0;                                         // m2
+  Eigen::Vector2d centroid = Eigen::Vector2d::Zero();      // m
+  Eigen::Matrix2d secondMoment = Eigen::Matrix2d::Zero();  // m4, integral of r r^T about the centroid
 };
 
 // Section of the solid inside the mesh, on scan lines along u. With `sites`, only the part within the power cells of

@@ -19,7 +19,7 @@ struct VoxelPiece {
 };
 
 struct VoxelBody {
-  double size = 0;                 // m, edge of a voxel
+  double size = 0;  // m, edge of a voxel
   std::array<int, 3> count{};
   std::vector<VoxelPiece> pieces;  // by x, y, then z
   std::vector<int> pieceAt;        // first piece of voxel (i * count[1] + j) * count[2] + k, -1 where empty
@@ -39,13 +39,13 @@ struct PowerSites {
 struct PowerCells {
   PowerSites sites;
   std::vector<int> cellOfPiece;
-  std::vector<MassProperties> cells;                  // volumes scaled so that they sum to the mesh's
+  std::vector<MassProperties> cells;                  // together exactly the mesh's
   std::map<std::pair<int, int>, double> contactArea;  // m2, lower cell first; voxel faces between the two
 };
 
 // Cells of the balls within the body. Balls whose cell would be empty shrink their neighbours' weights for all: from
 // the power diagram towards the Voronoi diagram, in which every inner centre owns its surroundings. A cell can stay
 // empty (volume 0) where two centres share a voxel or one lies outside.
-PowerCells divideByPower(const VoxelBody& body, const std::vector<Ball>& balls, double volume);
+PowerCells divideByPower(const VoxelBody& body, const std::vector<Ball>& balls, const MassProperties& exact);
 
 }  // namespace medulla

@@ -13,32 +13,36 @@ namespace medulla {
 
 // A filling sphere (paper 2.2): a ball, which is geometry, and a frame, which is mechanics.
 struct FillingSphere {
-  Eigen::Vector3d restBallCentre;  // m; the ball is inscribed in the mesh: contact and buckets use it
-  double radius = 0;               // m
-  Eigen::Vector3d restFrame;       // m; centroid of the sphere's power cell: mass and link ends sit here
-  double volume = 0;               // m3 of the power cell, the share of its surface nodes included
-  Eigen::Matrix3d secondMoment;    // m5, integral of r r^T over the power cell about restFrame
+  Eigen::Vector3d restBallCentre = Eigen::Vector3d::Zero();  // m; inscribed in the mesh: contact and buckets use it
+  double radius = 0;                                         // m
+  // m; link ends sit here, and so does the mass: centroid of the power cell less the shares of its surface nodes
+  // (node_volumes.h), of the whole cell where nodes carry no mass.
+  Eigen::Vector3d restFrame = Eigen::Vector3d::Zero();
+  double volume = 0;  // m3 of the power cell, the share of its surface nodes included
+  Eigen::Matrix3d secondMoment = Eigen::Matrix3d::Zero();  // m5, integral of r r^T over that cell about restFrame
 };
 
 // An elastic link (paper 2.2, figure 3) between the frames of two spheres. The section is that of an equivalent
 // uniform beam: bending and torsion of the tapered body averaged as compliances along the link.
 struct ElasticLink {
   int sphere0 = 0, sphere1 = 0;
-  double area = 0;           // m2
-  double bendingMomentU = 0;   // m4, second moment of area that resists bending about restU
-  double bendingMomentV = 0;   // m4, the same about restV
-  double torsionConstant = 0;  // m4, Saint-Venant
-  Eigen::Vector3d restU;     // unit, perpendicular to the centre line; V = (centre line) x U; principal axes of the section
+  double area = 0;                                  // m2
+  double bendingMomentU = 0;                        // m4, second moment of area that resists bending about restU
+  double bendingMomentV = 0;                        // m4, the same about restV
+  double torsionConstant = 0;                       // m4, Saint-Venant
+  Eigen::Vector3d restU = Eigen::Vector3d::Zero();  // unit, perpendicular to the centre line; V = (centre line) x U;
+                                                    // principal axes of the section
 };
 
 // How a surface node hangs on the skeleton (paper 2.3).
 struct Attachment {
   bool onLink = false;
-  int host = 0;             // link index if onLink, else sphere index
-  double along = 0;         // 0..1 from sphere0 to sphere1 of the link; 0 on a sphere
-  Eigen::Vector3d restOffset;  // m, model frame, from the anchor on the skeleton to the node; perpendicular to a link
-  double area = 0;          // m2, a third of the triangles around the node
-  double volume = 0;        // m3, share of the body's volume whose mass the node carries when it is dynamic
+  int host = 0;      // link index if onLink, else sphere index
+  double along = 0;  // 0..1 from sphere0 to sphere1 of the link; 0 on a sphere
+  Eigen::Vector3d restOffset =
+      Eigen::Vector3d::Zero();  // m, model frame, from the anchor on the skeleton to the node; perpendicular to a link
+  double area = 0;              // m2, a third of the triangles around the node
+  double volume = 0;            // m3, share of the body's volume whose mass the node carries when it is dynamic
 };
 
 // The surface that is drawn, evaluated from the nodes: x = sum w_i x_i + frame * offset, where the frame's columns are
@@ -48,7 +52,7 @@ struct RenderSurface {
   std::vector<int> first;  // size vertices + 1: stencil of vertex k is [first[k], first[k+1])
   std::vector<int> node;
   std::vector<float> weight, tangent0, tangent1;
-  std::vector<std::array<float, 3>> offset;       // m, in the frame above; zero where no fine shape is given
+  std::vector<std::array<float, 3>> offset;        // m, in the frame above; zero where no fine shape is given
   std::vector<std::array<float, 3>> restPosition;  // m, model frame: drives textures
   std::vector<std::array<int, 3>> triangles;
 };
@@ -71,8 +75,8 @@ struct SoftBodyModel {
 
   std::vector<FillingSphere> spheres;
   std::vector<ElasticLink> links;
-  std::vector<Attachment> attachments;     // one per node
-  std::vector<std::vector<int>> buckets;   // triangles of each sphere; every triangle in exactly one (paper 4)
+  std::vector<Attachment> attachments;    // one per node
+  std::vector<std::vector<int>> buckets;  // triangles of each sphere; every triangle in exactly one (paper 4)
   Skeleton skeleton;
   RenderSurface renderSurface;
 };

@@ -122,7 +122,8 @@ static bool meetsBox(const SurfaceTree::Node& node, const Vector3d& origin, cons
   return enter <= leave * (1 + 1e-12) + 1e-12;
 }
 
-// Calls visit(distance, index in leaf order) for every triangle hit by the ray within reach (Moeller and Trumbore 1997).
+// Calls visit(distance, index in leaf order) for every triangle hit by the ray within reach (Moeller and Trumbore
+// 1997).
 template <typename Visit>
 static void forEachHit(const SurfaceTree& tree, const Vector3d& origin, const Vector3d& direction, double reach,
                        const Visit& visit) {
@@ -151,8 +152,8 @@ static void forEachHit(const SurfaceTree& tree, const Vector3d& origin, const Ve
 }
 
 bool isInside(const SurfaceTree& tree, const Vector3d& p) {
-  static const std::array<Vector3d, 3> directions = {
-      Vector3d(0.5773, 0.6123, 0.5401), Vector3d(-0.7071, 0.123, 0.6963), Vector3d(0.1234, -0.891, -0.4367)};
+  static const std::array<Vector3d, 3> directions = {Vector3d(0.5773, 0.6123, 0.5401), Vector3d(-0.7071, 0.123, 0.6963),
+                                                     Vector3d(0.1234, -0.891, -0.4367)};
   const SurfaceTree::Node& root = tree.nodes[0];
   if ((p.array() < root.low.array()).any() || (p.array() > root.high.array()).any()) return false;
   const double reach = 4 * (root.high - root.low).norm();

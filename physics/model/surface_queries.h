@@ -17,16 +17,16 @@ struct SurfaceTree {
     int left = -1, right = -1;  // children, or -1 in a leaf
     int begin = 0, end = 0;     // leaf: range of `triangles`
   };
-  std::vector<Node> nodes;                               // root first
-  std::vector<std::array<int, 3>> triangles;             // vertex numbers of the mesh, in leaf order
-  std::vector<std::array<Eigen::Vector3d, 3>> corners;   // of `triangles`, m
+  std::vector<Node> nodes;                              // root first
+  std::vector<std::array<int, 3>> triangles;            // vertex numbers of the mesh, in leaf order
+  std::vector<std::array<Eigen::Vector3d, 3>> corners;  // of `triangles`, m
 };
 
 SurfaceTree makeSurfaceTree(const TriangleMesh& mesh);
 
 struct SurfacePoint {
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();              // m
-  double distance = std::numeric_limits<double>::infinity();    // m; infinity where nothing lies within the bound
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();            // m
+  double distance = std::numeric_limits<double>::infinity();  // m; infinity where nothing lies within the bound
 };
 
 // The point of the surface nearest to p, if one lies nearer than `within` (m).

@@ -42,8 +42,8 @@ std::vector<SurfaceSample> sampleSurface(const TriangleMesh& mesh, int count, st
       a = 1 - a;
       b = 1 - b;
     }
-    samples.push_back({corner(t, 0) + a * (corner(t, 1) - corner(t, 0)) + b * (corner(t, 2) - corner(t, 0)),
-                       cross(t).normalized()});
+    samples.push_back(
+        {corner(t, 0) + a * (corner(t, 1) - corner(t, 0)) + b * (corner(t, 2) - corner(t, 0)), cross(t).normalized()});
   }
   return samples;
 }

@@ -12,8 +12,8 @@ namespace medulla {
 // promise.
 struct RandomSequence {
   std::uint64_t state = 0;
-  double uniform();                 // [0, 1)
-  Eigen::Vector3d normal();         // roughly standard normal in each component: sum of twelve uniforms, free of libm
+  double uniform();          // [0, 1)
+  Eigen::Vector3d normal();  // roughly standard normal in each component: sum of twelve uniforms, free of libm
 };
 
 struct SurfaceSample {

@@ -1,0 +1,287 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cstring>
+
+#include "physics/model/attachment.h"
+#include "physics/model/build.h"
+#include "physics/model/build_report.h"
+#include "physics/model/link_sections.h"
+#include "physics/model/node_volumes.h"
+#include "physics/model/plane_section.h"
+#include "tests/test_shapes.h"
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+static SoftBodyModel build(const TriangleMesh& mesh, const BuildSettings& settings, BuildReport& report) {
+  return buildModel(asRepaired(mesh), nullptr, settings, report);
+}
+
+TEST(SurfaceQueries, BallAgainstItsOwnMesh) {
+  const TriangleMesh mesh = ellipsoidMesh(4, {1, 1, 1});
+  const SurfaceTree tree = makeSurfaceTree(mesh);
+  EXPECT_TRUE(isInside(tree, {0.3, 0.4, -0.5}));
+  EXPECT_FALSE(isInside(tree, {0.3, 0.4, -0.9}));
+  EXPECT_NEAR(closestPoint(tree, {0, 0, 3}).distance, 2, 2e-3);
+  EXPECT_NEAR(inscribedRadius(tree, {0.2, 0, 0}), 0.8, 3e-3);
+  EXPECT_EQ(inscribedRadius(tree, {2, 0, 0}), 0);
+  EXPECT_NEAR(firstHit(tree, {-5, 0.1, 0.2}, Vector3d::UnitX(), 10), 5 - std::sqrt(1 - 0.05), 5e-3);
+  EXPECT_FALSE(std::isfinite(firstHit(tree, {-5, 0.1, 0.2}, Vector3d::UnitX(), 3)));
+  EXPECT_FALSE(segmentCrosses(tree, {0, 0, 0}, mesh.vertices[17], 17));
+  EXPECT_TRUE(segmentCrosses(tree, -1.5 * mesh.vertices[17], mesh.vertices[17], 17));
+}
+
+TEST(MassProperties, BoxFarFromTheOrigin) {
+  TriangleMesh mesh;
+  const Vector3d at(100, -50, 20), size(1, 2, 3);
+  for (int k = 0; k < 8; ++k) mesh.vertices.push_back(at + size.cwiseProduct(Vector3d(k & 1, k >> 1 & 1, k >> 2)));
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  const MassProperties m = massProperties(mesh);
+  EXPECT_NEAR(m.volume, 6, 1e-10);
+  EXPECT_LT((m.centroid - at - size / 2).norm(), 1e-10);
+  const Vector3d expected = 6. / 12 * size.cwiseProduct(size);
+  EXPECT_LT((m.secondMoment - Eigen::Matrix3d(expected.asDiagonal())).norm(), 1e-9);
+}
+
+TEST(PowerCells, SumToTheBodyAndVoxelsAloneAreClose) {
+  const TriangleMesh mesh = ellipsoidMesh(3, {0.05, 0.03, 0.02});
+  const MassProperties exact = massProperties(mesh);
+  const VoxelBody voxels = voxelise(mesh, exact.volume, 60000);
+  double volume = 0;
+  for (const VoxelPiece& piece : voxels.pieces) volume += voxels.size * voxels.size * piece.height;
+  EXPECT_NEAR(volume / exact.volume, 1, 1e-3);
+  const PowerCells cells = divideByPower(voxels, {{{-0.02, 0, 0}, 0.015}, {{0.015, 0, 0}, 0.018}}, exact);
+  const MassProperties sum = combined(cells.cells);
+  EXPECT_NEAR(sum.volume / exact.volume, 1, 1e-12);
+  EXPECT_LT((sum.centroid - exact.centroid).norm(), 1e-12);
+  EXPECT_LT((sum.secondMoment - exact.secondMoment).norm(), 1e-10 * exact.secondMoment.norm());
+  ASSERT_EQ(cells.contactArea.size(), 1u);
+}
+
+TEST(PlaneSection, EllipseAndItsHalves) {
+  const TriangleMesh mesh = ellipsoidMesh(5, {3, 2, 1});
+  const Plane plane{Vector3d::Zero(), Vector3d::UnitY(), Vector3d::UnitZ()};
+  const double area = 3.14159265 * 2 * 1;
+  const SectionMoments whole = planeSection(mesh, plane);
+  EXPECT_NEAR(whole.area / area, 1, 3e-3);
+  EXPECT_NEAR(whole.secondMoment(0, 0) / (area * 4 / 4), 1, 5e-3);
+  EXPECT_NEAR(whole.secondMoment(1, 1) / (area * 1 / 4), 1, 5e-3);
+  const PowerSites sites{{{0, -1, 0}, {0, 1, 0}, {5, 1, 0}}, {0, 0, 0}};
+  EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 1}).area / area, 1, 3e-3);
+  EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 2}).area / area, 0.5, 3e-3);
+}
+
+TEST(LinkSections, StraightTubeGivesItsBeam) {
+  const double radius = 0.01, pi = 3.14159265358979;
+  BuildSettings settings;
+  settings.spheres = 5;
+  BuildReport report;
+  const SoftBodyModel model = build(cylinderMesh(0.1, radius, 48, 60), settings, report);
+  const double polygon = 48 / (2 * pi) * std::sin(2 * pi / 48);  // area of the 48-gon over that of the circle
+  for (const ElasticLink& link : model.links) {
+    EXPECT_NEAR(link.area / (polygon * pi * radius * radius), 1, 0.01);
+    EXPECT_NEAR(link.bendingMomentU / (pi * std::pow(radius, 4) / 4), 1, 0.03);
+    EXPECT_NEAR(link.bendingMomentV / (pi * std::pow(radius, 4) / 4), 1, 0.03);
+    EXPECT_NEAR(link.torsionConstant / (pi * std::pow(radius, 4) / 2), 1, 0.03);
+    const Vector3d line = model.spheres[link.sphere1].restFrame - model.spheres[link.sphere0].restFrame;
+    EXPECT_NEAR(link.restU.norm(), 1, 1e-12);
+    EXPECT_NEAR(link.restU.dot(line.normalized()), 0, 1e-12);
+  }
+}
+
+TEST(BuildReportTest, ConeOfTwoBalls) {
+  const Ball a{{0, 0, 0}, 1}, b{{4, 0, 0}, 1}, point{{4, 0, 0}, 0};
+  EXPECT_NEAR(signedDistanceToCone({2, 3, 0}, a, b), 2, 1e-12);
+  EXPECT_NEAR(signedDistanceToCone({-3, 0, 0}, a, b), 2, 1e-12);
+  EXPECT_NEAR(signedDistanceToCone({2, 0, 0}, a, b), -1, 1e-12);
+  EXPECT_NEAR(signedDistanceToCone({0.25, std::sqrt(1 - 1. / 16), 0}, a, point), 0, 1e-12);  // the tangent's end
+}
+
+// What a model promises whatever it was made from.
+static void expectSound(const SoftBodyModel& model, const BuildReport& report) {
+  EXPECT_EQ(report.components, 1);
+  EXPECT_LE(report.massError, 0.1);
+  EXPECT_LE(report.centreError, 0.1);
+  EXPECT_LE(report.inertiaError, 0.5);
+  std::vector<int> owners(model.triangles.size(), 0);
+  ASSERT_EQ(model.buckets.size(), model.spheres.size());
+  for (const auto& bucket : model.buckets) {
+    for (const int t : bucket) ++owners[t];
+  }
+  for (const int count : owners) EXPECT_EQ(count, 1);
+  ASSERT_EQ(model.attachments.size(), model.restNodes.size());
+  for (std::size_t n = 0; n < model.attachments.size(); ++n) {
+    const Attachment& a = model.attachments[n];
+    EXPECT_GT(a.volume, 0);
+    EXPECT_GT(a.area, 0);
+    EXPECT_LT((restAnchor(a, model.spheres, model.links) + a.restOffset - model.restNodes[n]).norm(), 1e-12);
+    if (!a.onLink) continue;
+    EXPECT_GT(a.along, 0);
+    EXPECT_LT(a.along, 1);
+    const ElasticLink& link = model.links[a.host];
+    const Vector3d line = model.spheres[link.sphere1].restFrame - model.spheres[link.sphere0].restFrame;
+    EXPECT_NEAR(a.restOffset.dot(line.normalized()), 0, 1e-12);
+  }
+  for (const ElasticLink& link : model.links) {
+    EXPECT_LT(link.sphere0, link.sphere1);
+    EXPECT_GT(std::min({link.area, link.bendingMomentU, link.bendingMomentV, link.torsionConstant}), 0);
+  }
+  for (const MassProperties& s : remainingSpheres(model.restNodes, model.spheres, model.links, model.attachments)) {
+    EXPECT_GT(s.volume, 0);
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(s.secondMoment).eigenvalues()[0], 0);
+  }
+}
+
+TEST(ModelBuild, GallbladderOfSevenSpheres) {
+  BuildReport report;
+  const SoftBodyModel model = build(assetMesh("gallbladder/gallbladder.obj"), {}, report);
+  expectSound(model, report);
+  EXPECT_EQ(report.spheres, 7);
+  EXPECT_GE(report.links, 6);
+  EXPECT_LE(report.links, 7);
+  EXPECT_EQ(report.triangles, 466);
+  EXPECT_EQ(report.centresOutside, 0);
+  EXPECT_EQ(report.attachmentsCrossing, 0);
+  EXPECT_GE(report.coverCones, report.cover);
+  EXPECT_LE(report.gapConesMax, report.gapMax);
+}
+
+TEST(ModelBuild, BallsAreInscribed) {
+  const TriangleMesh mesh = assetMesh("gallbladder/gallbladder.obj");
+  BuildReport report;
+  BuildSettings settings;
+  settings.spheres = 25;
+  const SoftBodyModel model = build(mesh, settings, report);
+  expectSound(model, report);
+  EXPECT_EQ(report.spheres, 25);
+  EXPECT_EQ(report.attachmentsCrossing, 0);
+  const SurfaceTree tree = makeSurfaceTree(mesh);
+  for (const FillingSphere& s : model.spheres) {
+    EXPECT_LE(s.radius, inscribedRadius(tree, s.restBallCentre) * (1 + 1e-9));
+  }
+}
+
+TEST(ModelBuild, SkeletonMethodKeepsThePapersResult) {
+  BuildReport report;
+  BuildSettings settings;
+  settings.method = BuildMethod::skeleton;
+  const SoftBodyModel model = build(assetMesh("gallbladder/gallbladder.obj"), settings, report);
+  expectSound(model, report);
+  EXPECT_EQ(report.spheres, report.skeletonNodes);
+  EXPECT_EQ(report.links, report.skeletonLinks);
+}
+
+TEST(ModelBuild, OneSphereAndAPlainBall) {
+  BuildReport report;
+  BuildSettings settings;
+  settings.spheres = 1;
+  const SoftBodyModel model = build(ellipsoidMesh(3, {0.02, 0.02, 0.02}), settings, report);
+  expectSound(model, report);
+  EXPECT_TRUE(model.links.empty());
+  EXPECT_LT(report.gapMax, 1);
+  EXPECT_GT(report.cover, 96);
+  EXPECT_LT(model.spheres[0].restFrame.norm(), 1e-5);
+}
+
+TEST(ModelBuild, WithoutSurfaceMassFramesAreCentroids) {
+  BuildReport report;
+  BuildSettings settings;
+  settings.surfaceMassFraction = 0;
+  const SoftBodyModel model = build(assetMesh("gallbladder/gallbladder.obj"), settings, report);
+  for (const Attachment& a : model.attachments) EXPECT_EQ(a.volume, 0);
+  EXPECT_LE(report.inertiaError, 1e-6);
+}
+
+template <typename T>
+static void expectSameBytes(const std::vector<T>& a, const std::vector<T>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(T)), 0);
+}
+
+TEST(ModelBuild, TwoBuildsAreEqualToTheByte) {
+  const TriangleMesh mesh = assetMesh("gallbladder/gallbladder.obj");
+  BuildReport report;
+  const SoftBodyModel a = build(mesh, {}, report), b = build(mesh, {}, report);
+  EXPECT_EQ(a.meshHash, b.meshHash);
+  EXPECT_EQ(a.settings, b.settings);
+  expectSameBytes(a.restNodes, b.restNodes);
+  expectSameBytes(a.triangles, b.triangles);
+  expectSameBytes(a.edges, b.edges);
+  expectSameBytes(a.skeleton.nodes, b.skeleton.nodes);
+  expectSameBytes(a.skeleton.links, b.skeleton.links);
+  expectSameBytes(a.spheres, b.spheres);
+  EXPECT_EQ(a.buckets, b.buckets);
+  ASSERT_EQ(a.links.size(), b.links.size());
+  for (std::size_t k = 0; k < a.links.size(); ++k) {  // field by field: padding bytes are nobody's
+    EXPECT_EQ(a.links[k].sphere0, b.links[k].sphere0);
+    EXPECT_EQ(a.links[k].sphere1, b.links[k].sphere1);
+    EXPECT_EQ(a.links[k].area, b.links[k].area);
+    EXPECT_EQ(a.links[k].bendingMomentU, b.links[k].bendingMomentU);
+    EXPECT_EQ(a.links[k].bendingMomentV, b.links[k].bendingMomentV);
+    EXPECT_EQ(a.links[k].torsionConstant, b.links[k].torsionConstant);
+    EXPECT_EQ(a.links[k].restU, b.links[k].restU);
+  }
+  ASSERT_EQ(a.attachments.size(), b.attachments.size());
+  for (std::size_t k = 0; k < a.attachments.size(); ++k) {
+    EXPECT_EQ(a.attachments[k].onLink, b.attachments[k].onLink);
+    EXPECT_EQ(a.attachments[k].host, b.attachments[k].host);
+    EXPECT_EQ(a.attachments[k].along, b.attachments[k].along);
+    EXPECT_EQ(a.attachments[k].restOffset, b.attachments[k].restOffset);
+    EXPECT_EQ(a.attachments[k].area, b.attachments[k].area);
+    EXPECT_EQ(a.attachments[k].volume, b.attachments[k].volume);
+  }
+  expectSameBytes(a.renderSurface.first, b.renderSurface.first);
+  expectSameBytes(a.renderSurface.node, b.renderSurface.node);
+  expectSameBytes(a.renderSurface.weight, b.renderSurface.weight);
+  expectSameBytes(a.renderSurface.tangent0, b.renderSurface.tangent0);
+  expectSameBytes(a.renderSurface.tangent1, b.renderSurface.tangent1);
+  expectSameBytes(a.renderSurface.offset, b.renderSurface.offset);
+  expectSameBytes(a.renderSurface.restPosition, b.renderSurface.restPosition);
+  expectSameBytes(a.renderSurface.triangles, b.renderSurface.triangles);
+}
+
+TEST(ModelBuild, ProgressRisesToOne) {
+  std::vector<double> steps;
+  BuildReport report;
+  buildModel(asRepaired(assetMesh("gallbladder/gallbladder.obj")), nullptr, {}, report,
+             [&](double done) { steps.push_back(done); });
+  ASSERT_GE(steps.size(), 5u);
+  for (std::size_t k = 1; k < steps.size(); ++k) EXPECT_GE(steps[k], steps[k - 1]);
+  EXPECT_EQ(steps.back(), 1);
+}
+
+TEST(ModelBuild, RefusesSettingsOutOfRange) {
+  const RepairedMesh mesh = asRepaired(ellipsoidMesh(1, {1, 1, 1}));
+  BuildReport report;
+  BuildSettings settings;
+  settings.spheres = 0;
+  EXPECT_THROW(buildModel(mesh, nullptr, settings, report), std::runtime_error);
+  settings = {};
+  settings.surfaceMassFraction = 0.5;
+  EXPECT_THROW(buildModel(mesh, nullptr, settings, report), std::runtime_error);
+  settings = {};
+  settings.renderLevels = 5;
+  EXPECT_THROW(buildModel(mesh, nullptr, settings, report), std::runtime_error);
+  EXPECT_THROW(buildModel(RepairedMesh{}, nullptr, {}, report), std::runtime_error);
+}
+
+TEST(Buckets, MajorityThenLowerSphere) {
+  std::vector<Attachment> nodes(4);
+  for (int n = 0; n < 4; ++n) nodes[n].host = n % 3;  // on spheres 0, 1, 2, 0
+  std::vector<ElasticLink> links(1);
+  links[0].sphere0 = 1;
+  links[0].sphere1 = 2;
+  Attachment onLink;
+  onLink.onLink = true;
+  onLink.along = 0.7;
+  nodes.push_back(onLink);  // node 4: nearer to sphere 2
+  const auto buckets = fillBuckets({{0, 1, 2}, {0, 1, 3}, {1, 2, 4}}, nodes, 3, links);
+  EXPECT_EQ(buckets[0], (std::vector<int>{0, 1}));
+  EXPECT_TRUE(buckets[1].empty());
+  EXPECT_EQ(buckets[2], (std::vector<int>{2}));
+}
+
+}  // namespace medulla
