@@ -1,6 +1,12 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <tinyxml2.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <map>
+#include <regex>
+#include <set>
 
 #include "app/files/scene_rules.h"
 #include "app/files/text_file.h"
@@ -12,6 +18,7 @@ namespace {
 
 // Every element and every attribute of the format, each value other than its default.
 const char* completeScene = R"(<?xml version="1.0"?>
+<?xml-model href="scene.xsd"?>
 <scene name="complete">
   <clock servo="1000" dynamics="40" duration="12"/>
   <dynamics integrator="explicit" order="1" gravity="0 0 -9.5" substeps="16"/>
@@ -77,7 +84,7 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(s.substeps, 16);
   ASSERT_EQ(s.bodies.size(), 2u);
   const SceneBody& body = s.bodies[0];
-  EXPECT_EQ(body.line, 8);
+  EXPECT_EQ(body.line, 9);
   EXPECT_EQ(body.name, "gallbladder");
   EXPECT_EQ(body.modelPath, std::filesystem::path(folder).parent_path().string() + "/assets/gallbladder.model.xml");
   EXPECT_EQ(body.look, "gallbladder");
@@ -136,6 +143,276 @@ TEST_F(SceneFile, EveryValueOfScenerysToolsAndPictureArrives) {
   EXPECT_EQ(s.height, 480);
   EXPECT_EQ(s.fps, 25);
   EXPECT_EQ(s.goldenTimes, (std::vector<double>{0.5, 3, 7}));
+}
+
+TEST_F(SceneFile, DefaultsStandWhereNothingIsSaid) {
+  const Scene s = read(
+      "<scene name='small'><clock duration='1'/><tissue name='t'/><body name='b' model='b.xml' tissue='t' "
+      "look='liver'/>"
+      "<camera position='0 0 1' target='0 0 0'/></scene>");
+  EXPECT_EQ(s.servoRate, 1200);
+  EXPECT_EQ(s.dynamicsRate, 50);
+  EXPECT_EQ(s.gravity, Eigen::Vector3d(0, -9.81, 0));
+  EXPECT_EQ(s.substeps, 0);
+  EXPECT_EQ(s.bodies[0].surface, SurfaceMode::full);
+  EXPECT_TRUE(s.bodies[0].worldFromModel.isApprox(Eigen::Isometry3d::Identity(), 0));
+  ASSERT_EQ(s.camera.size(), 1u);
+  EXPECT_EQ(s.camera[0].fovDegrees, 60);
+  EXPECT_EQ(s.width, 1280);
+  EXPECT_TRUE(s.goldenTimes.empty());
+}
+
+TEST_F(SceneFile, AKeyAtZeroReplacesTheCamerasOwnPose) {
+  const Scene s = read(edited("<key t=\"4\"", "<key t=\"0\""));
+  ASSERT_EQ(s.camera.size(), 2u);
+  EXPECT_EQ(s.camera[0].time, 0);
+  EXPECT_EQ(s.camera[0].position, Eigen::Vector3d(0, 0.1, 0.2));
+}
+
+// One edit of the complete scene and the whole complaint that it must bring.
+struct Mistake {
+  const char *from, *to, *complaint;
+};
+
+TEST_F(SceneFile, MistakesInTheStructureNameTheLineAndWhatWasExpected) {
+  const Mistake mistakes[] = {
+      {"position=\"0.1", "positon=\"0.1", R"(x.xml:10: <body> has no attribute "positon"; did you mean "position"?)"},
+      {"<light ", "<lihgt ", R"(x.xml:24: <scene> has no child <lihgt>; did you mean "light"?)"},
+      {"<fix spheres=\"4\"", "<body spheres=\"4\"", R"(x.xml:13: <body> has no child <body>; did you mean "fix"?)"},
+      {" duration=\"12\"", "", R"(x.xml:4: <clock> lacks the attribute "duration")"},
+      {"<clock servo=\"1000\" dynamics=\"40\" duration=\"12\"/>", "", "x.xml:3: <scene> lacks a <clock>"},
+      {"<dynamics ", "<dynamics/><dynamics ", "x.xml:5: <scene> has more than 1 <dynamics>"},
+      {"young=\"6e3\"", "young=\"6e3\" young=\"7e3\"",
+       R"(x.xml:7: broken XML: an attribute is not of the form name="value", or stands twice)"},
+      {"<!-- tissues -->", "tissues", R"(x.xml:3: <scene> holds text "tissues", expected none)"},
+      {"<!-- tissues -->", "<!ENTITY x>", "x.xml:6: <!...> inside an element is not understood"},
+      {"<scene ", "<scone ", "x.xml:3: broken XML: an element is not closed where it was opened"},
+      {"</scene>", "</scene><scene/>", "x.xml:26: broken XML: more than one element or text at the top"},
+      {"name=\"second\"", "name=\"gallbladder\"",
+       R"(x.xml:16: <body> name="gallbladder": another <body> has this name)"},
+      {"name=\"liver\"", "name=\"bile_sac\"", R"(x.xml:8: <tissue> name="bile_sac": another <tissue> has this name)"},
+      {"name=\"grasper\"", "name=\"my,tool\"",
+       R"(x.xml:18: <tool> name="my,tool": expected letters, digits, _ and - only)"},
+      {"tissue=\"bile_sac\"", "tissue=\"bile_sack\"",
+       R"(x.xml:9: <body> tissue="bile_sack": no <tissue> of this name; did you mean "bile_sac"?)"},
+      {"model=\"second.model.xml\"", "model=\"\"", R"(x.xml:16: <body> model="": is empty)"},
+  };
+  for (const Mistake& m : mistakes) EXPECT_EQ(complaint(edited(m.from, m.to)), m.complaint);
+}
+
+TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
+  const Mistake mistakes[] = {
+      {"6e3", "6e3Pa", R"(x.xml:7: <tissue> young="6e3Pa": expected 1 number > 0)"},
+      {"6e3", "nan", R"(x.xml:7: <tissue> young="nan": expected 1 number > 0)"},
+      {"6e3", "inf", R"(x.xml:7: <tissue> young="inf": expected 1 number > 0)"},
+      {"6e3", "1e999", R"(x.xml:7: <tissue> young="1e999": expected 1 number > 0)"},
+      {"6e3", "0x10", R"(x.xml:7: <tissue> young="0x10": expected 1 number > 0)"},
+      {"6e3", "", R"(x.xml:7: <tissue> young="": expected 1 number > 0)"},
+      {"6e3", "0", R"(x.xml:7: <tissue> young="0": expected 1 number > 0)"},
+      {"poisson=\"0.4\"", "poisson=\"0.5\"", R"(x.xml:7: <tissue> poisson="0.5": expected 1 number >= 0 and < 0.5)"},
+      {"damping=\"0.2\"", "damping=\"-1\"", R"(x.xml:7: <tissue> damping="-1": expected 1 number >= 0)"},
+      {"0.1 0.2 0.3", "0.1 0.2", R"(x.xml:10: <body> position="0.1 0.2": expected 3 numbers)"},
+      {"0.1 0.2 0.3", "0.1 0.2 0.3 0", R"(x.xml:10: <body> position="0.1 0.2 0.3 0": expected 3 numbers)"},
+      {"0.1 0.2 0.3", "0.1,0.2,0.3", R"(x.xml:10: <body> position="0.1,0.2,0.3": expected 3 numbers)"},
+      {"0.707 0 0.707 0", "0.7 0 0.7 0",
+       R"(x.xml:11: <body> orientation="0.7 0 0.7 0": expected a unit quaternion w x y z (length within 1e-3 of 1))"},
+      {"\"springs\"", "\"beam\"", R"(x.xml:11: <body> links="beam": unknown value; known: "springs")"},
+      {"\"skin\"", "\"contact\"", R"(x.xml:11: <body> surface="contact": unknown value; known: "full", "skin")"},
+      {"\"explicit\"", "\"implicit\"",
+       R"(x.xml:5: <dynamics> integrator="implicit": unknown value; known: "explicit")"},
+      {"order=\"1\"", "order=\"2\"", R"(x.xml:5: <dynamics> order="2": unknown value; known: "1")"},
+      {"substeps=\"16\"", "substeps=\"1.5\"",
+       R"(x.xml:5: <dynamics> substeps="1.5": expected 1 integer >= 0 and <= 1e+05)"},
+      {"shape=\"mesh\"", "shape=\"box\"", R"(x.xml:17: <static> shape="box": unknown value; known: "mesh")"},
+      {"unit=\"mm\"", "unit=\"km\"", R"(x.xml:17: <static> unit="km": unknown value; known: "m", "cm", "mm", "inch")"},
+      {"servo=\"1000\"", "servo=\"1001\"",
+       R"(x.xml:4: <clock> servo="1001": expected the servo rate to be a multiple of the dynamics rate)"},
+      {"dynamics=\"40\"", "dynamics=\"10\"", R"(x.xml:4: <clock> dynamics="10": expected 1 number >= 20 and <= 1200)"},
+      {"spheres=\"0 1\"", "spheres=\"\"", R"(x.xml:12: <fix> spheres="": expected one or more integers >= 0)"},
+      {"spheres=\"0 1\"", "spheres=\"0 -1\"", R"(x.xml:12: <fix> spheres="0 -1": expected one or more integers >= 0)"},
+      {"spheres=\"4\"", "spheres=\"1\"", R"(x.xml:13: <fix> spheres="1": sphere 1 is fixed twice)"},
+      {"0.4 0.1", "0.1 0.4", R"(x.xml:18: <tool> friction="0.1 0.4": expected static >= dynamic friction)"},
+      {"<key t=\"6\"", "<key t=\"4\"", R"(x.xml:22: <key> t="4": expected a later time than the key before it)"},
+      {"target=\"0 0.01 0\"", "target=\"0 0 0.2\"",
+       R"(x.xml:20: <camera> position="0 0 0.2": position and target are the same point)"},
+      {"640 480", "641 480", R"(x.xml:25: <output> size="641 480": expected even width and height (video needs them))"},
+      {"640 480", "640 8", R"(x.xml:25: <output> size="640 8": expected 2 integers >= 16 and <= 8192)"},
+      {"0.5 3 7", "0.5 13", R"(x.xml:25: <output> golden="0.5 13": a time beyond the scene's duration)"},
+      {"0.5 3 7", "3 0.5", R"(x.xml:25: <output> golden="3 0.5": expected increasing times)"},
+  };
+  for (const Mistake& m : mistakes) EXPECT_EQ(complaint(edited(m.from, m.to)), m.complaint);
+}
+
+TEST_F(SceneFile, FilesThatAreNoScenes) {
+  EXPECT_EQ(complaint(""), "x.xml: broken XML: the file is empty");
+  EXPECT_EQ(complaint("<model version='1'/>"), "x.xml:1: the root element is <model>, expected <scene>");
+  EXPECT_EQ(complaint("\n<scene name='a'>\n<clock duration=1/></scene>"),
+            "x.xml:3: broken XML: an attribute is not of the form name=\"value\", or stands twice");
+  EXPECT_EQ(complaint(std::string("<scene\0/>", 9)), "x.xml: holds a zero byte, expected XML text");
+  const auto reading = [](const std::string& path) {
+    try {
+      readScene(path);
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(reading(folder + "/none.xml"), folder + "/none.xml: cannot be opened: No such file or directory");
+  EXPECT_EQ(reading(folder), folder + ": is a folder, expected a file");
+  const std::string deep = [] {
+    std::string text;
+    for (int k = 0; k < 100000; ++k) text += "<a>";
+    return text;
+  }();
+  EXPECT_EQ(complaint(deep), "x.xml:1: broken XML: elements are nested too deeply");
+}
+
+TEST_F(SceneFile, OverridesReplaceSingleAttributes) {
+  const Scene s = read(completeScene, {{"body.gallbladder.surface", "full"},
+                                       {"tissue.bile_sac.young", "1"},
+                                       {"tissue.bile_sac.young", "1e4"},
+                                       {"dynamics.gravity", "0 0 0"},
+                                       {"tool.grasper.radius", "0.005"},
+                                       {"body.gallbladder.links.torsion", "7"},
+                                       {"body.second.links.flexion", "8"},
+                                       {"body.second.position", "1 2 3"},
+                                       {"scene.name", "other"}});
+  EXPECT_EQ(s.bodies[0].surface, SurfaceMode::full);
+  EXPECT_EQ(s.bodies[0].tissue.young, 1e4);  // the later one
+  EXPECT_EQ(s.gravity, Eigen::Vector3d::Zero());
+  EXPECT_EQ(s.tools[0].settings.radius, 0.005);
+  EXPECT_EQ(s.bodies[0].factors.torsion, 7);
+  EXPECT_EQ(s.bodies[1].factors.flexion, 8);  // where the scene has no <links>
+  EXPECT_EQ(s.bodies[1].worldFromModel.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(s.name, "other");
+}
+
+TEST_F(SceneFile, OverridesReachElementsLeftToTheirDefaults) {
+  const std::string text = edited("<light offset=\"0.01 0 0.01\" intensity=\"1.5\" reference_distance=\"0.2\"/>", "");
+  EXPECT_EQ(read(text, {{"light.intensity", "3"}}).lightIntensity, 3);
+}
+
+TEST_F(SceneFile, AShorterRunDropsTheGoldenTimesBeyondIt) {
+  EXPECT_EQ(read(completeScene, {{"clock.duration", "3.5"}}).goldenTimes, (std::vector<double>{0.5, 3}));
+}
+
+TEST_F(SceneFile, MistakesInOverridesNameTheOverride) {
+  const auto set = [&](const char* path, const char* value) { return complaint(completeScene, {{path, value}}); };
+  EXPECT_EQ(
+      set("body.galbladder.surface", "skin"),
+      "--set body.galbladder.surface: the scene has nothing of this name; did you mean body.gallbladder.surface?");
+  EXPECT_EQ(set("dynamics.gravty", "0 0 0"),
+            "--set dynamics.gravty: the scene has nothing of this name; did you mean dynamics.gravity?");
+  EXPECT_EQ(set("body.gallbladder", "x"),
+            "--set body.gallbladder: the scene has nothing of this name; did you mean body.gallbladder.name?");
+  EXPECT_EQ(set("camera.key.fov", "50"), "--set camera.key.fov: several elements answer to this, expected one");
+  EXPECT_EQ(set("body.gallbladder.surface", "contact"),
+            R"(--set body.gallbladder.surface: <body> surface="contact": unknown value; known: "full", "skin")");
+  EXPECT_EQ(set("tissue.bile_sac.young", "-1"),
+            R"(--set tissue.bile_sac.young: <tissue> young="-1": expected 1 number > 0)");
+  EXPECT_EQ(set("", "x").substr(0, 6), "--set ");
+}
+
+// The XML with every comment and declaration blanked, so that only tags are left to search.
+std::string withoutComments(std::string text) {
+  for (const auto& [open, close] : {std::pair("<!--", "-->"), std::pair("<?", "?>")}) {
+    for (std::size_t at = text.find(open); at != std::string::npos; at = text.find(open)) {
+      const std::size_t end = text.find(close, at) + std::string(close).size();
+      for (std::size_t k = at; k < end; ++k) text[k] = text[k] == '\n' ? '\n' : ' ';
+    }
+  }
+  return text;
+}
+
+// How a complaint about this place begins.
+std::string place(const std::string& text, long offset) {
+  return fmt::format("x.xml:{}: ", std::count(text.begin(), text.begin() + offset, '\n') + 1);
+}
+
+std::vector<std::string> scenesAtHand() {
+  std::vector<std::string> texts = {completeScene};
+  for (const auto& entry : std::filesystem::directory_iterator(MEDULLA_SOURCE_DIR "/scenes")) {
+    if (entry.path().extension() == ".xml") texts.push_back(readTextFile(entry.path()));
+  }
+  return texts;
+}
+
+TEST_F(SceneFile, EveryMisspeltAttributeFailsAtItsLine) {
+  const std::regex attribute("\\s([A-Za-z_]+)=[\"']");
+  for (const std::string& text : scenesAtHand()) {
+    const std::string tags = withoutComments(text);
+    int count = 0;
+    for (std::sregex_iterator match(tags.begin(), tags.end(), attribute), end; match != end; ++match, ++count) {
+      const std::string name = match->str(1);
+      const std::size_t behind = match->position(1) + name.size();
+      const std::string found = complaint(std::string(text).insert(behind, 1, 'x'));
+      EXPECT_TRUE(found.starts_with(place(tags, match->position(1)))) << name << ": " << found;
+      EXPECT_TRUE(found.ends_with(fmt::format("has no attribute \"{0}x\"; did you mean \"{0}\"?", name))) << found;
+    }
+    EXPECT_GT(count, 10);
+  }
+}
+
+TEST_F(SceneFile, EveryMisspeltElementFailsAtItsLine) {
+  for (const std::string& text : scenesAtHand()) {
+    const std::string tags = withoutComments(text);
+    for (const XmlRule& rule : sceneRules()) {
+      const std::regex tag("<(/?)" + rule.element + "\\b");
+      std::smatch first;
+      if (!std::regex_search(tags, first, tag)) continue;
+      const std::string found = complaint(std::regex_replace(tags, tag, "<$1" + rule.element + "x"));
+      EXPECT_TRUE(found.starts_with(place(tags, first.position()))) << found;
+      EXPECT_NE(found.find(fmt::format("<{}x>", rule.element)), std::string::npos) << found;
+    }
+  }
+}
+
+TEST(SceneFiles, EveryShippedSceneIsRead) {
+  for (const auto& entry : std::filesystem::directory_iterator(MEDULLA_SOURCE_DIR "/scenes")) {
+    if (entry.path().extension() != ".xml") continue;
+    EXPECT_EQ(readScene(entry.path()).name, entry.path().stem());
+  }
+}
+
+// What the schema knows of an element, as sorted lists: attributes (required ones with a !) and children.
+struct Known {
+  std::set<std::string> attributes, children;
+};
+
+TEST(SceneSchema, KnowsWhatTheReaderKnows) {
+  tinyxml2::XMLDocument document;
+  ASSERT_EQ(document.LoadFile(MEDULLA_SOURCE_DIR "/scenes/scene.xsd"), tinyxml2::XML_SUCCESS);
+  std::map<std::string, Known> schema;
+  const tinyxml2::XMLElement* e = document.RootElement()->FirstChildElement("xs:element");
+  for (; e; e = e->NextSiblingElement("xs:element")) {
+    Known& known = schema[e->Attribute("name")];
+    const tinyxml2::XMLElement* type = e->FirstChildElement("xs:complexType");
+    ASSERT_NE(type, nullptr);
+    const tinyxml2::XMLElement* a = type->FirstChildElement("xs:attribute");
+    for (; a; a = a->NextSiblingElement("xs:attribute")) {
+      known.attributes.insert(std::string(a->Attribute("name")) + (a->Attribute("use", "required") ? "!" : ""));
+    }
+    const tinyxml2::XMLElement* choice = type->FirstChildElement("xs:choice");
+    const tinyxml2::XMLElement* c = choice ? choice->FirstChildElement("xs:element") : nullptr;
+    for (; c; c = c->NextSiblingElement("xs:element")) known.children.insert(c->Attribute("ref"));
+  }
+  EXPECT_EQ(schema.size(), sceneRules().size());
+  for (const XmlRule& rule : sceneRules()) {
+    Known expected;
+    for (const std::string& a : rule.required) expected.attributes.insert(a + "!");
+    for (const std::string& a : rule.optional) expected.attributes.insert(a);
+    for (const XmlRule::Child& child : rule.children) expected.children.insert(child.name);
+    EXPECT_EQ(schema[rule.element].attributes, expected.attributes) << rule.element;
+    EXPECT_EQ(schema[rule.element].children, expected.children) << rule.element;
+  }
+}
+
+TEST(NearestName, CountsInsertionsDeletionsReplacementsAndSwaps) {
+  EXPECT_EQ(nearestName("positon", {"orientation", "position", "links"}), "position");
+  EXPECT_EQ(nearestName("fvo", {"fix", "fov"}), "fov");
+  EXPECT_EQ(nearestName("x", {"ab", "cd"}), "ab");  // the first of equals
+  EXPECT_EQ(nearestName("x", {}), "");
+  EXPECT_EQ(nearestName(std::string(1 << 20, 'a'), {"b", "a"}), "a");  // quick about it, too
 }
 
 }  // namespace

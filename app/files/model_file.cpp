@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cassert>
+#include <functional>
 #include <string_view>
 
 #include "app/files/input_error.h"
@@ -212,6 +213,21 @@ std::uint64_t readMeshHash(const XmlElement& root) {
   return value;
 }
 
+// Every edge of every triangle must be met once in the other direction.
+bool isClosed(const std::vector<std::array<int, 3>>& triangles) {
+  std::vector<std::array<int, 2>> forward, backward;
+  for (const std::array<int, 3>& t : triangles) {
+    for (int k = 0; k < 3; ++k) {
+      forward.push_back({t[k], t[(k + 1) % 3]});
+      backward.push_back({t[(k + 1) % 3], t[k]});
+    }
+  }
+  std::sort(forward.begin(), forward.end());
+  std::sort(backward.begin(), backward.end());
+  const bool once = std::adjacent_find(forward.begin(), forward.end()) == forward.end();
+  return once && !triangles.empty() && forward == backward;
+}
+
 void readSurface(const std::string& path, const XmlElement& root, SoftBodyModel& model) {
   Rows nodes(path, root, "nodes");
   nodes.forEach([&] { nodes.get(model.restNodes.emplace_back()); });
@@ -221,14 +237,11 @@ void readSurface(const std::string& path, const XmlElement& root, SoftBodyModel&
 
   Rows triangles(path, root, "triangles");
   triangles.forEach([&] { model.triangles.push_back(triangles.indices<3>(count)); });
-  triangles.require(!model.triangles.empty(), "expected a closed surface");
-  const TriangleMesh mesh{model.restNodes, model.triangles};
-  for (const std::array<int, 3>& across : adjacentTriangles(mesh)) {
-    for (const int triangle : across) triangles.require(triangle >= 0, "the surface is not closed");
-  }
+  triangles.require(isClosed(model.triangles), "the surface is not closed and wound one way");
   Rows edges(path, root, "edges");
   edges.forEach([&] { model.edges.push_back(edges.indices<2>(count)); });
-  edges.require(model.edges == uniqueEdges(mesh), "not the edges of the triangles, lower node first, sorted");
+  edges.require(model.edges == uniqueEdges({model.restNodes, model.triangles}),
+                "not the edges of the triangles, lower node first, sorted");
 }
 
 void readSpheres(const std::string& path, const XmlElement& root, SoftBodyModel& model) {
@@ -309,12 +322,14 @@ void readRenderSurface(const std::string& path, const XmlElement& root, std::siz
   Rows vertices(path, root, "render_vertices");
   s.first = {0};
   vertices.forEach([&] {
-    const int size = vertices.index(s.node.size() - s.first.back() + 1, 1);
-    s.first.push_back(s.first.back() + size);
+    const int begin = s.first.back();
+    const int end = begin + vertices.index(s.node.size() - begin + 1, 1);
+    const auto notAscending = std::adjacent_find(s.node.begin() + begin, s.node.begin() + end, std::greater_equal<>());
+    vertices.require(notAscending == s.node.begin() + end, "nodes of a stencil that are not ascending");
     vertices.get(s.offset.emplace_back(), s.restPosition.emplace_back());
+    s.first.push_back(end);
   });
-  vertices.require(s.first.back() == static_cast<long>(s.node.size()),
-                   "stencil sizes that do not add up to the rows of <render_stencils>");
+  vertices.require(s.first.back() == static_cast<long>(s.node.size()), "stencil sizes that do not add up");
   Rows triangles(path, root, "render_triangles");
   triangles.forEach([&] { s.triangles.push_back(triangles.indices<3>(s.restPosition.size())); });
 }

@@ -20,8 +20,9 @@ struct Target {
 
 void listTargets(XmlElement& element, const std::string& prefix, std::vector<Target>& out) {
   const XmlRule& rule = ruleOf(sceneRules(), element.name);
-  for (const std::string& a : rule.required) out.push_back({prefix + a, &element, a});
-  for (const std::string& a : rule.optional) out.push_back({prefix + a, &element, a});
+  for (const auto* attributes : {&rule.required, &rule.optional}) {
+    for (const std::string& a : *attributes) out.push_back({prefix + a, &element, a});
+  }
   for (XmlElement& child : element.children) {
     const bool known = std::any_of(rule.children.begin(), rule.children.end(),
                                    [&](const XmlRule::Child& c) { return c.name == child.name; });
@@ -53,6 +54,7 @@ void applyOverride(XmlElement& root, const SceneOverride& override) {
   const std::string where = "--set " + override.path;
   std::vector<Target> targets;
   listTargets(root, "", targets);
+  targets.push_back({"scene.name", &root, "name"});
   const auto matches = [&](const Target& t) { return t.path == override.path; };
   const auto found = std::find_if(targets.begin(), targets.end(), matches);
   if (found == targets.end()) {
@@ -288,7 +290,7 @@ void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene)
   const std::vector<int> size = readIntegers(output, "size", 2, {16, 8192});
   if (!size.empty()) {
     if (size[0] % 2 != 0 || size[1] % 2 != 0)
-      refuse(output, "size", "expected even width and height (the video needs them)");
+      refuse(output, "size", "expected even width and height (video needs them)");
     scene.width = size[0];
     scene.height = size[1];
   }

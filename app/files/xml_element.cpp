@@ -35,7 +35,7 @@ const char* describe(tinyxml2::XMLError error) {
     case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT:
       return "an element is not closed where it was opened";
     case tinyxml2::XML_ERROR_PARSING_ATTRIBUTE:
-      return "an attribute is not of the form name=\"value\"";
+      return "an attribute is not of the form name=\"value\", or stands twice";
     case tinyxml2::XML_ERROR_PARSING_ELEMENT:
       return "a tag is not complete";
     case tinyxml2::XML_ERROR_PARSING_TEXT:
@@ -63,7 +63,7 @@ void copyText(const std::string& path, const tinyxml2::XMLText& text, XmlElement
   if (!out.text.empty()) {
     throw inputError(path, text.GetLineNum(), "<" + out.name + ">: text in several pieces, expected one");
   }
-  out.text = value.substr(start);
+  out.text = value.substr(start, value.find_last_not_of(" \t\r\n") + 1 - start);
   out.textLine = text.GetLineNum();
 }
 
@@ -73,9 +73,6 @@ XmlElement copyElement(const std::string& path, const tinyxml2::XMLElement& elem
   out.line = element.GetLineNum();
   out.where = place(path, out.line);
   for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next()) {
-    if (out.find(a->Name())) {
-      throw inputError(path, a->GetLineNum(), "<" + out.name + "> has the attribute " + quoted(a->Name()) + " twice");
-    }
     out.attributes.push_back({a->Name(), a->Value(), place(path, a->GetLineNum())});
   }
   for (const tinyxml2::XMLNode* n = element.FirstChild(); n; n = n->NextSibling()) {

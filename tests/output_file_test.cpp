@@ -1,0 +1,139 @@
+#include "app/files/output_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include <csignal>
+
+#include "app/files/text_file.h"
+#include "tests/temporary_folder.h"
+
+namespace medulla {
+namespace {
+
+std::string complaint(const std::string& path) {
+  try {
+    OutputFile file(path);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(OutputFile, AppearsUnderItsNameOnlyWhenWhole) {
+  const TemporaryFolder folder;
+  OutputFile file(folder / "a.csv");
+  std::string expected;
+  for (int k = 0; k < 100000; ++k) {  // more than is collected before writing
+    file.write("line\n");
+    expected += "line\n";
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.csv"));
+  file.commit();
+  EXPECT_EQ(readTextFile(folder / "a.csv"), expected);
+  EXPECT_EQ(folder.contents().size(), 1u);
+}
+
+TEST(OutputFile, AbandonedItLeavesNothingAndTheEarlierFileStays) {
+  const TemporaryFolder folder;
+  folder.write("a.csv", "earlier");
+  try {
+    OutputFile file(folder / "a.csv");
+    file.write(std::string(1 << 20, 'x'));
+    EXPECT_EQ(folder.contents().size(), 2u);
+    throw std::runtime_error("the run failed");
+  } catch (const std::runtime_error&) {
+  }
+  EXPECT_EQ(readTextFile(folder / "a.csv"), "earlier");
+  EXPECT_EQ(folder.contents().size(), 1u);
+}
+
+TEST(OutputFile, ReplacesTheEarlierFileAtOnce) {
+  const TemporaryFolder folder;
+  folder.write("a.csv", "earlier and longer");
+  OutputFile file(folder / "a.csv");
+  file.write("new");
+  file.commit();
+  EXPECT_EQ(readTextFile(folder / "a.csv"), "new");
+}
+
+TEST(OutputFile, TwoOfOneNameDoNotMix) {
+  const TemporaryFolder folder;
+  OutputFile first(folder / "a.csv"), second(folder / "a.csv");
+  first.write("first");
+  second.write("second");
+  second.commit();
+  EXPECT_EQ(readTextFile(folder / "a.csv"), "second");
+  first.commit();
+  EXPECT_EQ(readTextFile(folder / "a.csv"), "first");
+}
+
+TEST(OutputFile, NeverTouchesATemporaryFileOfAnother) {
+  const TemporaryFolder folder;
+  const std::string stale = "a.csv." + std::to_string(::getpid()) + "-0.part";
+  folder.write(stale, "left by a killed run");
+  OutputFile file(folder / "a.csv");
+  file.write("new");
+  file.commit();
+  EXPECT_EQ(readTextFile(folder / "a.csv"), "new");
+  EXPECT_EQ(readTextFile(folder / stale), "left by a killed run");
+}
+
+TEST(OutputFile, WritesThroughALink) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "elsewhere");
+  folder.write("elsewhere/real.csv", "earlier");
+  std::filesystem::create_symlink("elsewhere/real.csv", folder / "link.csv");
+  OutputFile file(folder / "link.csv");
+  file.write("new");
+  file.commit();
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.csv"));
+  EXPECT_EQ(readTextFile(folder / "elsewhere/real.csv"), "new");
+}
+
+TEST(OutputFile, TargetsThatCannotBeWrittenAreRefusedAtOnce) {
+  const TemporaryFolder folder;
+  folder.write("file", "earlier");
+  EXPECT_EQ(complaint(folder / "none/a.csv"), folder / "none/a.csv: cannot be written: No such file or directory");
+  EXPECT_EQ(complaint(folder / "file/a.csv"), folder / "file/a.csv: cannot be written: Not a directory");
+  EXPECT_EQ(complaint(folder.path()), folder.path() + ": is a folder, expected the name of a file to write");
+  EXPECT_EQ(complaint(folder / "new/"), folder / "new/: expected the name of a file to write");
+  EXPECT_EQ(complaint(""), ": expected the name of a file to write");
+  // Renaming onto a device would replace it for the whole machine.
+  EXPECT_EQ(complaint("/dev/null"), "/dev/null: is not a regular file");
+  EXPECT_EQ(folder.contents().size(), 1u);
+  if (::geteuid() == 0) return;  // nothing is forbidden to root
+  ::chmod(folder.path().c_str(), 0500);
+  EXPECT_EQ(complaint(folder / "a.csv"), folder / "a.csv: cannot be written: Permission denied");
+  ::chmod(folder.path().c_str(), 0700);
+  ::chmod((folder / "file").c_str(), 0400);
+  EXPECT_EQ(complaint(folder / "file"), folder / "file: cannot be written: Permission denied");
+}
+
+TEST(OutputFile, AFullDiskIsReportedAndLeavesNothing) {
+  const TemporaryFolder folder;
+  folder.write("a.csv", "earlier");
+  // A limit on the size of files fails a write in the same way as a full disk.
+  const auto previous = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit before{};
+  ::getrlimit(RLIMIT_FSIZE, &before);
+  const rlimit small{1 << 19, before.rlim_max};
+  ::setrlimit(RLIMIT_FSIZE, &small);
+  std::string message;
+  try {
+    OutputFile file(folder / "a.csv");
+    for (int k = 0; k < 4; ++k) file.write(std::string(1 << 18, 'x'));
+    file.commit();
+  } catch (const std::runtime_error& error) {
+    message = error.what();
+  }
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, previous);
+  EXPECT_EQ(message, folder / "a.csv: cannot be written: File too large");
+  EXPECT_EQ(readTextFile(folder / "a.csv"), "earlier");
+  EXPECT_EQ(folder.contents().size(), 1u);
+}
+
+}  // namespace
+}  // namespace medulla
