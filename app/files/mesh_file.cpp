@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <system_error>
 
 #include "app/files/assimp_reader.h"
 #include "app/files/input_error.h"
 #include "app/files/obj_reader.h"
 #include "app/files/off_reader.h"
+#include "app/files/text_file.h"
 
 namespace medulla {
 
@@ -23,25 +21,14 @@ std::string extensionOf(const std::string& path) {
   return extension;
 }
 
-// Complains in the words of the file system, before any reader sees the path.
-void requireReadableFile(const std::string& path) {
+// Complaints that all formats share, before any reader sees the path.
+void requireMeshFile(const std::string& path) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
-    throw inputError(path, 0, "cannot be read: " + (error ? error.message() : std::string(std::strerror(ENOENT))));
-  }
-  if (std::filesystem::is_directory(status)) throw inputError(path, 0, "is a directory, expected a mesh file");
+  if (!std::filesystem::exists(status)) throw inputError(path, 0, "cannot be opened: " + error.message());
+  if (std::filesystem::is_directory(status)) throw inputError(path, 0, "is a folder, expected a mesh file");
   if (!std::filesystem::is_regular_file(status)) throw inputError(path, 0, "is not a file, expected a mesh file");
-  errno = 0;
-  if (!std::ifstream(path).is_open()) throw inputError(path, 0, std::string("cannot be read: ") + std::strerror(errno));
-  if (std::filesystem::file_size(path, error) == 0 && !error) throw inputError(path, 0, "is empty");
-}
-
-std::string readText(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (file.bad()) throw inputError(path, 0, "reading failed");
-  return text;
+  if (std::filesystem::file_size(path, error) == 0) throw inputError(path, 0, "is empty, expected a mesh file");
 }
 
 }  // namespace
@@ -55,13 +42,13 @@ double metresPerUnit(const std::string& unit) {
 }
 
 TriangleMesh readMesh(const std::string& path, double metresPerFileUnit) {
-  requireReadableFile(path);
+  requireMeshFile(path);
   const std::string extension = extensionOf(path);
   TriangleMesh mesh;
   if (extension == ".obj") {
-    mesh = parseObj(readText(path), path);
+    mesh = parseObj(readTextFile(path), path);
   } else if (extension == ".off") {
-    mesh = parseOff(readText(path), path);
+    mesh = parseOff(readTextFile(path), path);
   } else if (assimpReads(extension)) {
     mesh = readWithAssimp(path);
   } else {

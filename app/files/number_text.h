@@ -11,7 +11,7 @@
 namespace medulla {
 
 // The whole of `text` as a finite number: a leading + is allowed; nothing else around it, no hexadecimal, no NaN, no
-// infinity, no overflow. Empty otherwise. T: int, float or double.
+// infinity, no overflow. Empty otherwise. T: an integer, float or double.
 template <typename T>
 std::optional<T> parseNumber(std::string_view text) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);

@@ -1,10 +1,10 @@
 #include "app/files/text_lines.h"
 
-#include <charconv>
-#include <cmath>
-#include <system_error>
+#include <algorithm>
+#include <optional>
 
 #include "app/files/input_error.h"
+#include "app/files/number_text.h"
 
 namespace medulla {
 
@@ -38,27 +38,16 @@ bool TextLines::next() {
   return !words_.empty();
 }
 
-// from_chars knows no leading plus sign, which files do use.
-static std::string_view withoutPlus(std::string_view word) {
-  return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;
-}
-
 double TextLines::number(std::string_view word) const {
-  const std::string_view digits = withoutPlus(word);
-  double value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error == std::errc::result_out_of_range) fail(quoted(word) + " does not fit a double precision number");
-  if (error != std::errc() || end != digits.data() + digits.size()) fail("expected a number, found " + quoted(word));
-  if (!std::isfinite(value)) fail("expected a finite number, found " + quoted(word));
-  return value;
+  const std::optional<double> value = parseNumber<double>(word);
+  if (!value) fail("expected a finite number, found " + quoted(word));
+  return *value;
 }
 
 long long TextLines::integer(std::string_view word) const {
-  const std::string_view digits = withoutPlus(word);
-  long long value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc() || end != digits.data() + digits.size()) fail("expected an integer, found " + quoted(word));
-  return value;
+  const std::optional<long long> value = parseNumber<long long>(word);
+  if (!value) fail("expected an integer, found " + quoted(word));
+  return *value;
 }
 
 void TextLines::fail(const std::string& message) const {

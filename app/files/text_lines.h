@@ -19,7 +19,7 @@ class TextLines {
   const std::vector<std::string_view>& words() const { return words_; }
   int line() const { return line_; }  // 1-based
 
-  // Exact (std::from_chars). NaN, infinity and what does not fit a double are refused.
+  // The whole word, exact; NaN, infinity and what does not fit are refused.
   double number(std::string_view word) const;
   long long integer(std::string_view word) const;
 
