@@ -22,7 +22,7 @@ std::string findFfmpeg() {
   const char* path = std::getenv("PATH");
   std::istringstream folders(path ? path : "/usr/local/bin:/usr/bin:/bin");
   for (std::string folder; std::getline(folders, folder, ':');) {
-    const std::string candidate = (folder.empty() ? "." : folder) + "/ffmpeg";
+    std::string candidate = (folder.empty() ? "." : folder) + "/ffmpeg";
     if (access(candidate.c_str(), X_OK) == 0) return candidate;
   }
   throw std::runtime_error("ffmpeg not found: install the Debian package ffmpeg");
@@ -59,6 +59,7 @@ EncoderProcess::EncoderProcess(const std::string& path, int width, int height, d
 
   std::vector<std::string> words = arguments(program, path, width, height, fps);
   std::vector<char*> argv;
+  argv.reserve(words.size() + 1);
   for (std::string& w : words) argv.push_back(w.data());
   argv.push_back(nullptr);
 

@@ -37,7 +37,7 @@ ImageDifference compareImages(const Image& a, const Image& b) {
     overFour += worst > kNoticeable;
     d.overSixteen += worst > kGross;
   }
-  const double pixels = static_cast<double>(a.pixels.size() / 4);
+  const double pixels = 0.25 * static_cast<double>(a.pixels.size());
   d.equal = a.pixels == b.pixels;
   d.overFourPercent = pixels > 0 ? 100 * overFour / pixels : 0;
   d.psnr =

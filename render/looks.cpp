@@ -18,12 +18,12 @@ Look liver() {
   l.mottleFrequency = 22;
   l.wrap = {0.24f, 0.07f, 0.05f};
   l.roughness = 0.36f;
-  l.wetRoughness = 0.14f;
+  l.wetRoughness = 0.13f;
   l.mottle = 0.95f;
   l.vessels = 0.10f;
   l.vesselTint = {1.3f, 0.6f, 0.6f};
   l.bump = 0.44f;
-  l.specular = 0.8f;
+  l.specular = 0.66f;
   l.detailScale = 11;
   l.detail = {1024, 3, 1.2f, 0.4f, 74, 0.10f, 0};
   return l;
@@ -32,12 +32,12 @@ Look liver() {
 Look gallbladder() {
   Look l;
   l.name = "gallbladder";
-  l.albedoLow = {0.070f, 0.098f, 0.048f};
-  l.albedoHigh = {0.215f, 0.212f, 0.105f};
-  l.mottleFrequency = 22;
-  l.patches[0] = {{0.30f, 0.165f, 0.105f}, 42, 21, 1, {}, 0.42f, 0.68f, 0.60f};               // olive-brown blotches
-  l.patches[1] = {{0.30f, 0.125f, 0.075f}, 66, 9, 0.22f, {0, 1.1f, 0}, 0.55f, 1.10f, 0.85f};  // red neck
-  l.patches[2] = {{0.62f, 0.40f, 0.13f}, 54, 40, 1, {0, 0.22f, 0}, 0.66f, 0.80f, 0.75f};      // fat
+  l.albedoLow = {0.060f, 0.088f, 0.042f};
+  l.albedoHigh = {0.235f, 0.222f, 0.108f};
+  l.mottleFrequency = 34;
+  l.patches[0] = {{0.34f, 0.185f, 0.120f}, 60, 21, 1, {}, 0.44f, 0.68f, 0.52f};               // blood shining through
+  l.patches[1] = {{0.33f, 0.130f, 0.085f}, 66, 9, 0.25f, {0, 1.1f, 0}, 0.62f, 1.15f, 0.85f};  // red neck
+  l.patches[2] = {{0.62f, 0.40f, 0.13f}, 75, 40, 1, {0, 0.42f, 0}, 0.76f, 0.92f, 0.70f};      // fat
   l.wrap = {0.34f, 0.22f, 0.12f};
   l.roughness = 0.37f;
   l.wetRoughness = 0.17f;
@@ -45,7 +45,7 @@ Look gallbladder() {
   l.vessels = 0.85f;
   l.vesselTint = {1.9f, 0.36f, 0.45f};
   l.bump = 0.30f;
-  l.detailScale = 16;
+  l.detailScale = 15;
   l.detail = {512, 6, 2.4f, -1.3f, 0, 0, 0};
   return l;
 }

@@ -15,6 +15,10 @@ constexpr int kSearch = 14;           // px along an edge to either side
 constexpr float kSubpixel = 0.5f;     // how strongly single pixels that stick out are softened
 constexpr int kMargin = kSearch + 2;  // rows and columns without smoothing: no step leaves the picture
 
+// Glare: pixels brighter than this (of 255) spread over a few cells of kCell^2 pixels.
+constexpr int kCell = 8, kGlareFrom = 205;
+constexpr float kGlareAmount = 0.34f, kGlareTint[3] = {1.f, 0.93f, 0.88f};
+
 // Rec. 601 luma, 7 bits of fraction.
 int luma(int r, int g, int b) {
   return (38 * r + 75 * g + 15 * b) >> 7;
@@ -71,7 +75,14 @@ Blend findBlend(const std::uint8_t* m, std::ptrdiff_t stride) {
 }  // namespace
 
 PostProcess::PostProcess(int width, int height)
-    : width_(width), height_(height), luma_(std::size_t(width) * height), edge_(width) {
+    : width_(width),
+      height_(height),
+      luma_(std::size_t(width) * height),
+      edge_(width),
+      cellsX_(width / kCell + 3),
+      cellsY_(height / kCell + 3),
+      glare_(std::size_t(cellsX_) * cellsY_),
+      blurred_(glare_.size()) {
   const float h = float(height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
@@ -89,6 +100,53 @@ void PostProcess::fadeRim(Image& image) const {
     std::uint8_t* p = &image.pixels[4ul * r.index];
     for (int c = 0; c < 3; ++c) p[c] = std::uint8_t(p[c] * r.factor / 255);
   }
+}
+
+void PostProcess::gatherHighlights(const Image& image) {
+  std::fill(glare_.begin(), glare_.end(), 0.f);
+  for (int cy = 0; cy < height_ / kCell; ++cy)
+    for (int cx = 0; cx < width_ / kCell; ++cx) {
+      int sum = 0;
+      for (int y = 0; y < kCell; y += 2) {  // every fourth pixel tells enough
+        const std::uint8_t* p = &image.pixels[4ul * (std::size_t(cy * kCell + y) * width_ + cx * kCell)];
+        for (int x = 0; x < kCell; x += 2) sum += std::max(p[4 * x + 1] - kGlareFrom, 0);
+      }
+      glare_[std::size_t(cy + 1) * cellsX_ + cx + 1] = float(sum) * (4.f / (kCell * kCell));
+    }
+}
+
+// Binomial blur, along x and y, three times: a halo of about three cells.
+void PostProcess::blurGlare() {
+  const std::size_t stride = cellsX_, n = glare_.size();
+  for (int pass = 0; pass < 3; ++pass) {
+    blurred_ = glare_;
+    for (std::size_t i = 1; i + 1 < n; ++i) blurred_[i] = 0.25f * (glare_[i - 1] + 2 * glare_[i] + glare_[i + 1]);
+    for (std::size_t i = stride; i + stride < n; ++i)
+      glare_[i] = 0.25f * (blurred_[i - stride] + 2 * blurred_[i] + blurred_[i + stride]);
+  }
+}
+
+void PostProcess::addGlare(Image& image) {
+  gatherHighlights(image);
+  blurGlare();
+  // Between the centres of four cells the halo is interpolated; most of the picture has none.
+  for (int cy = 0; cy + 1 < cellsY_; ++cy)
+    for (int cx = 0; cx + 1 < cellsX_; ++cx) {
+      const float* g = &glare_[std::size_t(cy) * cellsX_ + cx];
+      const float a = g[0], b = g[1], c = g[cellsX_], d = g[cellsX_ + 1];
+      if (a + b + c + d < 1) continue;
+      const int x0 = cx * kCell - kCell / 2, y0 = cy * kCell - kCell / 2;
+      for (int y = std::max(y0, 0); y < std::min(y0 + kCell, height_); ++y)
+        for (int x = std::max(x0, 0); x < std::min(x0 + kCell, width_); ++x) {
+          const float u = (float(x - x0) + 0.5f) / kCell, v = (float(y - y0) + 0.5f) / kCell;
+          const float halo = kGlareAmount * ((a + (b - a) * u) * (1 - v) + (c + (d - c) * u) * v);
+          std::uint8_t* p = &image.pixels[4ul * (std::size_t(y) * width_ + x)];
+          for (int k = 0; k < 3; ++k) {  // screen: never beyond white
+            const float now = p[k];
+            p[k] = std::uint8_t(now + halo * kGlareTint[k] * (255 - now) * (1.f / 255) + 0.5f);
+          }
+        }
+    }
 }
 
 void PostProcess::computeLuma(const Image& image) {

@@ -12,6 +12,7 @@ class PostProcess {
  public:
   PostProcess(int width, int height);
   void fadeRim(Image& image) const;  // darkens towards the endoscope's rim; black outside
+  void addGlare(Image& image);       // halo around highlights, as scattered by an endoscope's lenses
   void smoothEdges(Image& image);    // FXAA (Lottes 2011) on pixels of high local contrast
 
  private:
@@ -23,6 +24,8 @@ class PostProcess {
     std::uint32_t index;
     std::uint8_t rgb[3];
   };
+  void gatherHighlights(const Image& image);
+  void blurGlare();
   void computeLuma(const Image& image);
   void smoothRow(const Image& image, int y);
 
@@ -30,6 +33,8 @@ class PostProcess {
   std::vector<RimPixel> rim_;
   std::vector<std::uint8_t> luma_, edge_;
   std::vector<Smoothed> smoothed_;
+  int cellsX_, cellsY_;  // coarse grid of the halo, with a border of one empty cell
+  std::vector<float> glare_, blurred_;
 };
 
 }  // namespace medulla

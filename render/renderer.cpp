@@ -205,8 +205,11 @@ void Renderer::render(const Picture& picture, Image& out) {
   d.lightAndSort(picture, view);
   d.draw(picture, view);
   d.readBack(out);
-  if (round) d.post.fadeRim(out);
   if (d.settings.antialias) d.post.smoothEdges(out);
+  if (round) {
+    d.post.addGlare(out);
+    d.post.fadeRim(out);
+  }
 }
 
 std::string Renderer::description() const {

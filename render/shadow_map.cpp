@@ -5,7 +5,7 @@
 namespace medulla {
 namespace {
 
-constexpr float kBehind = -1e9f;
+constexpr float kBehind = -1e9f, kFarAway = 1e6f;
 
 void projectVertices(const SceneMesh& mesh, const LightView& light, std::vector<glm::vec3>& texel) {
   texel.resize(mesh.position.size());
@@ -14,7 +14,9 @@ void projectVertices(const SceneMesh& mesh, const LightView& light, std::vector<
     const glm::vec4 clip = light.clipFromWorld * glm::vec4(mesh.position[i], 1);
     const float inverse = 1 / std::max(clip.w, 1e-6f);
     texel[i] = {(clip.x * inverse + 1) * half, (clip.y * inverse + 1) * half, clip.z * inverse * 0.5f + 0.5f};
-    if (clip.w < light.nearDistance) texel[i].x = kBehind;
+    // Bounded, so that texels convert to integers whatever the picture holds.
+    texel[i] = glm::clamp(texel[i], glm::vec3(-kFarAway), glm::vec3(kFarAway));
+    if (clip.w < light.nearDistance) texel[i] = glm::vec3(kBehind, kBehind, 0);
   }
 }
 

@@ -20,7 +20,7 @@ constexpr int kShadowSide = 1024;
 
 struct ShadowMap {
   DepthMap map{kShadowSide};
-  std::vector<glm::vec3> texel;          // every vertex of the mesh: texels and depth; x < -1e8 when behind the light
+  std::vector<glm::vec3> texel;  // every vertex of the mesh: texels and depth; x = y = -1e9 when behind the light
   std::vector<float> nearest, farthest;  // of blocks of kBlockSide^2 texels: whole triangles are judged by them
   static constexpr int kBlockSide = 8, kBlocks = kShadowSide / kBlockSide;
 };
