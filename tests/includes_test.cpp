@@ -66,9 +66,12 @@ TEST(Includes, AreFoundAtAll) {
 
 TEST(Includes, ArrowsBetweenFoldersNeverRunBack) {
   const std::map<std::string, std::set<std::string>> allowed = {
-      {"physics", {"physics"}}, {"haptics", {"haptics", "physics"}},
-      {"render", {"render"}},   {"app", {"app", "haptics", "physics", "render"}},
-      {"assets", {"assets", "physics"}},   {"tests", {"tests", "app", "haptics", "physics", "render"}},
+      {"physics", {"physics"}},
+      {"haptics", {"haptics", "physics"}},
+      {"render", {"render"}},
+      {"app", {"app", "haptics", "physics", "render"}},
+      {"assets", {"assets", "physics"}},
+      {"tests", {"tests", "app", "haptics", "physics", "render"}},
   };
   const std::regex relative("\\.\\./.*");
   for (const Source& source : sources()) {
