@@ -167,6 +167,8 @@ Buckets::Buckets(const std::vector<std::shared_ptr<const SoftBodyModel>>& bodies
   data_->near.reserve(data_->surface.triangles.size());
   copyNodes(rest, data_->surface.from);
   copyNodes(rest, data_->surface.to);
+  data_->surface.stepBefore.assign(data_->surface.from.size(), Vector3d::Zero());
+  data_->surface.step = data_->surface.stepBefore;
   for (Bucket& bucket : data_->buckets) {
     bucket.surface = &data_->surface;
     bucket.inflation = largestRadius * boundsFactor + boundsMargin;
@@ -185,9 +187,12 @@ const BlendedSurface& Buckets::surface() const {
 }
 
 void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to) {
-  copyNodes(from, data_->surface.from);
-  copyNodes(to, data_->surface.to);
-  data_->surface.duration = to.time - from.time;
+  BlendedSurface& surface = data_->surface;
+  copyNodes(from, surface.from);
+  copyNodes(to, surface.to);
+  surface.duration = to.time - from.time;
+  surface.stepBefore.swap(surface.step);
+  for (std::size_t n = 0; n < surface.step.size(); ++n) surface.step[n] = surface.to[n] - surface.from[n];
   for (Bucket& bucket : data_->buckets) {
     rtcCommitGeometry(bucket.geometry);
     rtcCommitScene(bucket.scene);

@@ -16,9 +16,13 @@ struct BlendedSurface {
   std::vector<int> bodyOfNode;
   std::vector<int> firstNode;             // of each body
   std::vector<Eigen::Vector3d> from, to;  // m, world, per node
-  double duration = 0;                    // s, between the two frames
+  // m, what each node moved in the frame before `from`, and from `from` to `to`
+  std::vector<Eigen::Vector3d> stepBefore, step;
+  double duration = 0;  // s, between the two frames
 
   Eigen::Vector3d node(int n, double alpha) const { return blendPoint(from[n], to[n], alpha); }
+  // What a node moves within one frame at its present velocity, m; continuous from frame to frame.
+  Eigen::Vector3d nodeStep(int n, double alpha) const { return blendPoint(stepBefore[n], step[n], alpha); }
   Triangle triangle(int t, double alpha) const {
     const auto& [a, b, c] = triangles[t];
     return {node(a, alpha), node(b, alpha), node(c, alpha)};

@@ -5,14 +5,9 @@
 
 namespace medulla {
 
-static const ProxyContact& mainContact(const Proxy& proxy) {
-  return *std::max_element(proxy.contacts.begin(), proxy.contacts.begin() + proxy.contactCount,
-                           [](const ProxyContact& a, const ProxyContact& b) { return a.share < b.share; });
-}
-
 static void holdPatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
                       double gripRadius, Grip& grip) {
-  const ProxyContact& contact = mainContact(proxy);
+  const ProxyContact& contact = proxy.mainContact();
   const std::array<int, 3>& touched = surface.triangles[contact.triangle];
   const int body = surface.bodyOfNode[touched[0]];
   const Eigen::Quaterniond toolFromWorld = device.worldFromTool.conjugate();
@@ -38,6 +33,13 @@ Eigen::Vector3d meanHeldGap(const BlendedSurface& surface, double alpha, const T
   assert(!grip.held.empty());
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const HeldOffset& held : grip.held) sum += surface.node(held.node, alpha) - heldTarget(device, held);
+  return sum / double(grip.held.size());
+}
+
+Eigen::Vector3d meanHeldStep(const BlendedSurface& surface, double alpha, const Grip& grip) {
+  assert(!grip.held.empty());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const HeldOffset& held : grip.held) sum += surface.nodeStep(held.node, alpha);
   return sum / double(grip.held.size());
 }
 

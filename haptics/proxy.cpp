@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -296,6 +297,12 @@ static double windingShare(const Triangle& triangle, const Vector3d& p) {
   const Vector3d a = triangle.a - p, b = triangle.b - p, c = triangle.c - p;
   const double la = a.norm(), lb = b.norm(), lc = c.norm();
   return std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) / (2 * M_PI);
+}
+
+const ProxyContact& Proxy::mainContact() const {
+  assert(contactCount > 0);
+  return *std::max_element(contacts.begin(), contacts.begin() + contactCount,
+                           [](const ProxyContact& a, const ProxyContact& b) { return a.share < b.share; });
 }
 
 Proxy placeProxy(const Buckets& buckets, const Vector3d& device, double toolRadius) {

@@ -26,6 +26,8 @@ struct Proxy {
   std::array<ProxyContact, 3> contacts;
 
   bool inContact() const { return contactCount > 0; }
+  // The contact that presses most; only in contact.
+  const ProxyContact& mainContact() const;
 };
 
 // A proxy at the device, or, when that is inside of a body, just outside at the nearest point of its surface, small, to

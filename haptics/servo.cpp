@@ -1,5 +1,6 @@
 #include "haptics/servo.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <stdexcept>
@@ -24,7 +25,10 @@ struct Tool {
   Vector3d coupled = Vector3d::Zero(), coupledAtFrameStart = Vector3d::Zero();
   Vector3d coupledSum = Vector3d::Zero();  // over the frame's ticks
   int ticks = 0;
-  double clampScale = 1;  // of the force, at the last tick
+  ProxyContact lastContact;  // while isLeaving: in contact, or not yet clear of it
+  bool isLeaving = false;
+  double largestPush = 0;  // N, of the coupling's spring during this contact
+  double clampScale = 1;   // of the force, at the last tick
 };
 }  // namespace
 
@@ -62,53 +66,73 @@ static void checkSettings(const ToolSettings& s, std::size_t tool) {
 // ---- One tick
 // --------------------------------------------------------------------------------------------------------
 
-static Vector3d nodeVelocity(const BlendedSurface& surface, int n) {
-  return surface.duration > 0 ? Vector3d((surface.to[n] - surface.from[n]) / surface.duration) : Vector3d::Zero();
-}
-
-static Vector3d contactVelocity(const BlendedSurface& surface, const ProxyContact& contact) {
-  const auto& [a, b, c] = surface.triangles[contact.triangle];
-  return contact.weights.x() * nodeVelocity(surface, a) + contact.weights.y() * nodeVelocity(surface, b) +
-         contact.weights.z() * nodeVelocity(surface, c);
-}
-
-static Vector3d meanContactVelocity(const BlendedSurface& surface, const Proxy& proxy) {
-  Vector3d v = Vector3d::Zero();
-  for (int k = 0; k < proxy.contactCount; ++k)
-    v += proxy.contacts[k].share * contactVelocity(surface, proxy.contacts[k]);
-  return v;
-}
-
-static Vector3d meanHeldVelocity(const BlendedSurface& surface, const Grip& grip) {
-  Vector3d v = Vector3d::Zero();
-  for (const HeldOffset& held : grip.held) v += nodeVelocity(surface, held.node);
-  return v / double(grip.held.size());
-}
-
 static Vector3d tangential(const Vector3d& v, const Vector3d& normal) {
   return v - v.dot(normal) * normal;
 }
 
-// The coupling of a pushing contact: a spring and a damper that never pulls. A slipping contact is dragged by friction
-// alone, which the proxy's position already holds, so its damper works along the normal only. The damper runs between
-// the device and the surface point, whose velocity is that of the dynamics: the proxy's own, differenced over ticks,
-// would jump at every edge.
-static Vector3d contactForce(const BlendedSurface& surface, const Tool& tool, const Vector3d& deviceVelocity) {
+static Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyContact& contact) {
+  const auto& [a, b, c] = surface.triangles[contact.triangle];
+  return contact.weights.x() * surface.nodeStep(a, alpha) + contact.weights.y() * surface.nodeStep(b, alpha) +
+         contact.weights.z() * surface.nodeStep(c, alpha);
+}
+
+static Vector3d meanContactStep(const BlendedSurface& surface, double alpha, const Proxy& proxy) {
+  Vector3d sum = Vector3d::Zero();
+  for (int k = 0; k < proxy.contactCount; ++k)
+    sum += proxy.contacts[k].share * contactStep(surface, alpha, proxy.contacts[k]);
+  return sum;
+}
+
+// What the surface's motion adds to the spring's force. The damper, against the velocity of the surface point in the
+// dynamics: the proxy's own, differenced over ticks, would jump at every edge. And the lead: the blended surface is one
+// frame late, by just the step that it moves in a frame; uncorrected, a device that presses at speed v feels k v T too
+// much, on soft tissue several times the tissue's own force.
+static Vector3d motionForce(const ToolSettings& tool, const Vector3d& step, double frameDuration,
+                            const Vector3d& deviceVelocity) {
+  const Vector3d velocity = frameDuration > 0 ? Vector3d(step / frameDuration) : Vector3d::Zero();
+  return tool.stiffness * step + tool.damping * (velocity - deviceVelocity);
+}
+
+// The coupling of a contact that pushes, or that the tool is leaving: along the normal the spring, negative once the
+// device has left the late surface, plus the motion's part, never pulling. The motion's part is bounded by the largest
+// that the spring has been in this contact, so that force begins without a step on a surface that already moves.
+// Tangentially a slipping contact is dragged by friction alone, which the proxy's position already holds.
+static Vector3d contactForce(const BlendedSurface& surface, double alpha, const Vector3d& deviceVelocity, Tool& tool) {
+  if (!tool.isLeaving) return Vector3d::Zero();
   const Proxy& proxy = tool.proxy;
-  const Vector3d spring = tool.settings.stiffness * (proxy.centre - tool.device.position);
-  if (!proxy.inContact() || spring.squaredNorm() == 0) return Vector3d::Zero();
-  const Vector3d normal = spring.normalized();
-  Vector3d damper = tool.settings.damping * (meanContactVelocity(surface, proxy) - deviceVelocity);
-  if (proxy.slipping) damper = damper.dot(normal) * normal;
-  const Vector3d force = spring + damper;
-  const double push = force.dot(normal);
-  return push > 0 ? force : Vector3d(force - push * normal);
+  const ProxyContact& last = tool.lastContact;
+  const Vector3d pull = proxy.centre - tool.device.position;
+  const bool isPressed = proxy.inContact() && pull.squaredNorm() > 0;
+  const Vector3d normal = isPressed ? Vector3d(pull.normalized()) : last.normal;
+  const double depth = isPressed ? pull.norm() : normal.dot(last.point - tool.device.position) + tool.settings.radius;
+  const double spring = tool.settings.stiffness * depth;
+  tool.largestPush = std::max(tool.largestPush, spring);
+  const Vector3d step = isPressed ? meanContactStep(surface, alpha, proxy) : contactStep(surface, alpha, last);
+  const Vector3d motion = motionForce(tool.settings, step, surface.duration, deviceVelocity);
+  const double push = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
+  return push * normal + (proxy.slipping ? Vector3d::Zero() : tangential(motion, normal));
 }
 
 static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Tool& tool,
                           const Vector3d& deviceVelocity) {
   return tool.settings.stiffness * meanHeldGap(surface, alpha, tool.device, tool.grip) +
-         tool.settings.damping * (meanHeldVelocity(surface, tool.grip) - deviceVelocity);
+         motionForce(tool.settings, meanHeldStep(surface, alpha, tool.grip), surface.duration, deviceVelocity);
+}
+
+// In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
+// contact is therefore handed over until the tool is clear of the point by its radius: a spring that only pushes does
+// no harm where nothing is pushed, and without it the tissue would jump free and knock against the tool.
+static void followLeaving(const BlendedSurface& surface, double alpha, Tool& tool) {
+  if (tool.proxy.inContact()) {
+    if (!tool.isLeaving) tool.largestPush = 0;
+    tool.lastContact = tool.proxy.mainContact();
+    tool.isLeaving = true;
+  } else if (tool.isLeaving) {
+    const Triangle triangle = surface.triangle(tool.lastContact.triangle, alpha);
+    const Vector3d& w = tool.lastContact.weights;
+    tool.lastContact.point = w.x() * triangle.a + w.y() * triangle.b + w.z() * triangle.c;
+    tool.isLeaving = (tool.proxy.centre - tool.lastContact.point).norm() <= 2 * tool.settings.radius;
+  }
 }
 
 static void record(const Vector3d& force, Tool& tool, ToolState& state) {
@@ -119,7 +143,7 @@ static void record(const Vector3d& force, Tool& tool, ToolState& state) {
   state.device = tool.device.position;
   state.proxy = tool.proxy.centre;
   state.holding = !tool.grip.held.empty();
-  state.inContact = tool.proxy.inContact();
+  state.inContact = tool.proxy.inContact() || (!state.holding && size > 0);
   tool.coupled = state.clamped && !state.holding
                      ? Vector3d(tool.proxy.centre + tool.clampScale * (tool.device.position - tool.proxy.centre))
                      : tool.device.position;
@@ -138,7 +162,8 @@ static void tickTool(Buckets& buckets, double alphaBefore, double alpha, double 
     record(heldForce(surface, alpha, tool, deviceVelocity), tool, state);
   } else {
     followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
-    record(contactForce(surface, tool, deviceVelocity), tool, state);
+    followLeaving(surface, alpha, tool);
+    record(contactForce(surface, alpha, deviceVelocity, tool), tool, state);
   }
 }
 
@@ -182,34 +207,44 @@ static Path coupledPath(const Tool& tool, double frameDuration, double tickDurat
   return {tool.coupledSum / tool.ticks + 0.5 * (frameDuration - tickDuration) * velocity, velocity};
 }
 
-// One spring per contact triangle, anchored so that stiffness (anchor - x) is the force of the coupling, k (device -
-// proxy), when x is the contact point: anchor = device + (contact point - proxy). Its tangential part is limited to
-// what friction carries; a slipping contact's anchor moves along the surface with the surface, not with the device,
-// because the point that is touched stays behind.
-static void handOverContacts(const BlendedSurface& surface, const Tool& tool, int index, const Path& path, Loads& out) {
+// A contact's spring, anchored so that stiffness (anchor - x) is the force of the coupling, k (device - proxy), when x
+// is the contact point: anchor = device + (contact point - proxy). Its tangential part is limited to what friction
+// carries; a slipping contact's anchor moves along the surface with the surface, not with the device, because the point
+// that is touched stays behind.
+static void handOverContact(const BlendedSurface& surface, double alpha, const Tool& tool, int index, const Path& path,
+                            const ProxyContact& contact, double share, Loads& out) {
   const ToolSettings& settings = tool.settings;
   const Proxy& proxy = tool.proxy;
-  const Vector3d stretch = path.end - proxy.centre;
-  for (int k = 0; k < proxy.contactCount; ++k) {
-    const ProxyContact& contact = proxy.contacts[k];
-    const double depth = std::max(0.0, -stretch.dot(contact.normal));
-    Vector3d drag = tangential(stretch, contact.normal), velocity = path.velocity;
-    const double limit = (proxy.slipping ? settings.dynamicFriction : settings.staticFriction) * depth;
-    if (drag.norm() > limit) drag *= limit / drag.norm();
-    if (proxy.slipping) velocity += tangential(contactVelocity(surface, contact) - path.velocity, contact.normal);
-    const auto& nodes = surface.triangles[contact.triangle];
-    const int body = surface.bodyOfNode[nodes[0]], first = surface.firstNode[body];
-    ToolSpring& spring = out.toolSprings.emplace_back();
-    spring.tool = index;
-    spring.body = body;
-    spring.nodes = {nodes[0] - first, nodes[1] - first, nodes[2] - first};
-    spring.weights = {contact.weights.x(), contact.weights.y(), contact.weights.z()};
-    spring.anchor = contact.point + stretch.dot(contact.normal) * contact.normal + drag;
-    spring.anchorVelocity = velocity;
-    spring.outward = contact.normal;
-    spring.stiffness = settings.stiffness * contact.share;
-    spring.damping = settings.damping * contact.share;
+  const double stretch = contact.normal.dot(path.end - contact.point) - proxy.radius;  // < 0: pushes
+  Vector3d drag = tangential(path.end - proxy.centre, contact.normal), velocity = path.velocity;
+  const double limit = (proxy.slipping ? settings.dynamicFriction : settings.staticFriction) * std::max(0.0, -stretch);
+  if (drag.norm() > limit) drag *= limit / drag.norm();
+  if (proxy.slipping) {
+    const Vector3d own =
+        surface.duration > 0 ? Vector3d(contactStep(surface, alpha, contact) / surface.duration) : Vector3d::Zero();
+    velocity += tangential(own - path.velocity, contact.normal);
   }
+  const auto& nodes = surface.triangles[contact.triangle];
+  const int body = surface.bodyOfNode[nodes[0]], first = surface.firstNode[body];
+  ToolSpring& spring = out.toolSprings.emplace_back();
+  spring.tool = index;
+  spring.body = body;
+  spring.nodes = {nodes[0] - first, nodes[1] - first, nodes[2] - first};
+  spring.weights = {contact.weights.x(), contact.weights.y(), contact.weights.z()};
+  spring.anchor = contact.point + stretch * contact.normal + drag;
+  spring.anchorVelocity = velocity;
+  spring.outward = contact.normal;
+  spring.stiffness = settings.stiffness * share;
+  spring.damping = settings.damping * share;
+}
+
+static void handOverContacts(const BlendedSurface& surface, double alpha, const Tool& tool, int index, const Path& path,
+                             Loads& out) {
+  const Proxy& proxy = tool.proxy;
+  for (int k = 0; k < proxy.contactCount; ++k)
+    handOverContact(surface, alpha, tool, index, path, proxy.contacts[k], proxy.contacts[k].share, out);
+  if (!proxy.inContact() && tool.isLeaving)
+    handOverContact(surface, alpha, tool, index, path, tool.lastContact, 1, out);
 }
 
 // Every held node pulled to where the tool wants it, by an equal share of the tool's stiffness: pulling is as stiff as
@@ -245,7 +280,7 @@ void Servo::handOver(double frameDuration, Loads& out) const {
     if (!tool.grip.held.empty())
       handOverGrip(surface, data_->alpha, tool, int(k), path, frameDuration, out);
     else
-      handOverContacts(surface, tool, int(k), path, out);
+      handOverContacts(surface, data_->alpha, tool, int(k), path, out);
   }
 }
 

@@ -1,0 +1,135 @@
+#include "haptics/grab.h"
+
+#include <gtest/gtest.h>
+
+#include "haptics/servo.h"
+#include "tests/tool_run.h"
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+static const Vector3d touch(0.012, 0.004, 0.0545);  // a little above the surface of the ellipsoid below
+
+static ToolRun grabbing() {
+  return ToolRun{SpringBody(ellipsoid(24, 20, 7, 0.3)), {}, {}, 24, 1.0 / 1200, {}};
+}
+
+static Vector3d approach(double t) {
+  return touch - 0.006 * ease(t, 0, 0.3) * Vector3d::UnitZ();
+}
+
+TEST(Grab, ClosingInContactHoldsThePatchWithTheToolsStiffnessAndNoForceStep) {
+  ToolRun run = grabbing();
+  run.device = [](double t) { return deviceAt(approach(t), t > 0.5 ? 1 : 0); };
+  Vector3d last = Vector3d::Zero();
+  bool held = false;
+  double step = 0;
+  run.run(0.8, [&](double t, const ToolState& tool) {
+    if (tool.holding && !held) step = (tool.force - last).norm();
+    held = tool.holding;
+    last = tool.force;
+    EXPECT_EQ(tool.holding, t > 0.5);
+  });
+  EXPECT_GT(last.norm(), 0.1);
+  EXPECT_LT(step, 0.02 * last.norm());
+  EXPECT_TRUE(run.loads.toolSprings.empty());
+  EXPECT_GE(run.loads.heldNodes.size(), 3U);
+  double stiffness = 0;
+  for (const HeldNode& held0 : run.loads.heldNodes) {
+    stiffness += held0.stiffness;
+    // Held nodes are those near the contact, which lies a radius below the proxy.
+    EXPECT_LT((run.body.shape->restNodes[held0.node] - (approach(1) - run.tool.radius * Vector3d::UnitZ())).norm(),
+              0.02);
+  }
+  EXPECT_NEAR(stiffness, run.tool.stiffness, 1e-9);
+}
+
+TEST(Grab, ATinyGripStillHoldsTheTouchedTriangle) {
+  ToolRun run = grabbing();
+  run.tool.gripRadius = 1e-6;
+  run.device = [](double t) { return deviceAt(approach(t), t > 0.5 ? 1 : 0); };
+  run.run(0.7);
+  EXPECT_EQ(run.loads.heldNodes.size(), 3U);
+}
+
+TEST(Grab, ClosingOnNothingHoldsNothingAndAClosedGripStillPresses) {
+  ToolRun run = grabbing();
+  run.device = [](double t) { return deviceAt(approach(t), 1); };
+  bool contact = false;
+  run.run(0.6, [&](double, const ToolState& tool) {
+    EXPECT_FALSE(tool.holding);
+    contact = tool.inContact;
+  });
+  EXPECT_TRUE(contact);
+  EXPECT_FALSE(run.loads.toolSprings.empty());
+}
+
+TEST(Grab, PullingTakesTheTissueAlongAndReleaseLetsItGo) {
+  ToolRun run = grabbing();
+  run.device = [](double t) {
+    const Vector3d pull = 0.02 * ease(t, 0.6, 1) * Vector3d::UnitZ();
+    return deviceAt(approach(t) + pull + (t > 2.5 ? 0.05 * (t - 2.5) : 0) * Vector3d::UnitZ(),
+                    t > 0.5 && t < 2.5 ? 1 : 0);
+  };
+  double pulled = 0;
+  bool holding = true;
+  int node = -1;
+  run.run(4, [&](double t, const ToolState& tool) {
+    if (t > 2.4 && t < 2.45) {
+      EXPECT_TRUE(tool.holding);
+      EXPECT_LT(tool.force.z(), -0.2);  // the tissue pulls the hand back
+      node = run.loads.heldNodes.front().node;
+      pulled = run.body.position[node].z() - run.body.shape->restNodes[node].z();
+    }
+    holding = tool.holding;
+  });
+  EXPECT_GT(pulled, 0.005);
+  EXPECT_FALSE(holding);
+  EXPECT_TRUE(run.loads.heldNodes.empty());
+  EXPECT_LT((run.body.position[node] - run.body.shape->restNodes[node]).norm(), 1e-3);
+  EXPECT_LT(run.mismatch(), 0.02);
+}
+
+TEST(Grab, TwistingTheToolTwistsTheTissue) {
+  ToolRun run = grabbing();
+  run.tool.gripRadius = 0.012;
+  run.device = [](double t) {
+    ToolSample sample = deviceAt(approach(t), t > 0.5 ? 1 : 0);
+    sample.worldFromTool = Eigen::AngleAxisd(ease(t, 0.6, 1), Vector3d::UnitZ());
+    return sample;
+  };
+  std::vector<Vector3d> before;
+  run.run(0.58);
+  before = run.body.position;
+  run.body = SpringBody(run.body.shape);
+  run.run(2.5);
+  // Mean turn of the held nodes about the tool's axis.
+  double turn = 0;
+  for (const HeldNode& held : run.loads.heldNodes) {
+    const Vector3d a = before[held.node] - touch, b = run.body.position[held.node] - touch;
+    turn +=
+        std::atan2(a.x() * b.y() - a.y() * b.x(), a.x() * b.x() + a.y() * b.y()) / double(run.loads.heldNodes.size());
+  }
+  EXPECT_GT(turn, 0.1);
+  EXPECT_LT(turn, 1);
+}
+
+TEST(Grab, PullBeyondForceMaxIsClampedForHandAndTissue) {
+  ToolRun run = grabbing();
+  run.tool.forceMax = 0.5;
+  run.device = [](double t) {
+    return deviceAt(approach(t) + 0.05 * ease(t, 0.6, 1) * Vector3d::UnitZ(), t > 0.5 ? 1 : 0);
+  };
+  Vector3d force = Vector3d::Zero();
+  bool clamped = false;
+  run.run(4, [&](double, const ToolState& tool) {
+    ASSERT_LE(tool.force.norm(), 0.5 * (1 + 1e-12));
+    force = tool.force;
+    clamped = tool.clamped;
+  });
+  EXPECT_TRUE(clamped);
+  EXPECT_LT((run.body.advance(run.loads, 0.02, 200) / 0.02 + force).norm(), 0.02 * force.norm());
+}
+
+}  // namespace medulla

@@ -1,0 +1,213 @@
+#include "haptics/servo.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/tool_run.h"
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+static constexpr double thickness = 0.01, top = 0.5 * thickness;
+
+static ToolSettings frictionless() {
+  ToolSettings tool;
+  tool.damping = tool.staticFriction = tool.dynamicFriction = 0;
+  return tool;
+}
+
+static Servo plateServo(const TouchShape& shape, const ToolSettings& tool, const Vector3d& start) {
+  return Servo({{shape}}, {tool}, 1e-3, frameAt(*shape, 0), {deviceAt(start)});
+}
+
+TEST(Servo, ForceIsTheCouplingAndTheSpringHandedOverGivesTheSame) {
+  const TouchShape shape = plate(10, 0.03, thickness, 5);
+  ToolSettings tool = frictionless();
+  Servo servo = plateServo(shape, tool, {0.001, 0.02, 0.002});
+  const Vector3d device(0.001, top + 0.001, 0.002);
+  for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt(device)});
+  const ToolState& state = servo.tools()[0];
+  const double depth = tool.radius - 0.001;
+  EXPECT_TRUE(state.inContact);
+  EXPECT_FALSE(state.clamped);
+  EXPECT_LT((state.proxy - Vector3d(0.001, top + tool.radius, 0.002)).norm(), 1e-6);
+  EXPECT_LT((state.force - tool.stiffness * depth * Vector3d::UnitY()).norm(), 1e-3);
+
+  // A second frame in which the device rests.
+  servo.commit(frameAt(*shape, 0), frameAt(*shape, 0.02));
+  for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt(device)});
+  Loads loads;
+  servo.handOver(0.02, loads);
+  ASSERT_FALSE(loads.toolSprings.empty());
+  EXPECT_TRUE(loads.heldNodes.empty());
+  Vector3d force = Vector3d::Zero();
+  double stiffness = 0;
+  for (const ToolSpring& spring : loads.toolSprings) {
+    Vector3d x = Vector3d::Zero();
+    for (int k = 0; k < 3; ++k) x += spring.weights[k] * shape->restNodes[spring.nodes[k]];
+    force += spring.stiffness * (spring.anchor - x);
+    stiffness += spring.stiffness;
+    EXPECT_NEAR(spring.weights[0] + spring.weights[1] + spring.weights[2], 1, 1e-12);
+    EXPECT_LT(spring.anchorVelocity.norm(), 1e-9);
+    EXPECT_GT(spring.outward.y(), 0.999);
+  }
+  EXPECT_NEAR(stiffness, tool.stiffness, 1e-9);
+  EXPECT_LT((force + servo.tools()[0].force).norm(), 1e-3);
+}
+
+TEST(Servo, ForceIsClampedAndSoIsWhatIsHandedOver) {
+  const TouchShape shape = plate(10, 0.03, thickness, 5);
+  ToolSettings tool = frictionless();
+  tool.forceMax = 1;
+  Servo servo = plateServo(shape, tool, {0.001, 0.02, 0.002});
+  for (int frame = 0; frame < 2; ++frame) {
+    for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt({0.001, top - 0.004, 0.002})});
+    if (frame == 0) servo.commit(frameAt(*shape, 0), frameAt(*shape, 0.02));
+  }
+  EXPECT_TRUE(servo.tools()[0].clamped);
+  EXPECT_NEAR(servo.tools()[0].force.norm(), 1, 1e-12);
+  Loads loads;
+  servo.handOver(0.02, loads);
+  double force = 0;
+  for (const ToolSpring& spring : loads.toolSprings) force += spring.stiffness * (top - spring.anchor.y());
+  EXPECT_NEAR(force, 1, 1e-3);
+}
+
+TEST(Servo, BadInputIsRefusedByName) {
+  const TouchShape shape = plate(4, 0.03, thickness, 2);
+  Servo servo = plateServo(shape, {}, {0, 0.02, 0});
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  for (const double bad : {nan, inf, 25.0, -1e20}) {
+    EXPECT_THROW(servo.tick(0.5, {deviceAt({0, bad, 0})}), std::runtime_error);
+    EXPECT_THROW(plateServo(shape, {}, {bad, 0, 0}), std::runtime_error);
+  }
+  ToolSample turned = deviceAt({0, 0.02, 0});
+  turned.worldFromTool.w() = nan;
+  EXPECT_THROW(servo.tick(0.5, {turned}), std::runtime_error);
+  for (double ToolSettings::*field : {&ToolSettings::radius, &ToolSettings::stiffness, &ToolSettings::forceMax}) {
+    ToolSettings settings;
+    settings.*field = 0;
+    EXPECT_THROW(plateServo(shape, settings, {0, 0.02, 0}), std::runtime_error);
+  }
+  servo.tick(0.5, {deviceAt({0, 0.02, 0})});  // and goes on
+}
+
+// The still tool touches; frames commit in the middle of a slide: nothing jumps.
+TEST(Servo, TwoToolsTouchTwoBodies) {
+  const TouchShape low = plate(6, 0.03, thickness, 3), high = plate(6, 0.03, thickness, 4);
+  DynamicsFrame frame = frameAt(*low, 0);
+  frame.bodies.push_back(
+      frameAt(*high, 0, [](const Vector3d& x, double) { return Vector3d(x + Vector3d(0.061, 0.002, 0)); }).bodies[0]);
+  ToolSettings fine = frictionless(), coarse = frictionless();
+  fine.radius = 0.0005;
+  coarse.radius = 0.004;
+  Servo servo({{low}, {high}}, {fine, coarse}, 1e-3, frame, {deviceAt({0, 0.02, 0}), deviceAt({0.061, 0.02, 0})});
+  for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt({0, 0.003, 0}), deviceAt({0.061, 0.005, 0})});
+  EXPECT_NEAR(servo.tools()[0].proxy.y(), top + fine.radius, 1e-6);
+  EXPECT_NEAR(servo.tools()[1].proxy.y(), top + 0.002 + coarse.radius, 1e-6);
+  Loads loads;
+  servo.handOver(0.02, loads);
+  for (const ToolSpring& spring : loads.toolSprings) {
+    EXPECT_EQ(spring.body, spring.tool);
+    for (const int n : spring.nodes) EXPECT_LT(n, int(low->restNodes.size()));
+  }
+}
+
+// ---- Against a soft body
+// ---------------------------------------------------------------------------------------------
+
+static ToolRun pressing(double speed) {
+  ToolRun run{SpringBody(ellipsoid(24, 20, 7, 0.3)), frictionless(), {}, 24, 1.0 / 1200, {}};
+  // Down 12 mm from 4 mm above the surface, a pause, and up.
+  run.device = [=](double t) {
+    const double down = std::min(0.016, speed * t), up = std::max(0.0, speed * (t - 1) - 0.016);
+    return deviceAt({0.012, 0.004, 0.0585 - down + up});
+  };
+  return run;
+}
+
+TEST(Servo, PressingSoftTissueHasNoForceStepsAndOneContact) {
+  const double speed = 0.05;
+  ToolRun run = pressing(speed);
+  Vector3d last = Vector3d::Zero();
+  double largest = 0, mostForce = 0;
+  int changes = 0;
+  bool before = false;
+  run.run(1.8, [&](double, const ToolState& tool) {
+    largest = std::max(largest, (tool.force - last).norm());
+    mostForce = std::max(mostForce, tool.force.norm());
+    changes += tool.inContact != before;
+    before = tool.inContact;
+    last = tool.force;
+  });
+  EXPECT_GT(mostForce, 0.3);
+  EXPECT_LE(largest, 1.2 * run.tool.stiffness * speed * run.tickDuration);
+  EXPECT_EQ(changes, 2);
+}
+
+TEST(Servo, HandAndTissueGetTheSameImpulseOverAPress) {
+  for (const double stiffness : {200.0, 400.0}) {
+    ToolRun run = pressing(0.03);
+    run.tool.stiffness = stiffness;
+    run.run(2.4);
+    EXPECT_GT(run.bodyImpulseLength, 0.1);
+    EXPECT_LT(run.mismatch(), 0.02) << stiffness;
+    EXPECT_LT(run.loads.toolSprings.size(), 1U);  // the tool is clear at the end
+  }
+}
+
+TEST(Servo, ASteadyPressHasTheTissuesOwnForce) {
+  ToolRun run = pressing(0.05);
+  Vector3d force = Vector3d::Zero();
+  run.device = [device = run.device](double t) { return device(std::min(t, 1.0)); };
+  run.run(3, [&](double, const ToolState& tool) { force = tool.force; });
+  run.handImpulse = run.bodyImpulse = Vector3d::Zero();
+  const Vector3d once = run.body.advance(run.loads, 0.02, 200) / 0.02;
+  EXPECT_LT((once + force).norm(), 0.005 * force.norm());
+}
+
+TEST(Servo, SlidingDragsTheTissueByFrictionOnly) {
+  for (const double friction : {0.0, 0.3}) {
+    ToolRun run = pressing(0.05);
+    run.tool.staticFriction = 1.2 * friction;
+    run.tool.dynamicFriction = friction;
+    run.device = [](double t) {
+      return deviceAt({0.012 + 0.03 * ease(t, 0.5, 1.0), 0.004, 0.0585 - 0.012 * ease(t, 0, 0.4)});
+    };
+    double press = 0, drag = 0;
+    run.run(1.6, [&](double t, const ToolState& tool) {
+      if (t < 0.8 || t > 1.2) return;
+      press += tool.force.z();
+      drag -= tool.force.x();
+    });
+    // The surface slopes by a few degrees along the way.
+    EXPECT_NEAR(drag / press, friction, 0.12);
+  }
+}
+
+TEST(Servo, AJumpInContactLeavesTheTissueWhole) {
+  ToolRun run = pressing(0.05);
+  run.tool = ToolSettings();
+  run.device = [](double t) {
+    return t < 0.5   ? deviceAt({0.012, 0.004, 0.0585 - 0.012 * ease(t, 0, 0.4)})
+           : t < 0.8 ? deviceAt({0.9, -0.4, -0.3})
+                     : deviceAt({0, 0, 0.2});
+  };
+  run.run(1.5, [&](double, const ToolState& tool) { ASSERT_LE(tool.force.norm(), run.tool.forceMax * (1 + 1e-12)); });
+  for (std::size_t n = 0; n < run.body.position.size(); ++n)
+    ASSERT_LT((run.body.position[n] - run.body.shape->restNodes[n]).norm(), 0.05);
+}
+
+TEST(Servo, TheSameRunTwiceIsTheSameBitForBit) {
+  std::vector<Vector3d> forces[2];
+  for (auto& out : forces) {
+    ToolRun run = pressing(0.05);
+    run.tool = ToolSettings();
+    run.run(1, [&](double, const ToolState& tool) { out.push_back(tool.force); });
+  }
+  EXPECT_EQ(forces[0], forces[1]);
+}
+
+}  // namespace medulla
