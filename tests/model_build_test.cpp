@@ -145,6 +145,8 @@ TEST(ModelBuild, GallbladderOfSevenSpheres) {
   EXPECT_EQ(report.triangles, 466);
   EXPECT_EQ(report.centresOutside, 0);
   EXPECT_EQ(report.attachmentsCrossing, 0);
+  EXPECT_LE(report.gapMax, 3.5);
+  EXPECT_GE(report.cover, 75);
   EXPECT_GE(report.coverCones, report.cover);
   EXPECT_LE(report.gapConesMax, report.gapMax);
 }
@@ -157,6 +159,8 @@ TEST(ModelBuild, BallsAreInscribed) {
   const SoftBodyModel model = build(mesh, settings, report);
   expectSound(model, report);
   EXPECT_EQ(report.spheres, 25);
+  EXPECT_LE(report.gapMax, 1.4);
+  EXPECT_GE(report.cover, 95);
   EXPECT_EQ(report.attachmentsCrossing, 0);
   const SurfaceTree tree = makeSurfaceTree(mesh);
   for (const FillingSphere& s : model.spheres) {

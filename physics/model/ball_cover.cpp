@@ -27,7 +27,7 @@ Gaps gapsTo(const Samples& samples, const Ball& ball) {
 
 template <typename Array>
 float cost(const Array& gaps) {
-  return gaps.square().square().sum();
+  return gaps.cube().square().sum();
 }
 
 // Which samples each candidate covers under a tolerance, one bit each.
