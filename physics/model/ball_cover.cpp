@@ -25,9 +25,12 @@ Gaps gapsTo(const Samples& samples, const Ball& ball) {
   return (distance - static_cast<float>(scale * ball.radius)).max(0.f);
 }
 
+// Of few balls the largest gap is what shows, of many the volume that all small gaps together leave uncovered.
+enum class Exponent { four, six };
+
 template <typename Array>
-float cost(const Array& gaps) {
-  return gaps.cube().square().sum();
+float cost(const Array& gaps, Exponent exponent) {
+  return exponent == Exponent::six ? gaps.cube().square().sum() : gaps.square().square().sum();
 }
 
 // Which samples each candidate covers under a tolerance, one bit each.
@@ -98,7 +101,7 @@ Gaps nearest(const GapTable& gaps, const std::vector<int>& chosen) {
   return least;
 }
 
-void fillUp(const GapTable& gaps, int count, std::vector<int>& chosen) {
+void fillUp(const GapTable& gaps, int count, Exponent exponent, std::vector<int>& chosen) {
   Gaps least = nearest(gaps, chosen);
   std::vector<char> taken(gaps.cols(), 0);
   for (const int c : chosen) taken[c] = 1;
@@ -107,7 +110,7 @@ void fillUp(const GapTable& gaps, int count, std::vector<int>& chosen) {
     float bestCost = 0;
     for (int c = 0; c < gaps.cols(); ++c) {
       if (taken[c]) continue;
-      const float candidateCost = cost(least.min(gaps.col(c)));
+      const float candidateCost = cost(least.min(gaps.col(c)), exponent);
       if (best < 0 || candidateCost < bestCost) {
         best = c;
         bestCost = candidateCost;
@@ -129,14 +132,14 @@ Gaps leastWithout(const GapTable& ballGaps, Eigen::Index without) {
 }
 
 // One pass: every chosen candidate gives way to the one that lowers the cost most. Returns whether any did.
-bool swapPass(const GapTable& gaps, std::vector<int>& chosen, GapTable& ballGaps) {
+bool swapPass(const GapTable& gaps, Exponent exponent, std::vector<int>& chosen, GapTable& ballGaps) {
   bool changed = false;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const Gaps others = leastWithout(ballGaps, static_cast<Eigen::Index>(k));
     const int before = chosen[k];
-    float best = cost(others.min(gaps.col(before)));
+    float best = cost(others.min(gaps.col(before)), exponent);
     for (int c = 0; c < gaps.cols(); ++c) {
-      const float candidateCost = cost(others.min(gaps.col(c)));
+      const float candidateCost = cost(others.min(gaps.col(c)), exponent);
       if (candidateCost < best * 0.999f) {
         best = candidateCost;
         chosen[k] = c;
@@ -161,18 +164,18 @@ bool displacedBall(const SurfaceTree& tree, const Ball& ball, const Eigen::Vecto
 }
 
 // One pass of trial moves around every ball; the steps shrink from pass to pass and while nothing improves.
-void movePass(const SurfaceTree& tree, const Samples& samples, int pass, int trials, RandomSequence& random,
-              std::vector<Ball>& balls, GapTable& ballGaps) {
+void movePass(const SurfaceTree& tree, const Samples& samples, int pass, int trials, Exponent exponent,
+              RandomSequence& random, std::vector<Ball>& balls, GapTable& ballGaps) {
   for (std::size_t k = 0; k < balls.size(); ++k) {
     const auto column = static_cast<Eigen::Index>(k);
     const Gaps others = leastWithout(ballGaps, column);
-    float best = cost(others.min(ballGaps.col(column)));
+    float best = cost(others.min(ballGaps.col(column)), exponent);
     double step = 0.4 * balls[k].radius / (pass + 1);
     for (int trial = 0; trial < trials; ++trial) {
       Ball moved;
       if (!displacedBall(tree, balls[k], step * random.normal(), trial % 2 == 1, samples.diagonal, moved)) continue;
       const Gaps movedGaps = gapsTo(samples, moved);
-      const float movedCost = cost(others.min(movedGaps));
+      const float movedCost = cost(others.min(movedGaps), exponent);
       if (movedCost < best) {
         best = movedCost;
         balls[k] = moved;
@@ -204,7 +207,8 @@ std::vector<Ball> coverWithBalls(const SurfaceTree& tree, const std::vector<Ball
   report(0.1);
 
   std::vector<int> chosen = coverByBisection(gaps, count);
-  fillUp(gaps, count, chosen);
+  const Exponent exponent = count <= 12 ? Exponent::six : Exponent::four;
+  fillUp(gaps, count, exponent, chosen);
   report(0.2);
 
   // Large models are dense already: a pass costs count^2 there and gains little.
@@ -213,7 +217,7 @@ std::vector<Ball> coverWithBalls(const SurfaceTree& tree, const std::vector<Ball
   for (int k = 0; k < count; ++k) ballGaps.col(k) = gaps.col(chosen[k]);
   const int swapPasses = large ? 1 : 4;
   for (int pass = 0; pass < swapPasses; ++pass) {
-    if (!swapPass(gaps, chosen, ballGaps)) break;
+    if (!swapPass(gaps, exponent, chosen, ballGaps)) break;
     report(0.2 + 0.4 * (pass + 1) / swapPasses);
   }
 
@@ -222,7 +226,7 @@ std::vector<Ball> coverWithBalls(const SurfaceTree& tree, const std::vector<Ball
   RandomSequence random{7};
   const int movePasses = large ? 2 : 4, trials = large ? 30 : 60;
   for (int pass = 0; pass < movePasses; ++pass) {
-    movePass(tree, samples, pass, trials, random, balls, ballGaps);
+    movePass(tree, samples, pass, trials, exponent, random, balls, ballGaps);
     report(0.6 + 0.4 * (pass + 1) / movePasses);
   }
   return balls;
