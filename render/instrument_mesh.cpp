@@ -89,7 +89,9 @@ void addShaft(Builder& b) {
         kSteel);
   // Light is computed per vertex and interpolated without perspective: rings stay close.
   std::vector<Ring> sheath = {{kShaftStart, 0.0023f}, {kShaftStart + 0.0001f, r - 0.0001f}, {kShaftStart + 0.0004f, r}};
-  for (float z = kShaftStart + 0.003f; z < kShaftEnd; z += 0.006f) sheath.push_back({z, r});
+  constexpr float kSpacing = 0.006f;
+  for (int k = 1; k <= int((kShaftEnd - kShaftStart) / kSpacing); ++k)
+    sheath.push_back({kShaftStart + kSpacing * float(k), r});
   lathe(b, sheath, kSheath);
 }
 

@@ -19,7 +19,7 @@ constexpr std::array<float, 2> kFinerAbove = {0.012f, 0.06f};  // projected radi
 
 void attribute(unsigned slot, int components, std::size_t stride, std::size_t offset, unsigned divisor) {
   glEnableVertexAttribArray(slot);
-  glVertexAttribPointer(slot, components, GL_FLOAT, GL_FALSE, int(stride), reinterpret_cast<const void*>(offset));
+  glVertexAttribPointer(slot, components, GL_FLOAT, GL_FALSE, int(stride), bufferOffset(offset));
   glVertexAttribDivisor(slot, divisor);
 }
 

@@ -19,6 +19,8 @@ constexpr int kMargin = kSearch + 2;  // rows and columns without smoothing: no 
 constexpr int kCell = 8, kGlareFrom = 205;
 constexpr float kGlareAmount = 0.34f, kGlareTint[3] = {1.f, 0.93f, 0.88f};
 
+constexpr float kRound = 0.5f;  // the values are positive
+
 // Rec. 601 luma, 7 bits of fraction.
 int luma(int r, int g, int b) {
   return (38 * r + 75 * g + 15 * b) >> 7;
@@ -91,7 +93,7 @@ PostProcess::PostProcess(int width, int height)
       if (r <= kRimInner) continue;
       // The fade is meant in light; pixels are gamma coded.
       const float share = std::pow(smoothStep(kRimOuter, kRimInner, r), 1 / 2.2f);
-      rim_.push_back({std::uint32_t(y * width + x), std::uint8_t(255 * share + 0.5f)});
+      rim_.push_back({std::uint32_t(y * width + x), std::uint8_t(255 * share + kRound)});
     }
 }
 
@@ -143,7 +145,7 @@ void PostProcess::addGlare(Image& image) {
           std::uint8_t* p = &image.pixels[4ul * (std::size_t(y) * width_ + x)];
           for (int k = 0; k < 3; ++k) {  // screen: never beyond white
             const float now = p[k];
-            p[k] = std::uint8_t(now + halo * kGlareTint[k] * (255 - now) * (1.f / 255) + 0.5f);
+            p[k] = std::uint8_t(now + halo * kGlareTint[k] * (255 - now) * (1.f / 255) + kRound);
           }
         }
     }
@@ -173,7 +175,8 @@ void PostProcess::smoothRow(const Image& image, int y) {
     const Blend blend = findBlend(&luma_[at], width_);
     const std::uint8_t *p = &image.pixels[4 * at], *q = p + 4 * blend.neighbour;
     Smoothed s{std::uint32_t(at), {}};
-    for (int c = 0; c < 3; ++c) s.rgb[c] = std::uint8_t(float(p[c]) + (float(q[c]) - float(p[c])) * blend.share + 0.5f);
+    for (int c = 0; c < 3; ++c)
+      s.rgb[c] = std::uint8_t(float(p[c]) + (float(q[c]) - float(p[c])) * blend.share + kRound);
     smoothed_.push_back(s);
   }
 }

@@ -30,7 +30,11 @@ struct Camera {
   float fovDegrees = 60;  // vertical
 };
 
-// The endoscope's light sits beside the lens; offset in the camera's frame (right, up, back), m.
+// The endoscope's light sits beside the lens; offset in the camera's frame (right, up, back), m. A matt surface of
+// albedo a that faces it at distance d has the radiance 1.3 a intensity 1.14 r^2 / (d^2 + 0.14 r^2), r =
+// referenceDistance, shown through the ACES tone curve and the sRGB transfer. Setting referenceDistance to the distance
+// of what matters does what a camera's automatic exposure does; the veil of distance (round pictures only) is measured
+// in it too.
 struct Light {
   glm::vec3 offset{0.012f, 0.012f, 0};
   float intensity = 1;  // 1 exposes a surface at `referenceDistance` fully
@@ -56,6 +60,8 @@ struct Segment {
   glm::vec4 colour{1};
 };
 
+// tissue: skins. model: balls, segments and instruments before a light backdrop, never round. both: surfaces that have
+// positions in this picture are seen through over the model, the others stay opaque.
 enum class ViewKind { tissue, model, both };
 
 struct Picture {

@@ -1,9 +1,15 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 // GLSL 3.30 sources. `defines` are lines "#define NAME VALUE\n" put under the version line.
 namespace medulla {
+
+// OpenGL takes offsets into buffers as pointers.
+inline const void* bufferOffset(std::size_t bytes) {
+  return reinterpret_cast<const void*>(bytes);  // NOLINT(performance-no-int-to-ptr)
+}
 
 unsigned buildProgram(const std::string& defines, const char* vertex, const char* fragment);  // throws with GLSL's log
 

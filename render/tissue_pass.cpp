@@ -17,7 +17,7 @@ constexpr int kMaskSegments = 96;
 
 void attribute(unsigned slot, int components, std::size_t offset) {
   glEnableVertexAttribArray(slot);
-  glVertexAttribPointer(slot, components, GL_FLOAT, GL_FALSE, sizeof(LitVertex), reinterpret_cast<const void*>(offset));
+  glVertexAttribPointer(slot, components, GL_FLOAT, GL_FALSE, sizeof(LitVertex), bufferOffset(offset));
 }
 
 unsigned makeDetail(const Look& look, int seed) {
@@ -165,7 +165,7 @@ void TissuePass::draw(const SceneMesh& mesh, const DrawLists& lists, const std::
     glUniform1f(p.opacity, opacity);
     glBindTexture(GL_TEXTURE_2D, textures_.at(look.name));
     glDrawElements(GL_TRIANGLES, int(run.indexCount), GL_UNSIGNED_INT,
-                   reinterpret_cast<const void*>(run.firstIndex * sizeof(std::uint32_t)));
+                   bufferOffset(run.firstIndex * sizeof(std::uint32_t)));
   }
   glDisable(GL_BLEND);
 }

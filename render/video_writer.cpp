@@ -58,6 +58,10 @@ struct VideoWriter::Data {
   }
 
   ~Data() {
+    {
+      const std::lock_guard lock(mutex);
+      failed = true;  // an abandoned film is not encoded to its end
+    }
     end();
     std::error_code ignored;
     std::filesystem::remove(partial, ignored);

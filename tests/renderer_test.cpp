@@ -276,6 +276,30 @@ TEST(Renderer, MovedSurfaceIsDrawnWhereItIsAndStaticOneReturns) {
   EXPECT_TRUE(compareImages(atRest, again).equal);
 }
 
+TEST(Renderer, MovingSkinIsSeenThroughInBothAndStaticSkinIsNot) {
+  Renderer renderer(settingsOf(64, 64));
+  const SurfaceShape skin = sphere("matte", {0, 0, 0}, 0.03f);
+  renderer.addSurface(skin);
+  Picture p = viewFromFront(0.2f);
+  p.balls = {{vec3(0), 0.02f, glm::vec4(0.9f, 0, 0, 1)}};
+  const auto redness = [&] {
+    Image image;
+    renderer.render(p, image);
+    const std::uint8_t* c = &image.pixels[4ul * (32 * 64 + 32)];
+    return c[0] - c[1];
+  };
+  p.view = ViewKind::both;
+  EXPECT_LT(redness(), 10);  // static: opaque
+  p.surfaces = {{skin.restPositions}};
+  const int both = redness();
+  p.view = ViewKind::model;
+  const int model = redness();
+  p.view = ViewKind::tissue;
+  EXPECT_LT(redness(), 10);
+  EXPECT_GT(both, 30);
+  EXPECT_GT(model, both + 10);
+}
+
 // Occlusion: the inside corner of two organs is darker than the same organ alone.
 TEST(Renderer, OrganBesideAnotherIsDarkerInTheCrease) {
   Image alone, together;
