@@ -1,0 +1,123 @@
+#include "tests/dynamics_states.h"
+#include "tests/synthetic_model.h"
+
+// Tools on the surface: what they give the body is what they report.
+namespace medulla {
+
+using namespace states;
+
+static World tubeWorld(SurfaceMode surface, bool fixed, double damping = 0.1) {
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
+  b.surface = surface;
+  b.tissue.damping = damping;
+  if (fixed) b.fixed = {{0, FixedFreedom::all}, {4, FixedFreedom::all}};
+  WorldSettings settings;
+  settings.gravity.setZero();
+  return World(settings, {b});
+}
+
+static Vector3d restNode(const World& world, int node) { return world.bodies()[0].model->restNodes[node]; }
+
+static ToolSpring pushAt(const World& world, int triangle, double depth) {
+  const auto& t = world.bodies()[0].model->triangles[triangle];
+  ToolSpring s;
+  s.nodes = t;
+  s.weights = {0.5, 0.3, 0.2};
+  const Vector3d a = restNode(world, t[0]), b = restNode(world, t[1]), c = restNode(world, t[2]);
+  s.outward = (b - a).cross(c - a).normalized();
+  s.anchor = 0.5 * a + 0.3 * b + 0.2 * c - depth * s.outward;
+  s.stiffness = 400;
+  s.damping = 1;
+  return s;
+}
+
+TEST(Loads, NodesGainExactlyWhatTheToolsGive) {
+  for (SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    World world = tubeWorld(surface, false);
+    Loads loads;
+    loads.toolSprings = {pushAt(world, 30, 0.003), pushAt(world, 31, 0.002)};  // sharing nodes
+    loads.toolSprings[1].tool = 1;
+    for (int node : {40, 41, 42}) {
+      HeldNode held;
+      held.tool = 2;
+      held.node = node;
+      held.anchor = restNode(world, node) + Vector3d(0.001, 0.002, -0.001);
+      held.anchorVelocity = {0.1, 0, 0};
+      held.stiffness = 300;
+      held.damping = 0.5;
+      loads.heldNodes.push_back(held);
+    }
+    for (int frame = 0; frame < 10; ++frame) {
+      const Momentum before = momentum(world.data());
+      const FrameReport report = world.advance(loads);
+      const Momentum after = momentum(world.data());
+      ASSERT_EQ(report.toolImpulse.size(), 3u);
+      const Vector3d given = report.toolImpulse[0] + report.toolImpulse[1] + report.toolImpulse[2];
+      EXPECT_GT(given.norm(), 0);
+      EXPECT_LT((after.linear - before.linear - given).norm(), 1e-12 * (after.linearScale + given.norm()));
+    }
+  }
+}
+
+TEST(Loads, AtRestTheForceIsStiffnessTimesDistance) {
+  for (SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    World world = tubeWorld(surface, true, 1);
+    Loads loads;
+    loads.toolSprings = {pushAt(world, 80, 0.003)};
+    FrameReport report;
+    for (int i = 0; i < 400; ++i) report = world.advance(loads);
+    DynamicsFrame frame;
+    world.readFrame(frame);
+    Vector3d x = Vector3d::Zero();
+    const ToolSpring& s = loads.toolSprings[0];
+    for (int k = 0; k < 3; ++k) x += s.weights[k] * frame.bodies[0].nodes[s.nodes[k]];
+    const Vector3d expected = s.stiffness * (s.anchor - x) * world.data().settings.frameDuration;
+    EXPECT_GT(expected.norm(), 1e-4);
+    EXPECT_LT((report.toolImpulse[0] - expected).norm(), 1e-3 * expected.norm());
+  }
+}
+
+TEST(Loads, APushingSpringNeverPulls) {
+  World world = tubeWorld(SurfaceMode::full, true);
+  Loads loads;
+  loads.toolSprings = {pushAt(world, 80, -0.003)};  // anchor outside
+  for (int i = 0; i < 5; ++i)
+    EXPECT_LE(world.advance(loads).toolImpulse[0].dot(loads.toolSprings[0].outward), 1e-15);
+}
+
+TEST(Loads, TheAnchorMovesWithinTheFrame) {
+  // A stiff held node follows a moving anchor; with the anchor frozen at the frame's end it would be there from the start.
+  World world = tubeWorld(SurfaceMode::full, true, 1);
+  Loads loads;
+  HeldNode held;
+  held.node = 45;
+  held.stiffness = 2000;
+  held.damping = 2;
+  const Vector3d velocity(0, 0.05, 0), start = restNode(world, held.node);
+  held.anchorVelocity = velocity;
+  DynamicsFrame frame;
+  for (int i = 1; i <= 10; ++i) {
+    held.anchor = start + velocity * (i * world.data().settings.frameDuration);
+    loads.heldNodes = {held};
+    world.advance(loads);
+    world.readFrame(frame);
+    EXPECT_LT((frame.bodies[0].nodes[held.node] - held.anchor).norm(), 2e-4) << "frame " << i;
+  }
+  EXPECT_NEAR(vectorOf(world.data().nodes.velocity[world.data().ranges[0].node[held.node]]).y(), 0.05, 0.005);
+}
+
+TEST(Loads, AStiffToolDoesNotBoundTheStep) {
+  World world = tubeWorld(SurfaceMode::full, true);
+  Loads loads;
+  loads.toolSprings = {pushAt(world, 80, 0.002)};
+  loads.toolSprings[0].stiffness = 1e5;
+  loads.toolSprings[0].damping = 100;
+  for (int i = 0; i < 50; ++i) world.advance(loads);
+  DynamicsFrame frame;
+  world.readFrame(frame);
+  Vector3d x = Vector3d::Zero();
+  for (int k = 0; k < 3; ++k) x += loads.toolSprings[0].weights[k] * frame.bodies[0].nodes[loads.toolSprings[0].nodes[k]];
+  EXPECT_LT((x - loads.toolSprings[0].anchor).norm(), 1e-4);
+}
+
+}  // namespace medulla

@@ -1,0 +1,140 @@
+#include <functional>
+#include <limits>
+
+#include "tests/dynamics_states.h"
+#include "tests/synthetic_model.h"
+
+namespace medulla {
+
+using namespace states;
+
+static BodyDescription tube(double young, double damping) {
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), young, {{0, FixedFreedom::all}});
+  b.name = "tube";
+  b.tissue.damping = damping;
+  return b;
+}
+
+static std::string messageOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return {};
+}
+
+TEST(World, TheSameRunTwiceHasTheSameHash) {
+  std::uint64_t hash[2];
+  for (std::uint64_t& h : hash) {
+    World world({}, {tube(6e3, 0.1), tube(9e3, 0.2)});
+    for (int i = 0; i < 20; ++i) {
+      world.advance({});
+      world.energies();  // reading changes nothing
+      DynamicsFrame frame;
+      world.readFrame(frame);
+    }
+    h = world.stateHash();
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+  World other({}, {tube(6e3, 0.1), tube(9e3, 0.2)});
+  for (int i = 0; i < 20; ++i) {
+    const std::uint64_t before = other.stateHash();
+    other.advance({});
+    EXPECT_NE(other.stateHash(), before);
+    EXPECT_EQ(other.stateHash(), other.stateHash());
+  }
+  EXPECT_EQ(other.stateHash(), hash[0]) << "reading changed the state";
+}
+
+TEST(World, BodiesDoNotDisturbEachOther) {
+  WorldSettings settings;
+  settings.substeps = 60;
+  World alone(settings, {tube(6e3, 0.1)}), together(settings, {tube(9e3, 0.2), tube(6e3, 0.1)});
+  for (int i = 0; i < 10; ++i) {
+    alone.advance({});
+    together.advance({});
+  }
+  DynamicsFrame a, b;
+  alone.readFrame(a);
+  together.readFrame(b);
+  for (std::size_t i = 0; i < a.bodies[0].nodes.size(); ++i) EXPECT_EQ(a.bodies[0].nodes[i], b.bodies[1].nodes[i]);
+}
+
+TEST(World, RestIsRest) {
+  WorldSettings settings;
+  settings.gravity.setZero();
+  for (SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    BodyDescription body = tube(6e3, 0.1);
+    body.surface = surface;
+    World world(settings, {body});
+    for (int i = 0; i < 10; ++i) world.advance({});
+    DynamicsFrame frame;
+    world.readFrame(frame);
+    for (std::size_t i = 0; i < frame.bodies[0].nodes.size(); ++i)
+      EXPECT_LT((frame.bodies[0].nodes[i] - body.model->restNodes[i]).norm(), 1e-14);
+    EXPECT_NEAR(world.volumeRatio(0), 1, 1e-12);
+  }
+}
+
+TEST(World, StableAtTheEstimateAndUnstableWellAbove) {
+  for (double damping : {0.0, 0.1}) {
+    for (SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+      BodyDescription body = tube(6e3, damping);
+      body.surface = surface;
+      WorldSettings settings;
+      settings.gravity.setZero();
+      const double stable = World(settings, {body}).stableSubstep();
+      const auto energyAfter = [&](double share) {
+        settings.frameDuration = share * stable * 10;
+        settings.substeps = 10;
+        World world(settings, {body});
+        shake(world.data(), 11, 1e-4, 1e-6, 1e-4);
+        const double before = world.energies().kinetic + world.energies().elastic;
+        for (int i = 0; i < 200; ++i) world.advance({});
+        return (world.energies().kinetic + world.energies().elastic) / before;
+      };
+      EXPECT_LT(energyAfter(0.95), 20);
+      double above = std::numeric_limits<double>::infinity();
+      try {
+        above = energyAfter(1.3);
+      } catch (const std::runtime_error&) {
+        // not finite: as unstable as it gets
+      }
+      EXPECT_GT(above, 1e6) << "the estimate is too careful";
+    }
+  }
+}
+
+TEST(World, ABlowUpNamesBodyTimeAndCause) {
+  WorldSettings settings;
+  settings.substeps = 1;
+  World world(settings, {tube(1e6, 0.1)});
+  const std::string message = messageOf([&] {
+    for (int i = 0; i < 2000; ++i) world.advance({});
+  });
+  EXPECT_NE(message.find("body 'tube'"), std::string::npos) << message;
+  EXPECT_NE(message.find("not finite at"), std::string::npos) << message;
+  EXPECT_NE(message.find("more substeps"), std::string::npos) << message;
+}
+
+TEST(World, DescriptionsThatCannotBeSimulatedAreRefused) {
+  const auto refusal = [](const std::function<void(BodyDescription&)>& spoil) {
+    BodyDescription body = tube(6e3, 0.1);
+    spoil(body);
+    return messageOf([&] { World world({}, {body}); });
+  };
+  const auto expectSays = [](const std::string& message, const char* words) {
+    EXPECT_NE(message.find(words), std::string::npos) << message;
+    EXPECT_NE(message.find("body 'tube'"), std::string::npos) << message;
+  };
+  expectSays(refusal([](BodyDescription& b) { b.tissue.young = -1; }), "Young's modulus");
+  expectSays(refusal([](BodyDescription& b) { b.tissue.poisson = 0.5; }), "Poisson's ratio");
+  expectSays(refusal([](BodyDescription& b) { b.tissue.density = std::nan(""); }), "density");
+  expectSays(refusal([](BodyDescription& b) { b.tissue.damping = -0.1; }), "damping ratio");
+  expectSays(refusal([](BodyDescription& b) { b.factors.flexion = 0; }), "flexion factor");
+  expectSays(refusal([](BodyDescription& b) { b.fixed = {{99, FixedFreedom::all}}; }), "sphere 99");
+  expectSays(refusal([](BodyDescription& b) { b.model = std::make_shared<SoftBodyModel>(); }), "no spheres");
+}
+
+}  // namespace medulla
