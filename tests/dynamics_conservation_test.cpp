@@ -33,7 +33,7 @@ TEST(Conservation, MomentaOfAFreeBodyStayWhileItIsDamped) {
 }
 
 TEST(Conservation, EnergyOfAnUndampedBodyDoesNotDrift) {
-  World world(weightless(), {freeTube(0)});
+  World world(weightless(200), {freeTube(0)});
   shake(world.data(), 5, 0.1, 0.0005, 0.05);
   const Energies start = world.energies();
   double largest = 0;
@@ -42,8 +42,8 @@ TEST(Conservation, EnergyOfAnUndampedBodyDoesNotDrift) {
     const Energies e = world.energies();
     largest = std::max(largest, std::abs(e.kinetic + e.elastic - start.kinetic - start.elastic));
   }
-  // The symplectic step swings about the true energy by a share of order step times frequency, here 0.7 at most.
-  EXPECT_LT(largest, 0.15 * (start.kinetic + start.elastic));
+  // The symplectic step swings about the true energy by a share of order step times frequency (8 % for the fastest).
+  EXPECT_LT(largest, 0.02 * (start.kinetic + start.elastic));
   EXPECT_GT(world.energies().kinetic, 0.05 * start.kinetic);
 }
 
@@ -86,19 +86,21 @@ TEST(Conservation, AFreeTopKeepsItsEnergy) {
   BodyDescription body = synthetic::body(synthetic::chainModel(synthetic::straightTube(2, 0.05, 0.01, 4, 8)), 5e3);
   auto model = std::make_shared<SoftBodyModel>(*body.model);
   model->spheres.resize(1);
-  model->spheres[0].secondMoment = model->spheres[0].volume * 1e-4 * Vector3d(0.2, 0.5, 1.0).asDiagonal().toDenseMatrix();
+  model->spheres[0].secondMoment =
+      model->spheres[0].volume * 1e-4 * Vector3d(0.2, 0.5, 1.0).asDiagonal().toDenseMatrix();
   model->links.clear();
   for (Attachment& a : model->attachments) a = {false, 0, 0, model->restNodes[0], a.area, a.volume};
   body.model = model;
   body.surface = SurfaceMode::skin;
-  World world(weightless(20), {body});  // 1 ms
+  World world(weightless(20), {body});                  // 1 ms
   setAngularVelocity(world.data(), 0, {0.2, 20, 0.1});  // about the middle axis: it tumbles
   const double energy = world.energies().kinetic;
   const Vector3d momentumBefore = vectorOf(world.data().spheres.angularMomentum[0]);
   Vector3d slowest = Vector3d::Ones() * 1e9;
   for (int i = 0; i < 250; ++i) {
     world.advance({});
-    const Vector3d inBody = orientation(world.data(), 0).conjugate() * vectorOf(world.data().spheres.angularVelocity[0]);
+    const Vector3d inBody =
+        orientation(world.data(), 0).conjugate() * vectorOf(world.data().spheres.angularVelocity[0]);
     slowest = slowest.cwiseMin(inBody);
   }
   EXPECT_LT(slowest.y(), -10) << "it did not turn over: the gyroscopic term is missing";

@@ -16,7 +16,9 @@ static World tubeWorld(SurfaceMode surface, bool fixed, double damping = 0.1) {
   return World(settings, {b});
 }
 
-static Vector3d restNode(const World& world, int node) { return world.bodies()[0].model->restNodes[node]; }
+static Vector3d restNode(const World& world, int node) {
+  return world.bodies()[0].model->restNodes[node];
+}
 
 static ToolSpring pushAt(const World& world, int triangle, double depth) {
   const auto& t = world.bodies()[0].model->triangles[triangle];
@@ -81,12 +83,12 @@ TEST(Loads, APushingSpringNeverPulls) {
   World world = tubeWorld(SurfaceMode::full, true);
   Loads loads;
   loads.toolSprings = {pushAt(world, 80, -0.003)};  // anchor outside
-  for (int i = 0; i < 5; ++i)
-    EXPECT_LE(world.advance(loads).toolImpulse[0].dot(loads.toolSprings[0].outward), 1e-15);
+  for (int i = 0; i < 5; ++i) EXPECT_LE(world.advance(loads).toolImpulse[0].dot(loads.toolSprings[0].outward), 1e-15);
 }
 
 TEST(Loads, TheAnchorMovesWithinTheFrame) {
-  // A stiff held node follows a moving anchor; with the anchor frozen at the frame's end it would be there from the start.
+  // A stiff held node follows a moving anchor; with the anchor frozen at the frame's end it would be there from the
+  // start.
   World world = tubeWorld(SurfaceMode::full, true, 1);
   Loads loads;
   HeldNode held;
@@ -116,7 +118,8 @@ TEST(Loads, AStiffToolDoesNotBoundTheStep) {
   DynamicsFrame frame;
   world.readFrame(frame);
   Vector3d x = Vector3d::Zero();
-  for (int k = 0; k < 3; ++k) x += loads.toolSprings[0].weights[k] * frame.bodies[0].nodes[loads.toolSprings[0].nodes[k]];
+  for (int k = 0; k < 3; ++k)
+    x += loads.toolSprings[0].weights[k] * frame.bodies[0].nodes[loads.toolSprings[0].nodes[k]];
   EXPECT_LT((x - loads.toolSprings[0].anchor).norm(), 1e-4);
 }
 

@@ -9,7 +9,8 @@ namespace medulla {
 using namespace states;
 
 static BodyDescription tube(double young, double damping) {
-  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), young, {{0, FixedFreedom::all}});
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), young,
+                                      {{0, FixedFreedom::all}});
   b.name = "tube";
   b.tissue.damping = damping;
   return b;

@@ -7,8 +7,18 @@
 namespace medulla {
 
 struct Anchor {
-  Lanes3 offset, position, velocity;  // m from the host's centre line or centre, m, m/s
+  Lanes3 base, baseVelocity;  // m, m/s: the point of the skeleton
+  Lanes3 omega;               // rad/s of the frame that carries the offset
+  Lanes3 offset;              // m, from the base to where the node belongs
 };
+
+inline Lanes3 positionOf(const Anchor& a) {
+  return a.base + a.offset;
+}
+// Of the point fixed to the carrying frame at `lever` from the base.
+inline Lanes3 velocityAt(const Anchor& a, const Lanes3& lever) {
+  return a.baseVelocity + cross(a.omega, lever);
+}
 
 // One link's frame, the same in all lanes.
 struct LinkHost {
@@ -40,11 +50,11 @@ inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   Lanes c, s;
   cosineSine(g.along * h.twist, c, s);
   Anchor a;
+  a.base = fma(g.along, h.line, h.origin);
+  a.baseVelocity = fma(g.along, h.lineVelocity, h.originVelocity);
+  a.omega = fma(fma(g.along, h.spinAlong, h.spin0), h.n, h.turning);
   a.offset =
       fma(fnma(g.restOffset.z, s, g.restOffset.y * c), h.axisU, fma(g.restOffset.y, s, g.restOffset.z * c) * h.axisV);
-  a.position = fma(g.along, h.line, h.origin) + a.offset;
-  const Lanes3 omega = fma(fma(g.along, h.spinAlong, h.spin0), h.n, h.turning);
-  a.velocity = fma(g.along, h.lineVelocity, h.originVelocity) + cross(omega, a.offset);
   return a;
 }
 
@@ -60,11 +70,7 @@ inline SphereHost sphereHost(const WorldData& d, int i) {
 }
 
 inline Anchor anchorOnSphere(const SphereHost& h, const NodeGroup& g) {
-  Anchor a;
-  a.offset = rotate(h.rotation, g.restOffset);
-  a.position = h.position + a.offset;
-  a.velocity = h.velocity + cross(h.angularVelocity, a.offset);
-  return a;
+  return {h.position, h.velocity, h.angularVelocity, rotate(h.rotation, g.restOffset)};
 }
 
 }  // namespace medulla

@@ -106,9 +106,9 @@ Vector3d nodePosition(const WorldData& d, int node) {
   if (!isSkin(d, node)) return vectorOf(d.nodes.position[node]);
   const GroupHost host = d.nodes.groupHosts[node / 4];
   const NodeGroup& group = d.nodes.groups[node / 4];
-  return lane(host.onLink ? anchorOnLink(linkHost(d, host.host), group).position
-                          : anchorOnSphere(sphereHost(d, host.host), group).position,
-              node % 4);
+  const Anchor anchor =
+      host.onLink ? anchorOnLink(linkHost(d, host.host), group) : anchorOnSphere(sphereHost(d, host.host), group);
+  return lane(positionOf(anchor), node % 4);
 }
 
 void addNodeImpulse(WorldData& d, int node, const Vector3d& impulse) {

@@ -27,11 +27,17 @@ void storeNodes(const Lanes3& v, std::vector<Quad>& q, int i) {
   store(q[i + 3], d);
 }
 
-// Pull of the anchors on the four nodes of group g; adds it to their force.
-Lanes3 pullNodes(Nodes& n, const NodeGroup& group, const Anchor& anchor, int g) {
-  const Lanes3 stretch = anchor.position - gatherNodes(n.position, 4 * g);
-  const Lanes3 rate = anchor.velocity - gatherNodes(n.velocity, 4 * g);
-  const Lanes3 pull = fma(group.stiffness, stretch, group.damping * rate);
+struct Pull {
+  Lanes3 force, moment;  // N on the nodes, N m about the anchors' bases
+};
+
+// Pull of the anchors on the four nodes of group g; adds it to their force. The spring pulls along the stretch, so that
+// its moment is the same whether it acts on the host at the anchor or at the node. The damper does not: it acts between
+// the node and the point of the carrying frame where the node *is*, or the pair would exert a couple on a free body.
+Pull pullNodes(Nodes& n, const NodeGroup& group, const Anchor& anchor, int g) {
+  const Lanes3 lever = gatherNodes(n.position, 4 * g) - anchor.base;
+  const Lanes3 rate = velocityAt(anchor, lever) - gatherNodes(n.velocity, 4 * g);
+  const Lanes3 pull = fma(group.stiffness, anchor.offset - lever, group.damping * rate);
   Lanes a = pull.x, b = pull.y, c = pull.z, d = splat(0);
   transpose(a, b, c, d);
   Quad* f = &n.force[4 * g];
@@ -39,7 +45,7 @@ Lanes3 pullNodes(Nodes& n, const NodeGroup& group, const Anchor& anchor, int g) 
   store(f[1], load(f[1]) + b);
   store(f[2], load(f[2]) + c);
   store(f[3], load(f[3]) + d);
-  return pull;
+  return {pull, cross(lever, pull)};
 }
 
 void evaluateOnLink(WorldData& d, const HostRange& range) {
@@ -49,13 +55,11 @@ void evaluateOnLink(WorldData& d, const HostRange& range) {
   Lanes twist = zero;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
-    const Anchor anchor = anchorOnLink(host, group);
-    const Lanes3 pull = pullNodes(d.nodes, group, anchor, g);
-    const Lanes3 turning = cross(anchor.offset, pull);
-    sum = sum + pull;
-    along = fma(group.along, pull, along);
-    moment = moment + turning;
-    twist = fma(group.along, dot(host.n, turning), twist);
+    const Pull pull = pullNodes(d.nodes, group, anchorOnLink(host, group), g);
+    sum = sum + pull.force;
+    along = fma(group.along, pull.force, along);
+    moment = moment + pull.moment;
+    twist = fma(group.along, dot(host.n, pull.moment), twist);
   }
   LinkFrame& f = d.links.frames[range.host / 4];
   const int lane = range.host % 4;
@@ -77,10 +81,10 @@ void evaluateOnSphere(WorldData& d, const HostRange& range) {
   const Lanes zero = splat(0);
   Lanes3 sum{zero, zero, zero}, moment = sum;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
-    const Anchor anchor = anchorOnSphere(host, d.nodes.groups[g]);
-    const Lanes3 pull = pullNodes(d.nodes, d.nodes.groups[g], anchor, g);
-    sum = sum + pull;
-    moment = moment + cross(anchor.offset, pull);
+    const NodeGroup& group = d.nodes.groups[g];
+    const Pull pull = pullNodes(d.nodes, group, anchorOnSphere(host, group), g);
+    sum = sum + pull.force;
+    moment = moment + pull.moment;
   }
   store(d.spheres.force[range.host], zero - sumOfLanes(sum, zero));
   store(d.spheres.torque[range.host], zero - sumOfLanes(moment, zero));
@@ -133,8 +137,8 @@ void evaluateAttachments(WorldData& d) {
 
 void placeSkin(WorldData& d) {
   const auto place = [&d](const Anchor& anchor, int g) {
-    storeNodes(anchor.position, d.nodes.position, 4 * g);
-    storeNodes(anchor.velocity, d.nodes.velocity, 4 * g);
+    storeNodes(positionOf(anchor), d.nodes.position, 4 * g);
+    storeNodes(velocityAt(anchor, anchor.offset), d.nodes.velocity, 4 * g);
   };
   for (const HostRange& range : d.nodes.skinOnLinks) {
     const LinkHost host = linkHost(d, range.host);
@@ -156,7 +160,7 @@ double surfaceEnergy(const WorldData& d) {
     sum += 0.5 * s.stiffness[k % 4] * stretch * stretch;
   }
   const auto add = [&](const Anchor& anchor, int g) {
-    const Lanes3 stretch = anchor.position - gatherNodes(d.nodes.position, 4 * g);
+    const Lanes3 stretch = positionOf(anchor) - gatherNodes(d.nodes.position, 4 * g);
     sum += 0.5 * sumOfLanes(d.nodes.groups[g].stiffness * dot(stretch, stretch));
   };
   for (const HostRange& range : d.nodes.onLinks) {
