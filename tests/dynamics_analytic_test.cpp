@@ -79,7 +79,7 @@ TEST(Analytic, ACantileverBendsLikeEulerBernoulli) {
     constexpr double g = 0.02;  // small: linear
     BodyDescription body = bar(links, 1);
     World world(under({0, -g, 0}), {body});
-    settle(world, 20);
+    settle(world, 80);
     std::vector<double> weight, tipOnly(links + 1, 0);
     for (const FillingSphere& s : body.model->spheres) weight.push_back(kDensity * s.volume * g);
     tipOnly.back() = 1;

@@ -8,12 +8,9 @@ namespace medulla {
 // r(x) with asin(sqrt(x)) = sqrt(x) (1 + x r(x)) on 0 <= x <= 1/4. Interpolated at Chebyshev nodes from asin's power
 // series in exact arithmetic; error of asin 7e-17.
 inline Lanes arcSineRemainder(Lanes x) {
-  Lanes r = splat(0.028540834429984487);
-  for (double c : {-0.011237244215539824, 0.016311748922541877, 0.007714874347447517, 0.011892875834833392,
-                   0.013927457312716163, 0.017355437344723182, 0.022372038738232097, 0.030381947625840226,
-                   0.04464285709958662, 0.07500000000022967, 0.16666666666666646})
-    r = fma(r, x, splat(c));
-  return r;
+  return polynomial(x, 0.16666666666666646, 0.07500000000022967, 0.04464285709958662, 0.030381947625840226,
+                    0.022372038738232097, 0.017355437344723182, 0.013927457312716163, 0.011892875834833392,
+                    0.007714874347447517, 0.016311748922541877, -0.011237244215539824, 0.028540834429984487);
 }
 
 struct AngleOverSine {
@@ -76,14 +73,12 @@ inline void cosineSine(Lanes angle, Lanes& cosine, Lanes& sine) {
   const Lanes one = splat(1), two = splat(2);
   const Lanes q = splat(0.25) * fnma(nearest(angle * splat(1 / kTurn)), splat(kTurn), angle);
   const Lanes q2 = q * q;
-  Lanes s = splat(-1.0 / 1307674368000.0);
-  for (double c : {1.0 / 6227020800.0, -1.0 / 39916800.0, 1.0 / 362880.0, -1.0 / 5040.0, 1.0 / 120.0, -1.0 / 6.0})
-    s = fma(s, q2, splat(c));
-  s = fma(s * q2, q, q);
-  Lanes versine = splat(1.0 / 20922789888000.0);  // 1 - cos: keeps the doubling from losing small angles
-  for (double c :
-       {-1.0 / 87178291200.0, 1.0 / 479001600.0, -1.0 / 3628800.0, 1.0 / 40320.0, -1.0 / 720.0, 1.0 / 24.0, -0.5})
-    versine = fma(versine, q2, splat(c));
+  const Lanes r = polynomial(q2, -1.0 / 6, 1.0 / 120, -1.0 / 5040, 1.0 / 362880, -1.0 / 39916800, 1.0 / 6227020800.0,
+                             -1.0 / 1307674368000.0);
+  const Lanes s = fma(r * q2, q, q);
+  // 1 - cos, which keeps the doubling from losing small angles
+  const Lanes versine = polynomial(q2, -0.5, 1.0 / 24, -1.0 / 720, 1.0 / 40320, -1.0 / 3628800, 1.0 / 479001600,
+                                   -1.0 / 87178291200.0, 1.0 / 20922789888000.0);
   const Lanes c1 = fma(versine, q2, one);
   const Lanes s2 = two * s * c1, c2 = fnma(two * s, s, one);
   sine = two * s2 * c2;

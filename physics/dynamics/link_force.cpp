@@ -30,7 +30,7 @@ struct SphereLanes {
   Rotation rotation;
 };
 
-SphereLanes gatherSpheres(const Spheres& s, const std::uint32_t* i) {
+MEDULLA_INLINE SphereLanes gatherSpheres(const Spheres& s, const std::uint32_t* i) {
   SphereLanes out;
   out.position = gather(s.position[i[0]], s.position[i[1]], s.position[i[2]], s.position[i[3]]);
   out.velocity = gather(s.velocity[i[0]], s.velocity[i[1]], s.velocity[i[2]], s.velocity[i[3]]);
@@ -42,7 +42,7 @@ SphereLanes gatherSpheres(const Spheres& s, const std::uint32_t* i) {
   return out;
 }
 
-LinkEnd measureEnd(const LinkGroup& link, const Rotation& rotation, const Lanes3& n) {
+MEDULLA_INLINE LinkEnd measureEnd(const LinkGroup& link, const Rotation& rotation, const Lanes3& n) {
   LinkEnd e;
   e.t = rotate(rotation, link.restT);
   e.u = rotate(rotation, link.restU);
@@ -59,11 +59,12 @@ LinkEnd measureEnd(const LinkGroup& link, const Rotation& rotation, const Lanes3
 }
 
 // The smallest rotation that takes t to n, applied to an axis perpendicular to t.
-Lanes3 carry(const LinkEnd& e, const Lanes3& axis, Lanes axisAlongN) {
+MEDULLA_INLINE Lanes3 carry(const LinkEnd& e, const Lanes3& axis, Lanes axisAlongN) {
   return fnma(axisAlongN, e.spinAxis, axis);
 }
 
-LinkMeasures measure(const LinkGroup& link, const SphereLanes& s0, const SphereLanes& s1, Lanes unwoundTwist) {
+MEDULLA_INLINE LinkMeasures measure(const LinkGroup& link, const SphereLanes& s0, const SphereLanes& s1,
+                                    Lanes unwoundTwist) {
   LinkMeasures m;
   m.line = s1.position - s0.position;
   m.length = squareRoot(dot(m.line, m.line));
@@ -81,8 +82,8 @@ LinkMeasures measure(const LinkGroup& link, const SphereLanes& s0, const SphereL
 
 // Flexion: the rotation vector from t to n has components -f b on u and f a on v, f = theta / sin(theta). Their
 // gradients with respect to n are f v - b h t and f u - a h t (signs cancel in the energy), h = -df/dcos(theta).
-Lanes3 flexionGradient(const LinkGroup& link, const LinkEnd& e, const Lanes3& nRate, const Lanes3& omega,
-                       const Lanes3& n) {
+MEDULLA_INLINE Lanes3 flexionGradient(const LinkGroup& link, const LinkEnd& e, const Lanes3& nRate, const Lanes3& omega,
+                                      const Lanes3& n) {
   const Lanes3 relative = nRate - cross(omega, n);  // n' as the sphere sees it
   const Lanes alongT = e.angle.slope * dot(e.t, relative);
   const Lanes rateA = e.angle.value * dot(e.u, relative) - e.a * alongT;

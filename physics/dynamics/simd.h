@@ -10,6 +10,9 @@
 // chosen at run time by processor.
 namespace medulla {
 
+// For functions whose results are dozens of registers: through memory they would cost more than what they compute.
+#define MEDULLA_INLINE [[gnu::always_inline]] inline
+
 using Lanes = __m256d;  // + - * / and [] are the compilers' own
 
 struct Lanes3 {
@@ -43,6 +46,14 @@ inline Lanes fma(Lanes a, Lanes b, Lanes c) {
 inline Lanes fnma(Lanes a, Lanes b, Lanes c) {
   return _mm256_fnmadd_pd(a, b, c);
 }  // c - a b
+// c0 + x (c1 + x (c2 + ...))
+inline Lanes polynomial(Lanes, double last) {
+  return splat(last);
+}
+template <class... Rest>
+inline Lanes polynomial(Lanes x, double c0, Rest... rest) {
+  return fma(polynomial(x, rest...), x, splat(c0));
+}
 inline Lanes squareRoot(Lanes a) {
   return _mm256_sqrt_pd(a);
 }

@@ -61,6 +61,14 @@ void storeAngularVelocity(const SphereGroup& g, const Turning& t, Quad* out) {
   storeQuads(omega.x, omega.y, omega.z, splat(0), out);
 }
 
+void stepNodes(std::vector<Quad>& velocity, const std::vector<Quad>& force, const std::vector<double>& inverseMass,
+               double h, int count) {
+  Quad* v = velocity.data();
+  const Quad* f = force.data();
+  const double* inverse = inverseMass.data();
+  for (int i = 0; i < count; ++i) store(v[i], fma(splat(h * inverse[i]), load(f[i]), load(v[i])));
+}
+
 }  // namespace
 
 void sumSphereForces(WorldData& d) {
@@ -87,9 +95,7 @@ void stepVelocities(WorldData& d) {
     store(s.velocity[i], fma(h * splat(g.inverseMass[i % 4]), load(s.force[i]), load(s.velocity[i])));
     store(s.angularMomentum[i], fma(h * splat(g.freeToTurn[i % 4]), load(s.torque[i]), load(s.angularMomentum[i])));
   }
-  Nodes& n = d.nodes;
-  for (int i = 0; i < n.dynamicEnd; ++i)
-    store(n.velocity[i], fma(splat(d.substep * n.inverseMass[i]), load(n.force[i]), load(n.velocity[i])));
+  stepNodes(d.nodes.velocity, d.nodes.force, d.nodes.inverseMass, d.substep, d.nodes.dynamicEnd);
 }
 
 void stepPositions(WorldData& d) {
@@ -102,8 +108,10 @@ void stepPositions(WorldData& d) {
     storeQuads(t.q.x, t.q.y, t.q.z, t.w, &s.orientation[4 * g]);
   }
   refreshAngularVelocities(d);
-  Nodes& n = d.nodes;
-  for (int i = 0; i < n.dynamicEnd; ++i) store(n.position[i], fma(h, load(n.velocity[i]), load(n.position[i])));
+  Quad* x = d.nodes.position.data();
+  const Quad* v = d.nodes.velocity.data();
+  const int count = d.nodes.dynamicEnd;
+  for (int i = 0; i < count; ++i) store(x[i], fma(h, load(v[i]), load(x[i])));
 }
 
 void refreshAngularVelocities(WorldData& d) {

@@ -112,16 +112,24 @@ void evaluateSpringTensions(WorldData& d) {
 }
 
 void sumNodeForces(WorldData& d) {
-  Nodes& n = d.nodes;
   const Lanes gravity = load(d.gravity);
-  const SpringEnd* end = d.springs.ends.data();
+  // Plain pointers: through the vectors every store could change every address.
+  const std::vector<Quad>& x = d.nodes.position;
+  const char* positions = reinterpret_cast<const char*>(x.data());
+  Quad* force = d.nodes.force.data();
+  const double* mass = d.nodes.mass.data();
   const double* tension = d.springs.tensionOverLength.data();
-  for (int i = 0; i < n.dynamicEnd; ++i) {
-    Lanes force = splat(n.mass[i]) * gravity;
-    const Lanes x = load(n.position[i]);
-    const SpringEnd* last = d.springs.ends.data() + d.springs.firstEnd[i + 1];
-    for (; end != last; ++end) force = fma(splat(tension[end->spring]), load(at(n.position, end->other)) - x, force);
-    store(n.force[i], force);
+  const SpringEnd* end = d.springs.ends.data();
+  const std::uint32_t* firstEnd = d.springs.firstEnd.data();
+  const int count = d.nodes.dynamicEnd;
+  for (int i = 0; i < count; ++i) {
+    const Lanes here = load(*reinterpret_cast<const Quad*>(positions + i * sizeof(Quad)));
+    Lanes sum = splat(mass[i]) * gravity;
+    for (std::uint32_t k = firstEnd[i]; k < firstEnd[i + 1]; ++k) {
+      const Lanes there = load(*reinterpret_cast<const Quad*>(positions + end[k].other));
+      sum = fma(splat(tension[end[k].spring]), there - here, sum);
+    }
+    store(force[i], sum);
   }
 }
 
