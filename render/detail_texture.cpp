@@ -19,9 +19,10 @@ class VesselPainter {
     for (int k = 0; k < pattern.vesselTrees; ++k) {
       const float turn = random_.next() < 0.3f ? 3.1416f : 0.f;
       const float heading = pattern.vesselHeading + (random_.next() - 0.5f) * 1.5f + turn;
+      const int row = k / 3;
       // One tree per cell of a coarse grid: bare and crowded corners would betray the tile.
       const float x = (float(k % 3) + 0.2f + 0.6f * random_.next()) * float(side_) / 3;
-      const float y = (float(k / 3) + 0.2f + 0.6f * random_.next()) * float(side_) / 3;
+      const float y = (float(row) + 0.2f + 0.6f * random_.next()) * float(side_) / 3;
       grow({x, y, heading, heading, pattern.vesselWidth * (0.55f + 0.45f * random_.next()) * unit_, 0});
     }
   }
@@ -37,14 +38,14 @@ class VesselPainter {
     float wobble = 0, untilFork = (26 + 30 * random_.next()) * unit_ * (0.6f + 0.4f * w.width / unit_);
     float turn = random_.next() < 0.5f ? -1.f : 1.f;
     const float steps = (150 + 90 * random_.next()) * unit_ * std::min(1.f, 0.25f + w.width / (2.2f * unit_));
-    for (float step = 0; step < steps; step += 1) {
+    for (int step = 0; step < int(std::ceil(steps)); ++step) {
       wobble += -0.06f * wobble + (random_.next() - 0.5f) * 0.11f;
       w.angle += (w.heading - w.angle) * 0.012f;
       const float angle = w.angle + wobble;
       w.x += std::cos(angle);
       w.y += std::sin(angle);
       // A trunk fades in as if it surfaced from the depth.
-      splat(w, w.forks ? 1.f : std::min(1.f, step / (70 * unit_)));
+      splat(w, w.forks ? 1.f : std::min(1.f, float(step) / (70 * unit_)));
       w.width *= 0.9990f;
       untilFork -= 1;
       if (untilFork < 0 && w.forks < kMaxForks - 1) {
