@@ -18,8 +18,7 @@ static constexpr double arrived = 1e-9;
 // Enough for every groove and corner met in a tick; what is left is done in the next.
 static constexpr int maxSweeps = 10, maxPushes = 10, maxPasses = 4;
 
-// ---- Nearest point in half-spaces
-// ------------------------------------------------------------------------------------
+// ---- Nearest point in half-spaces ----------------------------------------------------------------------
 
 // Point of the intersection of the chosen planes that is nearest to the goal: goal + N^T p with N N^T p = b - N goal.
 static bool nearestOnPlanes(const Vector3d& goal, const HalfSpace* halfSpaces, const int* chosen, int count,
@@ -63,8 +62,7 @@ bool nearestInHalfSpaces(const Vector3d& goal, const HalfSpace* halfSpaces, int 
   return best < std::numeric_limits<double>::infinity();
 }
 
-// ---- Half-spaces collected on the way
-// --------------------------------------------------------------------------------
+// ---- Half-spaces collected on the way ------------------------------------------------------------------
 
 namespace {
 struct TouchedPlanes {
@@ -98,8 +96,7 @@ static void dropPlane(TouchedPlanes& touched, int k) {
   touched.triangles[k] = touched.triangles[touched.count];
 }
 
-// ---- The device moves
-// ------------------------------------------------------------------------------------------------
+// ---- The device moves ------------------------------------------------------------------------------------
 
 // Moves the proxy to `target` or standOff short of the first surface on the way. The step back along the path grows at
 // grazing incidence, so that the distance to the surface stays standOff.
@@ -196,8 +193,7 @@ void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool
   if (!proxy.inContact()) proxy.slipping = true;
 }
 
-// ---- The surface moves
-// -----------------------------------------------------------------------------------------------
+// ---- The surface moves -----------------------------------------------------------------------------------
 
 static Vector3d weighted(const Triangle& triangle, const Vector3d& weights) {
   return weights.x() * triangle.a + weights.y() * triangle.b + weights.z() * triangle.c;
@@ -288,8 +284,7 @@ void followSurface(Buckets& buckets, double alphaBefore, double alpha, double to
   }
 }
 
-// ---- The start
-// -------------------------------------------------------------------------------------------------------
+// ---- The start -------------------------------------------------------------------------------------------
 
 // Solid angle of a triangle seen from p, over 4 pi (Van Oosterom and Strackee 1983). Summed over a closed surface: 1
 // inside, 0 outside.

@@ -18,17 +18,17 @@ namespace {
 // A tool between two hand-overs. The "coupled" position is the device as the coupling feels it: where the clamped
 // spring would end. It is the device itself unless forceMax was reached.
 struct Tool {
+  ToolSample device, deviceAtFrameStart;
   ToolSettings settings;
   Proxy proxy;
   Grip grip;
-  ToolSample device, deviceAtFrameStart;
   Vector3d coupled = Vector3d::Zero(), coupledAtFrameStart = Vector3d::Zero();
   Vector3d coupledSum = Vector3d::Zero();  // over the frame's ticks
-  int ticks = 0;
-  ProxyContact lastContact;  // while isLeaving: in contact, or not yet clear of it
+  ProxyContact lastContact;                // while isLeaving: in contact, or not yet clear of it
+  double largestPush = 0;                  // N, of the coupling's spring during this contact
+  double clampScale = 1;                   // of the force, at the last tick
+  int ticks = 0;                           // in this frame
   bool isLeaving = false;
-  double largestPush = 0;  // N, of the coupling's spring during this contact
-  double clampScale = 1;   // of the force, at the last tick
 };
 }  // namespace
 
@@ -40,8 +40,7 @@ struct Servo::Data {
   std::vector<ToolState> states;
 };
 
-// ---- Checks
-// ----------------------------------------------------------------------------------------------------------
+// ---- Checks ----------------------------------------------------------------------------------------------
 
 static void checkSample(const ToolSample& sample, std::size_t tool) {
   const bool inReach = sample.position.allFinite() && sample.position.lpNorm<Eigen::Infinity>() <= toolReach;
@@ -63,8 +62,7 @@ static void checkSettings(const ToolSettings& s, std::size_t tool) {
                              "staticFriction >= dynamicFriction >= 0, all finite");
 }
 
-// ---- One tick
-// --------------------------------------------------------------------------------------------------------
+// ---- One tick --------------------------------------------------------------------------------------------
 
 static Vector3d tangential(const Vector3d& v, const Vector3d& normal) {
   return v - v.dot(normal) * normal;
@@ -175,8 +173,7 @@ void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
   data_->alpha = alpha;
 }
 
-// ---- Dynamics side
-// ---------------------------------------------------------------------------------------------------
+// ---- Dynamics side ---------------------------------------------------------------------------------------
 
 static void startFrame(Tool& tool) {
   tool.deviceAtFrameStart = tool.device;
@@ -284,8 +281,7 @@ void Servo::handOver(double frameDuration, Loads& out) const {
   }
 }
 
-// ---- Life
-// ------------------------------------------------------------------------------------------------------------
+// ---- Life ------------------------------------------------------------------------------------------------
 
 static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, const ToolSample& start) {
   Tool tool;
@@ -301,6 +297,7 @@ static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, const
 static Buckets makeBuckets(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools,
                            const DynamicsFrame& rest) {
   std::vector<std::shared_ptr<const SoftBodyModel>> models;
+  models.reserve(bodies.size());
   for (const TouchableBody& body : bodies) models.push_back(body.model);
   double largestRadius = 0;
   for (std::size_t k = 0; k < tools.size(); ++k) {
@@ -314,6 +311,8 @@ Servo::Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSet
              const DynamicsFrame& rest, const std::vector<ToolSample>& start)
     : data_(new Data{makeBuckets(bodies, tools, rest), tickDuration, 0, {}, {}}) {
   assert(tools.size() == start.size() && tickDuration > 0);
+  data_->tools.reserve(tools.size());
+  data_->states.reserve(tools.size());
   for (std::size_t k = 0; k < tools.size(); ++k) {
     checkSample(start[k], k);
     data_->tools.push_back(makeTool(data_->buckets, tools[k], start[k]));

@@ -14,8 +14,7 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-// ---- Triangle tests
-// --------------------------------------------------------------------------------------------------
+// ---- Triangle tests --------------------------------------------------------------------------------------
 
 static Triangle randomTriangle(TestRandom& random) {
   const Vector3d middle = random.vector(0.02);
@@ -90,8 +89,7 @@ TEST(SweptTriangle, DegenerateTrianglesCountAsTheirEdges) {
   EXPECT_NEAR(hit.t, (0.02 - 0.003) / 0.04, 1e-12);
 }
 
-// ---- Buckets
-// ---------------------------------------------------------------------------------------------------------
+// ---- Buckets ---------------------------------------------------------------------------------------------
 
 static SurfaceHit bruteForce(const BlendedSurface& surface, const Vector3d& start, const Vector3d& motion,
                              double radius, double alpha) {
@@ -157,8 +155,7 @@ TEST(Buckets, NearMissesNoTriangleWithinReach) {
   }
 }
 
-// ---- Half-spaces
-// -----------------------------------------------------------------------------------------------------
+// ---- Half-spaces ---------------------------------------------------------------------------------------
 
 TEST(HalfSpaces, NearestPointIsFeasibleAndNoSampledPointIsNearer) {
   TestRandom random;
@@ -199,8 +196,7 @@ TEST(HalfSpaces, OppositeWallsWithoutRoomAreReported) {
   EXPECT_FALSE(nearestInHalfSpaces({0, 0, 0}, walls, 2, x, pressure));
 }
 
-// ---- Whole ticks
-// -----------------------------------------------------------------------------------------------------
+// ---- Whole ticks -----------------------------------------------------------------------------------------
 
 namespace {
 struct Script {

@@ -94,7 +94,6 @@ TEST(Servo, BadInputIsRefusedByName) {
   servo.tick(0.5, {deviceAt({0, 0.02, 0})});  // and goes on
 }
 
-// The still tool touches; frames commit in the middle of a slide: nothing jumps.
 TEST(Servo, TwoToolsTouchTwoBodies) {
   const TouchShape low = plate(6, 0.03, thickness, 3), high = plate(6, 0.03, thickness, 4);
   DynamicsFrame frame = frameAt(*low, 0);
@@ -115,8 +114,7 @@ TEST(Servo, TwoToolsTouchTwoBodies) {
   }
 }
 
-// ---- Against a soft body
-// ---------------------------------------------------------------------------------------------
+// ---- Against a soft body ---------------------------------------------------------------------------------
 
 static ToolRun pressing(double speed) {
   ToolRun run{SpringBody(ellipsoid(24, 20, 7, 0.3)), frictionless(), {}, 24, 1.0 / 1200, {}};
