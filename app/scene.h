@@ -14,12 +14,12 @@ namespace medulla {
 
 struct SceneBody {
   int line = 0;
+  SurfaceMode surface = SurfaceMode::full;
   std::string name, modelPath, look;
   Tissue tissue;
   LinkFactors factors;
-  SurfaceMode surface = SurfaceMode::full;
-  Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
   std::vector<FixedSphere> fixed;
+  Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
 };
 
 // Scenery: drawn, not simulated, not touched yet.

@@ -1,5 +1,7 @@
 #include "app/files/log_file.h"
 
+#include <fmt/format.h>
+
 #include <cassert>
 
 #include "app/files/number_text.h"
@@ -24,12 +26,12 @@ LogFile::LogFile(const std::string& path, const std::vector<std::string>& tools,
     : file_(path), toolCount_(tools.size()), bodyCount_(bodies.size()) {
   std::string header = "t";
   for (const std::string& tool : tools) {
-    for (const char* quantity : {".device", ".proxy", ".force"}) {
-      for (const char* axis : {".x", ".y", ".z"}) header += "," + tool + quantity + axis;
+    for (const char* quantity : {"device", "proxy", "force"}) {
+      header += fmt::format(",{0}.{1}.x,{0}.{1}.y,{0}.{1}.z", tool, quantity);
     }
-    header += "," + tool + ".contact," + tool + ".held";
+    header += fmt::format(",{0}.contact,{0}.held", tool);
   }
-  for (const std::string& body : bodies) header += "," + body + ".volume_ratio," + body + ".dynamic_nodes";
+  for (const std::string& body : bodies) header += fmt::format(",{0}.volume_ratio,{0}.dynamic_nodes", body);
   file_.write(header + ",energy.kinetic,energy.elastic,impulse_mismatch\n");
 }
 

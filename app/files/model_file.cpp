@@ -170,17 +170,19 @@ class Rows {
   }
 
  private:
+  static bool isSpace(char c) { return c == ' ' || c == '\n' || c == '\t'; }
+
   void skipSpace() {
     std::size_t k = 0;
-    for (; k < rest_.size() && (rest_[k] == ' ' || rest_[k] == '\n' || rest_[k] == '\t'); ++k)
-      line_ += rest_[k] == '\n';
+    for (; k < rest_.size() && isSpace(rest_[k]); ++k) line_ += rest_[k] == '\n';
     rest_.remove_prefix(k);
   }
 
   template <typename T>
   T next() {
     skipSpace();
-    const std::size_t length = std::min(rest_.find_first_of(" \n\t"), rest_.size());
+    std::size_t length = 0;  // a plain loop: find_first_of() took a quarter of the whole reading time
+    while (length < rest_.size() && !isSpace(rest_[length])) ++length;
     require(length > 0, "fewer numbers than its rows hold");
     const std::optional<T> value = parseNumber<T>(rest_.substr(0, length));
     require(value.has_value(), std::is_integral_v<T> ? "expected an integer" : "expected a finite number");

@@ -22,7 +22,7 @@ static std::string resolveTarget(const std::string& path) {
   if (path.empty() || path.back() == '/') throw inputError(path, 0, "expected the name of a file to write");
   std::error_code error;
   const bool link = std::filesystem::is_symlink(path, error);
-  const std::string target = link ? std::filesystem::weakly_canonical(path, error).string() : path;
+  std::string target = link ? std::filesystem::weakly_canonical(path, error).string() : path;
   struct stat status {};
   if (::stat(target.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) throw inputError(path, 0, "is a folder, expected the name of a file to write");
@@ -32,7 +32,7 @@ static std::string resolveTarget(const std::string& path) {
   return target;
 }
 
-OutputFile::OutputFile(std::string path) : path_(resolveTarget(path)) {
+OutputFile::OutputFile(const std::string& path) : path_(resolveTarget(path)) {
   const mode_t readAndWrite = 0666;  // less the user's mask
   // Names left by killed runs are stepped over: O_EXCL never touches a file that somebody else made.
   for (int attempt = 0; descriptor_ < 0; ++attempt) {

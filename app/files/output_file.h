@@ -11,7 +11,7 @@ namespace medulla {
 // a folder or device of that name), write() and commit() where the system fails (disk full), with path and reason.
 class OutputFile {
  public:
-  explicit OutputFile(std::string path);
+  explicit OutputFile(const std::string& path);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;

@@ -59,6 +59,7 @@ void applyOverride(XmlElement& root, const SceneOverride& override) {
   const auto found = std::find_if(targets.begin(), targets.end(), matches);
   if (found == targets.end()) {
     std::vector<std::string> known;
+    known.reserve(targets.size());
     for (const Target& t : targets) known.push_back(t.path);
     throw std::runtime_error(where + ": the scene has nothing of this name; did you mean " +
                              nearestName(override.path, known) + "?");
@@ -88,7 +89,7 @@ const XmlElement& onlyChild(const XmlElement& parent, const std::string& name) {
 
 // Names stand in override paths, column names, object names and file names.
 std::string readName(const XmlElement& element) {
-  const std::string name = readText(element, "name");
+  std::string name = readText(element, "name");
   const auto plain = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
   };
@@ -99,7 +100,7 @@ std::string readName(const XmlElement& element) {
 }
 
 std::string readUniqueName(const XmlElement& element, std::set<std::string>& taken) {
-  const std::string name = readName(element);
+  std::string name = readName(element);
   if (!taken.insert(name).second) refuse(element, "name", "another <" + element.name + "> has this name");
   return name;
 }
