@@ -222,6 +222,7 @@ std::vector<Ball> coverWithBalls(const SurfaceTree& tree, const std::vector<Ball
   }
 
   std::vector<Ball> balls;
+  balls.reserve(chosen.size());
   for (const int c : chosen) balls.push_back(candidates[c]);
   RandomSequence random{7};
   const int movePasses = large ? 2 : 4, trials = large ? 30 : 60;

@@ -78,6 +78,7 @@ SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const st
     if (degree[c.spheres[0]] < degreeMax && degree[c.spheres[1]] < degreeMax) add(c.spheres);
   }
   std::vector<Eigen::Vector3d> centres;
+  centres.reserve(balls.size());
   for (const Ball& ball : balls) centres.push_back(ball.centre);
   joinComponents(centres, links);
   std::sort(links.begin(), links.end());

@@ -112,6 +112,7 @@ std::vector<MassProperties> remainingSpheres(const std::vector<Vector3d>& nodes,
                                              const std::vector<ElasticLink>& links,
                                              const std::vector<Attachment>& attachments) {
   std::vector<MassProperties> whole;
+  whole.reserve(spheres.size());
   for (const FillingSphere& s : spheres) whole.push_back({s.volume, s.restFrame, s.secondMoment});
   return withoutNodes(std::move(whole), nodes, links, attachments);
 }

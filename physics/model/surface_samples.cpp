@@ -22,6 +22,7 @@ Eigen::Vector3d RandomSequence::normal() {
 
 std::vector<SurfaceSample> sampleSurface(const TriangleMesh& mesh, int count, std::uint64_t seed) {
   std::vector<double> areaUpTo;
+  areaUpTo.reserve(mesh.triangles.size());
   double area = 0;
   const auto corner = [&](int t, int c) -> const Eigen::Vector3d& { return mesh.vertices[mesh.triangles[t][c]]; };
   const auto cross = [&](int t) -> Eigen::Vector3d {
