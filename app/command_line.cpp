@@ -1,7 +1,236 @@
 #include "app/command_line.h"
 
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+
+#include "app/commands/commands.h"
+#include "app/interrupt.h"
+
 namespace medulla {
-int runCommandLine(int, char**) {
+
+namespace {
+
+constexpr const char* kIntroduction =
+    "Medulla renders deformable organs without a display: soft bodies made of filling spheres,\n"
+    "pressed, pulled and grabbed by a recorded or scripted haptic trajectory.\n\n"
+    "  medulla render scenes/gallbladder.xml -o gallbladder.mp4   draw a scene into a video\n"
+    "  medulla replay scenes/gallbladder.xml --log run.csv        run it without pictures\n"
+    "  medulla build organ.obj -o organ.model.xml --spheres 12    make a model of your own mesh\n"
+    "  medulla golden                                             compare with the golden images";
+
+constexpr const char* kExitCodes =
+    "Results go to standard output as \"name value [unit]\" lines, everything else to standard error.\n"
+    "Exit codes: 0 done, 1 input or run failed, 2 wrong usage, 3 golden mismatch, 130 interrupted.";
+
+std::optional<std::pair<int, int>> splitPair(const std::string& text, char separator) {
+  int a = 0, b = 0, used = 0;
+  const std::string format = std::string("%d") + separator + "%d%n";
+  if (std::sscanf(text.c_str(), format.c_str(), &a, &b, &used) != 2 || used != static_cast<int>(text.size()))
+    return std::nullopt;
+  return std::make_pair(a, b);
+}
+
+[[noreturn]] void usageError(const std::string& option, const std::string& value, const std::string& expected) {
+  throw CLI::ValidationError(option + " " + value, "expected " + expected);
+}
+
+// Options as typed; turned into RunOptions after parsing.
+struct RunArguments {
+  std::string scene, log, logRate = "frame";
+  std::vector<std::string> sets, trajectories;
+  std::vector<std::vector<std::string>> surfaces;
+};
+
+void addRunOptions(CLI::App& command, RunArguments& a) {
+  command.add_option("SCENE", a.scene, "scene file (XML)")->required();
+  command.add_option("--set", a.sets, "replace one value of the scene, e.g. body.gallbladder.surface=skin (repeatable)")
+      ->type_name("PATH=VALUE")
+      ->allow_extra_args(false);
+  command.add_option("--trajectory", a.trajectories, "read a tool's motion from another file (repeatable)")
+      ->type_name("[TOOL=]FILE")
+      ->allow_extra_args(false);
+  command.add_option("--log", a.log, "write a CSV row per dynamics frame: tools, forces, volume, energies")
+      ->type_name("FILE");
+  command.add_option("--log-rate", a.logRate, "rows of the log: per dynamics frame or per servo tick")
+      ->check(CLI::IsMember({"frame", "tick"}))
+      ->capture_default_str();
+  command.add_option("--surface-at", a.surfaces, "write the bodies' surfaces at time T (s) or \"end\" as OBJ (repeatable)")
+      ->type_name("T FILE.obj")
+      ->type_size(2)
+      ->allow_extra_args(false);
+}
+
+RunOptions runOptions(const RunArguments& a) {
+  RunOptions options;
+  options.scene = a.scene;
+  for (const std::string& set : a.sets) {
+    const std::size_t equals = set.find('=');
+    if (equals == std::string::npos || equals == 0) usageError("--set", set, "PATH=VALUE");
+    options.overrides.push_back({set.substr(0, equals), set.substr(equals + 1)});
+  }
+  for (const std::string& t : a.trajectories) {
+    const std::size_t equals = t.find('=');
+    if (equals == std::string::npos)
+      options.trajectories[""] = t;
+    else
+      options.trajectories[t.substr(0, equals)] = t.substr(equals + 1);
+  }
+  options.logPath = a.log;
+  options.logEveryTick = a.logRate == "tick";
+  for (const auto& request : a.surfaces) {
+    SurfaceRequest r;
+    r.path = request.at(1);
+    if (request[0] != "end") {
+      char* rest = nullptr;
+      r.time = std::strtod(request[0].c_str(), &rest);
+      if (rest == request[0].c_str() || *rest) usageError("--surface-at", request[0], "a time in seconds or \"end\"");
+    }
+    options.surfaces.push_back(std::move(r));
+  }
+  return options;
+}
+
+struct RenderArguments {
+  RunArguments run;
+  std::vector<std::string> outputs;
+  std::string view = "tissue", size, frames, context = "auto";
+  std::vector<std::string> show;
+  double fps = 0;
+};
+
+RenderOptions renderOptions(const RenderArguments& a) {
+  RenderOptions options;
+  options.run = runOptions(a.run);
+  options.outputs = a.outputs;
+  if (options.outputs.empty()) options.outputs = {std::filesystem::path(a.run.scene).stem().string() + ".mp4"};
+  options.view.view = a.view == "model" ? ViewKind::model : a.view == "both" ? ViewKind::both : ViewKind::tissue;
+  options.view.showProxy = std::find(a.show.begin(), a.show.end(), "proxy") != a.show.end();
+  if (!a.size.empty()) {
+    options.size = splitPair(a.size, 'x');
+    const auto valid = [](int n) { return n >= 16 && n <= 8192 && n % 2 == 0; };
+    if (!options.size || !valid(options.size->first) || !valid(options.size->second))
+      usageError("--size", a.size, "WIDTHxHEIGHT, even numbers from 16 to 8192");
+  }
+  if (!a.frames.empty()) {
+    options.frames = splitPair(a.frames, ':');
+    if (!options.frames) usageError("--frames", a.frames, "A:B, whole numbers, B excluded");
+  }
+  if (a.fps != 0) options.fps = a.fps;
+  options.context = a.context;
+  return options;
+}
+
+void addRender(CLI::App& app, RenderArguments& a) {
+  CLI::App* c = app.add_subcommand("render", "run a scene and draw it into a video or numbered PNG files");
+  addRunOptions(*c, a.run);
+  c->add_option("-o,--output", a.outputs, "FILE.mp4, or a folder for PNG files; repeatable (default: SCENE's name + .mp4)")
+      ->type_name("FILE.mp4|DIR")
+      ->allow_extra_args(false);
+  c->add_option("--view", a.view, "skin; or spheres, links and attachments; or both")
+      ->check(CLI::IsMember({"tissue", "model", "both"}))
+      ->capture_default_str();
+  c->add_option("--show", a.show, "draw also: proxy (proxy sphere, device and the spring between them)")
+      ->check(CLI::IsMember({"proxy"}))
+      ->allow_extra_args(false);
+  c->add_option("--size", a.size, "picture size in pixels (default: the scene's)")->type_name("WxH");
+  c->add_option("--fps", a.fps, "pictures per second (default: the scene's)")->check(CLI::Range(1.0, 240.0));
+  c->add_option("--frames", a.frames, "only pictures A to B-1, counted from 0")->type_name("A:B");
+  c->add_option("--context", a.context, "how to draw off screen")
+      ->check(CLI::IsMember({"auto", "osmesa", "egl"}))
+      ->capture_default_str();
+}
+
+struct BuildArguments {
+  BuildOptions options;
+  std::string method = "cover";
+};
+
+void addBuild(CLI::App& app, BuildArguments& a) {
+  CLI::App* c = app.add_subcommand("build", "make a model of filling spheres from a closed triangle mesh");
+  c->add_option("MESH", a.options.mesh, "closed surface: OBJ, OFF, STL, PLY, ...")->required();
+  c->add_option("-o,--output", a.options.output, "model file to write")->type_name("MODEL.xml")->required();
+  c->add_option("--spheres", a.options.settings.spheres, "number of filling spheres")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  c->add_option("--method", a.method, "cover: inscribed balls chosen to fill the body; skeleton: the raw edge collapse")
+      ->check(CLI::IsMember({"cover", "skeleton"}))
+      ->capture_default_str();
+  c->add_option("--unit", a.options.unit, "unit of the mesh files")
+      ->check(CLI::IsMember({"m", "cm", "mm", "inch"}))
+      ->capture_default_str();
+  c->add_option("--fine", a.options.fine, "detailed shape that the drawn surface follows")->type_name("MESH");
+  c->add_option("--report", a.options.reportPath, "write the quality report as CSV too")->type_name("FILE.csv");
+}
+
+void addGolden(CLI::App& app, GoldenOptions& o) {
+  CLI::App* c = app.add_subcommand("golden", "render the scenes' golden moments and compare with the stored images");
+  c->add_option("SCENE", o.scenes, "scene files (default: scenes/*.xml)");
+  c->add_flag("--update", o.update, "store what is drawn now as the new golden images");
+  c->add_option("--images", o.images, "folder of the golden images (default: golden_images beside the scene's folder)")
+      ->type_name("DIR");
+  c->add_option("--failures", o.failures, "where pictures that differ go")->type_name("DIR")->capture_default_str();
+  c->add_option("--context", o.context, "how to draw off screen")
+      ->check(CLI::IsMember({"auto", "osmesa", "egl"}))
+      ->capture_default_str();
+}
+
+int dispatch(int argc, char** argv) {
+  CLI::App app(kIntroduction, "medulla");
+  app.footer(kExitCodes);
+  app.require_subcommand(0, 1);
+  app.get_formatter()->column_width(34);
+  bool version = false;
+  app.add_flag("--version", version, "version, and those of Mesa, Embree and the compiler");
+  RenderArguments render;
+  RunArguments replay;
+  BuildArguments build;
+  GoldenOptions golden;
+  addRender(app, render);
+  CLI::App* replayCommand =
+      app.add_subcommand("replay", "run a scene without pictures, as fast as it goes, and print its results");
+  addRunOptions(*replayCommand, replay);
+  addBuild(app, build);
+  addGolden(app, golden);
+  RenderOptions renderRun;
+  RunOptions replayRun;
+  try {
+    app.parse(argc, argv);
+    if (app.got_subcommand("render")) renderRun = renderOptions(render);
+    if (app.got_subcommand("replay")) replayRun = runOptions(replay);
+  } catch (const CLI::Success& success) {
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "medulla: %s (see medulla --help)\n", error.what());
+    return 2;
+  }
+  if (version) return printVersion();
+  if (app.got_subcommand("render")) return runRender(renderRun);
+  if (app.got_subcommand("replay")) return runReplay(replayRun);
+  if (app.got_subcommand("golden")) return runGolden(golden);
+  if (app.got_subcommand("build")) {
+    build.options.settings.method = build.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
+    return runBuild(build.options);
+  }
+  std::fputs(app.help().c_str(), stderr);
   return 2;
 }
+
+}  // namespace
+
+int runCommandLine(int argc, char** argv) {
+  watchInterrupts();
+  try {
+    const int code = dispatch(argc, argv);
+    if (std::fflush(stdout) != 0) throw std::runtime_error("standard output cannot be written");
+    return code;
+  } catch (const Interrupted&) {
+    std::fputs("medulla: interrupted, nothing unfinished was kept\n", stderr);
+    return 130;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "medulla: %s\n", error.what());
+    return 1;
+  }
+}
+
 }  // namespace medulla

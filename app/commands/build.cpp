@@ -1,0 +1,62 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "app/commands/commands.h"
+#include "app/files/mesh_file.h"
+#include "app/files/model_file.h"
+#include "app/files/report_file.h"
+#include "app/interrupt.h"
+#include "app/progress.h"
+
+namespace medulla {
+
+// The command that repeats the build, file names without folders: the model is the same wherever it is built.
+static std::string repeatingCommand(const BuildOptions& options) {
+  namespace fs = std::filesystem;
+  const BuildSettings& s = options.settings;
+  std::string command = "medulla build " + fs::path(options.mesh).filename().string();
+  command += s.method == BuildMethod::cover ? fmt::format(" --method cover --spheres {}", s.spheres)
+                                            : std::string(" --method skeleton");
+  if (options.unit != "m") command += " --unit " + options.unit;
+  if (!options.fine.empty()) command += " --fine " + fs::path(options.fine).filename().string();
+  return command;
+}
+
+static RepairedMesh repaired(const std::string& path, const TriangleMesh& mesh) {
+  try {
+    return repairMesh(mesh);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("{}: {}", path, error.what()));
+  }
+}
+
+int runBuild(const BuildOptions& options) {
+  const double scale = metresPerUnit(options.unit);
+  const TriangleMesh input = readMesh(options.mesh, scale);
+  const RepairedMesh mesh = repaired(options.mesh, input);
+  for (const std::string& note : mesh.notes) fmt::print(stderr, "{}: {}\n", options.mesh, note);
+  TriangleMesh fine;
+  if (!options.fine.empty()) fine = readMesh(options.fine, scale);
+
+  BuildReport report;
+  Progress progress("build", 100, "%");
+  SoftBodyModel model;
+  try {
+    model = buildModel(mesh, options.fine.empty() ? nullptr : &fine, options.settings, report, [&](double share) {
+      checkInterrupt();
+      progress.update(100 * share);
+    });
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(fmt::format("{}: {}", options.mesh, error.what()));
+  }
+  model.name = std::filesystem::path(options.mesh).stem().string();
+  model.meshHash = meshHash(input);
+  model.settings = repeatingCommand(options);
+  if (!options.reportPath.empty()) writeReport(options.reportPath, report);
+  writeModel(options.output, model);
+  fmt::print("{}", reportLines(report));
+  return 0;
+}
+
+}  // namespace medulla

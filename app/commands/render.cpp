@@ -1,0 +1,104 @@
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+
+#include "app/commands/commands.h"
+#include "app/progress.h"
+#include "render/video_writer.h"
+
+namespace medulla {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool isVideo(const std::string& path) { return fs::path(path).extension() == ".mp4"; }
+
+// Where pictures go: any number of videos and folders of numbered PNG files.
+class PictureOutputs {
+ public:
+  PictureOutputs(const std::vector<std::string>& paths, int width, int height, double fps) {
+    for (const std::string& path : paths) {
+      if (isVideo(path)) {
+        videos_.emplace_back(path, width, height, fps);
+        continue;
+      }
+      if (!fs::path(path).extension().empty() && !fs::is_directory(path))
+        throw std::runtime_error(fmt::format("{}: expected FILE.mp4 or a folder for PNG files", path));
+      std::error_code error;
+      fs::create_directories(path, error);
+      if (error) throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", path, error.message()));
+      folders_.push_back(path);
+    }
+  }
+  void write(int number, const Image& image) {
+    for (VideoWriter& video : videos_) video.write(image);
+    for (const std::string& folder : folders_) writePng(fmt::format("{}/{:05d}.png", folder, number), image);
+  }
+  void finish() {
+    for (VideoWriter& video : videos_) video.finish();
+  }
+
+ private:
+  std::vector<VideoWriter> videos_;
+  std::vector<std::string> folders_;
+};
+
+void applyOverrides(const RenderOptions& options, Scene& scene) {
+  if (options.size) std::tie(scene.width, scene.height) = *options.size;
+  if (options.fps) scene.fps = *options.fps;
+}
+
+std::pair<int, int> frameRange(const RenderOptions& options, const Scene& scene) {
+  const int count = static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9));
+  if (!options.frames) return {0, count};
+  const auto [first, last] = *options.frames;
+  if (first < 0 || first >= last || last > count)
+    throw std::runtime_error(
+        fmt::format("--frames {}:{}: expected 0 <= A < B <= {}, the scene's number of pictures", first, last, count));
+  return *options.frames;
+}
+
+}  // namespace
+
+int runRender(const RenderOptions& options) {
+  LoadedScene loaded = loadRun(options.run);
+  applyOverrides(options, loaded.scene);
+  const Scene& scene = loaded.scene;
+  const auto [first, last] = frameRange(options, scene);
+
+  Simulation simulation(loaded);
+  PictureOutputs outputs(options.outputs, scene.width, scene.height, scene.fps);
+  Renderer renderer({.width = scene.width, .height = scene.height, .context = options.context});
+  const SceneView view(loaded, simulation.current(), renderer);
+
+  Progress progress("render", last - first, "pictures");
+  const double cpuStart = processCpuSeconds();
+  const auto start = std::chrono::steady_clock::now();
+  PictureState state;
+  Picture picture;
+  Image image;
+  int next = first;
+  runToEnd(loaded, options.run, simulation, [&] {
+    const double end = simulation.record().start + simulation.record().duration;
+    for (; next < last && next / scene.fps <= end + 1e-9; ++next) {
+      stateAt(simulation.record(), next / scene.fps, state);
+      view.compose(state, options.view, picture);
+      renderer.render(picture, image);
+      outputs.write(next, image);
+      progress.update(next - first + 1);
+    }
+  });
+  outputs.finish();
+  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  for (const std::string& path : options.outputs) fmt::print("file {}\n", fs::absolute(path).lexically_normal().string());
+  fmt::print("pictures {}\n", last - first);
+  fmt::print("pictures_per_second {:.4g}\n", (last - first) / wall);
+  printTotals(simulation, processCpuSeconds() - cpuStart, wall);
+  return 0;
+}
+
+}  // namespace medulla

@@ -1,0 +1,20 @@
+#include <chrono>
+
+#include "app/commands/commands.h"
+#include "app/progress.h"
+
+namespace medulla {
+
+int runReplay(const RunOptions& options) {
+  const LoadedScene loaded = loadRun(options);
+  Simulation simulation(loaded);
+  Progress progress("replay", loaded.scene.duration, "s");
+  const double cpuStart = processCpuSeconds();
+  const auto start = std::chrono::steady_clock::now();
+  runToEnd(loaded, options, simulation, [&] { progress.update(simulation.time()); });
+  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  printTotals(simulation, processCpuSeconds() - cpuStart, wall);
+  return 0;
+}
+
+}  // namespace medulla

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/simulation.h"
+
+// What `replay` and `render` share: a scene run to its end in logical time, with its log and surface files.
+namespace medulla {
+
+struct SurfaceRequest {
+  std::optional<double> time;  // s; none: the end
+  std::string path;
+};
+
+struct RunOptions {
+  std::string scene;
+  std::vector<SceneOverride> overrides;
+  std::map<std::string, std::string> trajectories;  // tool name (empty: the only tool) -> file
+  std::string logPath;
+  bool logEveryTick = false;
+  std::vector<SurfaceRequest> surfaces;
+};
+
+// Process CPU time over all threads, s.
+double processCpuSeconds();
+
+LoadedScene loadRun(const RunOptions& options);
+
+// Runs the simulation to its end; `afterFrame` is called after every dynamics frame. Log and surfaces appear under
+// their names when the run is through. Throws Interrupted after a signal.
+void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
+              const std::function<void()>& afterFrame);
+
+// The result lines of a run on standard output.
+void printTotals(const Simulation& simulation, double cpuSeconds, double wallSeconds);
+
+}  // namespace medulla

@@ -1,0 +1,67 @@
+#include <filesystem>
+#include <fmt/format.h>
+
+#include "app/files/input_error.h"
+#include "app/files/mesh_file.h"
+#include "app/files/model_file.h"
+#include "app/files/trajectory_file.h"
+#include "app/simulation.h"
+
+namespace medulla {
+
+// A missing file is the scene's mistake: said at the line that names it.
+static void requireFile(const Scene& scene, int line, const std::string& what, const std::string& path) {
+  if (!std::filesystem::exists(path))
+    throw inputError(scene.path, line, fmt::format("{} \"{}\" does not exist", what, path));
+}
+
+static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene& scene) {
+  std::vector<std::shared_ptr<const SoftBodyModel>> models;
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const SceneBody& body = scene.bodies[b];
+    std::shared_ptr<const SoftBodyModel> model;
+    for (std::size_t e = 0; e < b && !model; ++e)
+      if (scene.bodies[e].modelPath == body.modelPath) model = models[e];
+    if (!model) {
+      requireFile(scene, body.line, fmt::format("model of body \"{}\"", body.name), body.modelPath);
+      model = std::make_shared<const SoftBodyModel>(readModel(body.modelPath));
+    }
+    const int spheres = static_cast<int>(model->spheres.size());
+    for (const FixedSphere& fixed : body.fixed)
+      if (fixed.sphere < 0 || fixed.sphere >= spheres)
+        throw inputError(scene.path, body.line,
+                         fmt::format("body \"{}\" fixes sphere {}, its model has spheres 0 to {}", body.name,
+                                     fixed.sphere, spheres - 1));
+    models.push_back(std::move(model));
+  }
+  return models;
+}
+
+LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories) {
+  LoadedScene loaded;
+  for (const auto& [name, path] : trajectories) {
+    bool known = false;
+    for (SceneTool& tool : scene.tools) {
+      if (tool.name != name) continue;
+      tool.trajectoryPath = path;
+      tool.line = 0;
+      known = true;
+    }
+    if (!known) throw std::runtime_error(fmt::format("--trajectory {}={}: the scene has no tool \"{}\"", name, path, name));
+  }
+  loaded.models = loadModels(scene);
+  for (const SceneStatic& item : scene.statics) {
+    requireFile(scene, item.line, "mesh", item.meshPath);
+    TriangleMesh mesh = readMesh(item.meshPath, item.metresPerUnit);
+    for (Eigen::Vector3d& v : mesh.vertices) v = item.worldFromMesh * v;
+    loaded.statics.push_back(std::move(mesh));
+  }
+  for (const SceneTool& tool : scene.tools) {
+    if (tool.line > 0) requireFile(scene, tool.line, fmt::format("trajectory of tool \"{}\"", tool.name), tool.trajectoryPath);
+    loaded.trajectories.push_back(readTrajectory(tool.trajectoryPath));
+  }
+  loaded.scene = std::move(scene);
+  return loaded;
+}
+
+}  // namespace medulla

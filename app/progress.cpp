@@ -1,0 +1,51 @@
+#include "app/progress.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+
+namespace medulla {
+
+static double secondsBetween(std::chrono::steady_clock::time_point a, std::chrono::steady_clock::time_point b) {
+  return std::chrono::duration<double>(b - a).count();
+}
+
+Progress::Progress(std::string what, double total, std::string unit)
+    : what_(std::move(what)),
+      unit_(std::move(unit)),
+      total_(std::max(total, 1e-12)),
+      terminal_(isatty(STDERR_FILENO) == 1),
+      start_(std::chrono::steady_clock::now()),
+      last_(start_) {}
+
+Progress::~Progress() {
+  if (drawn_ && terminal_) std::fputs("\r\x1b[K", stderr);
+}
+
+std::string Progress::text(double done, double elapsed) const {
+  const double share = std::clamp(done / total_, 0.0, 1.0);
+  const double left = share > 0 ? elapsed * (1 - share) / share : 0;
+  return fmt::format("{} {:.0f}/{:.0f} {} ({:.0f} %), {:.0f} s left", what_, done, total_, unit_, 100 * share, left);
+}
+
+void Progress::update(double done) {
+  const auto now = std::chrono::steady_clock::now();
+  const double elapsed = secondsBetween(start_, now);
+  const double pause = terminal_ ? 0.1 : 5;
+  if (elapsed < (terminal_ ? 0.5 : 2) || (drawn_ && secondsBetween(last_, now) < pause)) return;
+  last_ = now;
+  drawn_ = true;
+  if (!terminal_) {
+    fmt::print(stderr, "{}\n", text(done, elapsed));
+    return;
+  }
+  constexpr int kWidth = 30;
+  const int filled = static_cast<int>(kWidth * std::clamp(done / total_, 0.0, 1.0));
+  fmt::print(stderr, "\r\x1b[K[{}{}] {}", std::string(filled, '#'), std::string(kWidth - filled, '.'),
+             text(done, elapsed));
+  std::fflush(stderr);
+}
+
+}  // namespace medulla

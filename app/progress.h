@@ -1,0 +1,28 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+namespace medulla {
+
+// Progress of long work on standard error: a bar with the time left on a terminal, a line every few seconds elsewhere,
+// nothing for work that ends within two seconds.
+class Progress {
+ public:
+  Progress(std::string what, double total, std::string unit);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  void update(double done);
+
+ private:
+  std::string text(double done, double elapsed) const;
+
+  std::string what_, unit_;
+  double total_;
+  bool terminal_;
+  bool drawn_ = false;
+  std::chrono::steady_clock::time_point start_, last_;
+};
+
+}  // namespace medulla

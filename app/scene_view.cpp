@@ -1,0 +1,160 @@
+#include "app/scene_view.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/files/input_error.h"
+
+namespace medulla {
+
+namespace {
+
+glm::vec3 toGlm(const Eigen::Vector3d& v) { return {float(v.x()), float(v.y()), float(v.z())}; }
+glm::quat toGlm(const Eigen::Quaterniond& q) { return {float(q.w()), float(q.x()), float(q.y()), float(q.z())}; }
+
+// Colours of the model view, linear RGB: after the paper's figures, told apart by brightness too.
+constexpr glm::vec4 kBallColour{0.80f, 0.30f, 0.22f, 0.55f};
+constexpr glm::vec4 kFixedBallColour{0.30f, 0.32f, 0.36f, 0.70f};
+constexpr glm::vec4 kLinkColour{0.95f, 0.75f, 0.20f, 1};
+constexpr glm::vec4 kAttachmentColour{0.25f, 0.55f, 0.80f, 1};
+constexpr glm::vec4 kAxisColours[3] = {{0.85f, 0.15f, 0.12f, 1}, {0.15f, 0.65f, 0.15f, 1}, {0.15f, 0.30f, 0.90f, 1}};
+constexpr glm::vec4 kProxyColour{0.15f, 0.75f, 0.25f, 0.9f};
+constexpr glm::vec4 kDeviceColour{0.95f, 0.20f, 0.85f, 0.9f};
+
+SurfaceShape shapeOf(const TriangleMesh& mesh, const std::string& look) {
+  SurfaceShape shape;
+  shape.look = look;
+  for (const Eigen::Vector3d& v : mesh.vertices) shape.restPositions.push_back(toGlm(v));
+  for (const auto& t : mesh.triangles) shape.triangles.push_back({unsigned(t[0]), unsigned(t[1]), unsigned(t[2])});
+  return shape;
+}
+
+SurfaceShape shapeOf(const RenderSurface& surface, const std::vector<Eigen::Vector3d>& nodes, const std::string& look) {
+  SurfaceShape shape;
+  shape.look = look;
+  evaluateRenderSurface(surface, nodes, shape.restPositions);
+  for (const auto& t : surface.triangles) shape.triangles.push_back({unsigned(t[0]), unsigned(t[1]), unsigned(t[2])});
+  return shape;
+}
+
+Eigen::Vector3d anchorOf(const SoftBodyModel& model, const BodyFrame& frame, const Attachment& attachment) {
+  if (!attachment.onLink) return frame.spheres[attachment.host].position;
+  const ElasticLink& link = model.links[attachment.host];
+  return blendPoint(frame.spheres[link.sphere0].position, frame.spheres[link.sphere1].position, attachment.along);
+}
+
+// Spheres with their frames, links and attachments: the paper's figures 2, 10 and 11.
+void addModel(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame, Picture& picture) {
+  for (std::size_t i = 0; i < model.spheres.size(); ++i) {
+    const FillingSphere& sphere = model.spheres[i];
+    const SpherePose& pose = frame.spheres[i];
+    const Eigen::Matrix3d worldFromSphere = pose.worldFromSphere.toRotationMatrix();
+    const Eigen::Vector3d centre = pose.position + worldFromSphere * (sphere.restBallCentre - sphere.restFrame);
+    const bool fixed = std::any_of(body.fixed.begin(), body.fixed.end(),
+                                   [&](const FixedSphere& f) { return f.sphere == static_cast<int>(i); });
+    picture.balls.push_back({toGlm(centre), float(sphere.radius), fixed ? kFixedBallColour : kBallColour});
+    const float axis = 0.6f * float(sphere.radius), thin = 0.035f * float(sphere.radius);
+    for (int a = 0; a < 3; ++a)
+      picture.segments.push_back({toGlm(pose.position), toGlm(pose.position) + axis * toGlm(worldFromSphere.col(a)), thin,
+                                  kAxisColours[a]});
+  }
+  for (const ElasticLink& link : model.links) {
+    const float radius = 0.08f * float(std::min(model.spheres[link.sphere0].radius, model.spheres[link.sphere1].radius));
+    picture.segments.push_back({toGlm(frame.spheres[link.sphere0].position), toGlm(frame.spheres[link.sphere1].position),
+                                std::max(radius, 0.0004f), kLinkColour});
+  }
+  for (std::size_t n = 0; n < model.attachments.size(); ++n) {
+    picture.segments.push_back(
+        {toGlm(anchorOf(model, frame, model.attachments[n])), toGlm(frame.nodes[n]), 0.00010f, kAttachmentColour});
+    picture.balls.push_back({toGlm(frame.nodes[n]), 0.0005f, kAttachmentColour});
+  }
+}
+
+void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& state, const ViewOptions& options,
+             Picture& picture) {
+  Instrument instrument;
+  // The picture shows the proxy: an instrument never enters the tissue, its device may.
+  instrument.tip = toGlm(state.proxy);
+  instrument.worldFromTool = toGlm(input.worldFromTool);
+  constexpr double kOpenJaw = 0.38, kClosedJaw = 0.05;  // rad
+  instrument.jawAngle = float(kClosedJaw + (kOpenJaw - kClosedJaw) * (1 - input.grip));
+  instrument.touching = state.inContact || state.holding;
+  picture.instruments.push_back(instrument);
+  if (!options.showProxy) return;
+  picture.balls.push_back({toGlm(state.proxy), float(tool.settings.radius), kProxyColour});
+  picture.balls.push_back({toGlm(state.device), 0.6f * float(tool.settings.radius), kDeviceColour});
+  picture.segments.push_back({toGlm(state.device), toGlm(state.proxy), 0.0004f, kDeviceColour});
+}
+
+}  // namespace
+
+void evaluateRenderSurface(const RenderSurface& surface, const std::vector<Eigen::Vector3d>& nodes,
+                           std::vector<glm::vec3>& out) {
+  const std::size_t count = surface.first.empty() ? 0 : surface.first.size() - 1;
+  out.resize(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    glm::vec3 x(0), a(0), b(0);
+    for (int s = surface.first[k]; s < surface.first[k + 1]; ++s) {
+      const glm::vec3 node = toGlm(nodes[surface.node[s]]);
+      x += surface.weight[s] * node;
+      a += surface.tangent0[s] * node;
+      b += surface.tangent1[s] * node;
+    }
+    const auto& o = surface.offset[k];
+    if (o[0] != 0 || o[1] != 0 || o[2] != 0) {
+      const glm::vec3 t0 = glm::normalize(a), n = glm::normalize(glm::cross(a, b));
+      x += o[0] * t0 + o[1] * glm::cross(n, t0) + o[2] * n;
+    }
+    out[k] = x;
+  }
+}
+
+Camera cameraAt(const std::vector<CameraKey>& keys, double time) {
+  std::size_t next = 0;
+  while (next < keys.size() && keys[next].time <= time) ++next;
+  const CameraKey& a = keys[next > 0 ? next - 1 : 0];
+  const CameraKey& b = keys[std::min(next, keys.size() - 1)];
+  const double span = b.time - a.time;
+  double u = span > 0 ? std::clamp((time - a.time) / span, 0.0, 1.0) : 0;
+  u = u * u * (3 - 2 * u);  // eases in and out of every key
+  Camera camera;
+  camera.position = toGlm(blendPoint(a.position, b.position, u));
+  camera.target = toGlm(blendPoint(a.target, b.target, u));
+  camera.fovDegrees = float((1 - u) * a.fovDegrees + u * b.fovDegrees);
+  return camera;
+}
+
+SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Renderer& renderer) : loaded_(&loaded) {
+  const Scene& scene = loaded.scene;
+  const auto add = [&](int line, SurfaceShape shape) {
+    try {
+      renderer.addSurface(std::move(shape));
+    } catch (const std::runtime_error& error) {
+      throw inputError(scene.path, line, error.what());
+    }
+  };
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    add(scene.bodies[b].line, shapeOf(loaded.models[b]->renderSurface, rest.bodies[b].nodes, scene.bodies[b].look));
+  for (std::size_t s = 0; s < scene.statics.size(); ++s)
+    add(scene.statics[s].line, shapeOf(loaded.statics[s], scene.statics[s].look));
+}
+
+void SceneView::compose(const PictureState& state, const ViewOptions& options, Picture& picture) const {
+  const Scene& scene = loaded_->scene;
+  picture.view = options.view;
+  picture.camera = cameraAt(scene.camera, state.time);
+  picture.light = {toGlm(scene.lightOffset), float(scene.lightIntensity), float(scene.lightReferenceDistance)};
+  picture.instruments.clear();
+  picture.balls.clear();
+  picture.segments.clear();
+  picture.surfaces.resize(scene.bodies.size() + scene.statics.size());
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const BodyFrame& frame = state.frame.bodies[b];
+    evaluateRenderSurface(loaded_->models[b]->renderSurface, frame.nodes, picture.surfaces[b].positions);
+    if (options.view != ViewKind::tissue) addModel(scene.bodies[b], *loaded_->models[b], frame, picture);
+  }
+  for (std::size_t k = 0; k < scene.tools.size(); ++k)
+    addTool(scene.tools[k], state.inputs[k], state.tools[k], options, picture);
+}
+
+}  // namespace medulla

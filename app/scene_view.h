@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/simulation.h"
+#include "render/renderer.h"
+
+// Physics to draw lists: the one place where Eigen becomes GLM.
+namespace medulla {
+
+struct ViewOptions {
+  ViewKind view = ViewKind::tissue;
+  bool showProxy = false;  // proxy sphere, device and the spring between them
+};
+
+class SceneView {
+ public:
+  // Hands every surface of the scene to the renderer, at rest. Throws std::runtime_error naming scene and line on an
+  // unknown look.
+  SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Renderer& renderer);
+
+  // Fills `picture` (reused) from a state.
+  void compose(const PictureState& state, const ViewOptions& options, Picture& picture) const;
+
+ private:
+  const LoadedScene* loaded_;
+};
+
+// The drawn surface of a body in its present shape: `out` gets one position per render vertex (RenderSurface's comment
+// has the formula).
+void evaluateRenderSurface(const RenderSurface& surface, const std::vector<Eigen::Vector3d>& nodes,
+                           std::vector<glm::vec3>& out);
+
+// Camera at a time: smooth through the keys, still before the first and after the last.
+Camera cameraAt(const std::vector<CameraKey>& keys, double time);
+
+}  // namespace medulla

@@ -1,0 +1,141 @@
+#include "app/simulation.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace medulla {
+
+static World makeWorld(const LoadedScene& loaded) {
+  const Scene& scene = loaded.scene;
+  WorldSettings settings;
+  settings.gravity = scene.gravity;
+  settings.frameDuration = 1 / scene.dynamicsRate;
+  settings.substeps = scene.substeps;
+  std::vector<BodyDescription> bodies;
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const SceneBody& body = scene.bodies[b];
+    bodies.push_back({body.name, loaded.models[b], body.tissue, body.factors, body.surface, body.worldFromModel,
+                      body.fixed});
+  }
+  return World(settings, std::move(bodies));
+}
+
+Simulation::Simulation(const LoadedScene& loaded)
+    : loaded_(&loaded),
+      ticksPerFrame_(static_cast<int>(std::lround(loaded.scene.servoRate / loaded.scene.dynamicsRate))),
+      frameCount_(static_cast<int>(std::ceil(loaded.scene.duration * loaded.scene.dynamicsRate - 1e-9))),
+      frameDuration_(1 / loaded.scene.dynamicsRate),
+      tickDuration_(1 / loaded.scene.servoRate),
+      world_(makeWorld(loaded)) {
+  world_.readFrame(current_);
+  previous_ = current_;
+  sampleInputs(0, inputs_);
+
+  std::vector<TouchableBody> bodies;
+  for (const auto& model : loaded.models) bodies.push_back({model});
+  std::vector<ToolSettings> tools;
+  for (const SceneTool& tool : loaded.scene.tools) tools.push_back(tool.settings);
+  servo_ = std::make_unique<Servo>(bodies, tools, tickDuration_, current_, inputs_);
+
+  record_.duration = frameDuration_;
+  record_.from = record_.to = current_;
+  record_.inputs.assign(ticksPerFrame_ + 1, inputs_);
+  record_.tools.assign(ticksPerFrame_ + 1, servo_->tools());
+}
+
+void Simulation::sampleInputs(double time, std::vector<ToolSample>& out) const {
+  out.resize(loaded_->trajectories.size());
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] = sampleTrajectory(loaded_->trajectories[k], time);
+}
+
+void Simulation::advanceFrame() {
+  runTicks();
+  servo_->handOver(frameDuration_, loads_);
+  const FrameReport report = world_.advance(loads_);
+  std::swap(previous_, current_);
+  world_.readFrame(current_);
+  servo_->commit(previous_, current_);
+  ++frame_;
+  accountImpulses(report);
+  accountVolumes();
+}
+
+void Simulation::runTicks() {
+  record_.start = time();
+  record_.from = previous_;
+  record_.to = current_;
+  record_.inputs[0] = record_.inputs[ticksPerFrame_];
+  record_.tools[0] = record_.tools[ticksPerFrame_];
+  for (int tick = 1; tick <= ticksPerFrame_; ++tick) {
+    sampleInputs(record_.start + tick * tickDuration_, inputs_);
+    servo_->tick(static_cast<double>(tick) / ticksPerFrame_, inputs_);
+    record_.inputs[tick] = inputs_;
+    record_.tools[tick] = servo_->tools();
+    for (const ToolState& tool : servo_->tools()) totals_.forceMax = std::max(totals_.forceMax, tool.force.norm());
+  }
+  totals_.ticks += ticksPerFrame_;
+  totals_.substeps += world_.substepsPerFrame();
+  totals_.simulated += frameDuration_;
+}
+
+// The force on the hand is minus what the tool gives to the bodies.
+void Simulation::accountImpulses(const FrameReport& report) {
+  double impulse = 0, difference = 0;
+  for (std::size_t k = 0; k < loaded_->trajectories.size(); ++k) {
+    Eigen::Vector3d servo = Eigen::Vector3d::Zero();
+    for (int tick = 1; tick <= ticksPerFrame_; ++tick) servo -= tickDuration_ * record_.tools[tick][k].force;
+    const Eigen::Vector3d dynamics = k < report.toolImpulse.size() ? report.toolImpulse[k] : Eigen::Vector3d::Zero();
+    impulse += servo.norm();
+    difference += (servo - dynamics).norm();
+  }
+  totals_.toolImpulse += impulse;
+  totals_.impulseDifference += difference;
+  lastMismatch_ = impulse > 0 ? 100 * difference / impulse : 0;
+}
+
+void Simulation::accountVolumes() {
+  for (std::size_t b = 0; b < loaded_->models.size(); ++b) {
+    const double ratio = world_.volumeRatio(static_cast<int>(b));
+    totals_.volumeRatioMin = std::min(totals_.volumeRatioMin, ratio);
+    totals_.volumeRatioMax = std::max(totals_.volumeRatioMax, ratio);
+  }
+}
+
+static ToolSample blendSample(const ToolSample& a, const ToolSample& b, double u) {
+  ToolSample s;
+  s.time = (1 - u) * a.time + u * b.time;
+  s.position = blendPoint(a.position, b.position, u);
+  s.worldFromTool = a.worldFromTool.slerp(u, b.worldFromTool);
+  s.grip = (1 - u) * a.grip + u * b.grip;
+  return s;
+}
+
+static ToolState blendTool(const ToolState& a, const ToolState& b, double u) {
+  ToolState s = u < 0.5 ? a : b;
+  s.device = blendPoint(a.device, b.device, u);
+  s.proxy = blendPoint(a.proxy, b.proxy, u);
+  s.force = blendPoint(a.force, b.force, u);
+  return s;
+}
+
+void stateAt(const ServoRecord& record, double time, PictureState& out) {
+  const int ticks = static_cast<int>(record.inputs.size()) - 1;
+  const double alpha = std::clamp((time - record.start) / record.duration, 0.0, 1.0);
+  // A time on a tick takes that tick as it was: the usual picture rates divide the servo's.
+  double position = alpha * ticks;
+  if (std::abs(position - std::round(position)) < 1e-6) position = std::round(position);
+  const int tick = std::min(static_cast<int>(position), ticks - 1);
+  const double u = position - tick;
+  out.time = time;
+  blendFrames(record.from, record.to, position / ticks, out.frame);
+  const std::size_t tools = record.tools[tick].size();
+  out.inputs.resize(tools);
+  out.tools.resize(tools);
+  for (std::size_t k = 0; k < tools; ++k) {
+    out.inputs[k] = blendSample(record.inputs[tick][k], record.inputs[tick + 1][k], u);
+    out.tools[k] = blendTool(record.tools[tick][k], record.tools[tick + 1][k], u);
+  }
+}
+
+}  // namespace medulla

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "app/scene.h"
+#include "haptics/servo.h"
+#include "physics/dynamics/world.h"
+#include "physics/model/triangle_mesh.h"
+
+namespace medulla {
+
+// A scene with everything that it names in memory.
+struct LoadedScene {
+  Scene scene;
+  std::vector<std::shared_ptr<const SoftBodyModel>> models;  // one per body
+  std::vector<TriangleMesh> statics;                         // one per static, world frame
+  std::vector<Trajectory> trajectories;                      // one per tool
+};
+
+// `trajectories` replaces tools' files, by tool name. Throws std::runtime_error with file and line; a file that is
+// missing is reported at the scene's line that names it.
+LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories = {});
+
+// What the servo saw and did during one dynamics frame [start, start + duration]: the two frames that were blended
+// meanwhile, and inputs and tools at its ticks (index 0 is the state at `start`).
+struct ServoRecord {
+  double start = 0, duration = 0;
+  DynamicsFrame from, to;
+  std::vector<std::vector<ToolSample>> inputs;
+  std::vector<std::vector<ToolState>> tools;
+};
+
+// The state that a picture shows.
+struct PictureState {
+  double time = 0;
+  DynamicsFrame frame;
+  std::vector<ToolSample> inputs;
+  std::vector<ToolState> tools;
+};
+
+// State at a time within the record: surface, device and proxy blended between ticks. `out` is reused.
+void stateAt(const ServoRecord& record, double time, PictureState& out);
+
+// Results of a run so far.
+struct RunTotals {
+  double simulated = 0;  // s
+  long substeps = 0, ticks = 0;
+  double forceMax = 0;                              // N, of any tool
+  double volumeRatioMin = 1, volumeRatioMax = 1;    // of any body
+  double toolImpulse = 0, impulseDifference = 0;    // N s, sums over frames and tools of lengths
+  double impulseMismatch() const { return toolImpulse > 0 ? 100 * impulseDifference / toolImpulse : 0; }  // %
+};
+
+// The loop of a run in logical time: ticks of the servo over the two last dynamics frames, then one dynamics frame
+// under the springs that the servo hands over (paper 5). No clock, no thread: the same scene gives the same hash.
+class Simulation {
+ public:
+  explicit Simulation(const LoadedScene& loaded);
+
+  bool finished() const { return frame_ >= frameCount_; }
+  void advanceFrame();  // throws std::runtime_error when the state stops being finite
+
+  int frame() const { return frame_; }  // dynamics frames done
+  int frameCount() const { return frameCount_; }
+  double time() const { return frame_ * frameDuration_; }
+  const ServoRecord& record() const { return record_; }       // of the last frame; before the first: the rest state
+  const DynamicsFrame& previous() const { return previous_; }  // dynamics frames, not delayed by blending
+  const DynamicsFrame& current() const { return current_; }
+  double lastImpulseMismatch() const { return lastMismatch_; }  // %, of the last frame
+  const RunTotals& totals() const { return totals_; }
+  const World& world() const { return world_; }
+
+ private:
+  void sampleInputs(double time, std::vector<ToolSample>& out) const;
+  void runTicks();
+  void accountImpulses(const FrameReport& report);
+  void accountVolumes();
+
+  const LoadedScene* loaded_;
+  int ticksPerFrame_, frameCount_, frame_ = 0;
+  double frameDuration_, tickDuration_;
+  World world_;
+  DynamicsFrame previous_, current_;
+  std::vector<ToolSample> inputs_;
+  std::unique_ptr<Servo> servo_;
+  ServoRecord record_;
+  Loads loads_;
+  RunTotals totals_;
+  double lastMismatch_ = 0;
+};
+
+}  // namespace medulla

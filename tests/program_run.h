@@ -1,0 +1,86 @@
+#pragma once
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+// Runs the program itself, as a user would, in a folder of the test's own.
+namespace medulla {
+
+struct ProgramResult {
+  int exitCode = -1;
+  std::string out, err;
+};
+
+struct ProgramOptions {
+  std::string folder = ".";
+  double interruptAfter = 0;      // s; > 0: SIGINT is sent then
+  std::string path;               // PATH of the child; empty: inherited
+};
+
+inline std::string readFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+inline ProgramResult runProgram(const std::vector<std::string>& arguments, const ProgramOptions& options = {}) {
+  char base[] = "/tmp/medulla_run_XXXXXX";
+  const std::string folder = mkdtemp(base);
+  const pid_t child = fork();
+  if (child == 0) {
+    if (!freopen((folder + "/out").c_str(), "w", stdout) || !freopen((folder + "/err").c_str(), "w", stderr) ||
+        chdir(options.folder.c_str()) != 0)
+      _exit(99);
+    if (!options.path.empty()) setenv("PATH", options.path.c_str(), 1);
+    std::vector<char*> argv{const_cast<char*>(MEDULLA_PROGRAM)};
+    for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
+    argv.push_back(nullptr);
+    execv(MEDULLA_PROGRAM, argv.data());
+    _exit(98);
+  }
+  if (options.interruptAfter > 0) {
+    usleep(static_cast<useconds_t>(1e6 * options.interruptAfter));
+    kill(child, SIGINT);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ProgramResult result;
+  result.exitCode = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.out = readFile(folder + "/out");
+  result.err = readFile(folder + "/err");
+  std::filesystem::remove_all(folder);
+  return result;
+}
+
+// A folder that is gone when the test ends.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    char base[] = "/tmp/medulla_test_XXXXXX";
+    path_ = mkdtemp(base);
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+  const std::string& path() const { return path_; }
+  // Names in the folder, hidden ones too.
+  std::vector<std::string> contents() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(path_)) names.push_back(entry.path().filename().string());
+    return names;
+  }
+  void write(const std::string& name, const std::string& text) const { std::ofstream(path_ + "/" + name) << text; }
+
+ private:
+  std::string path_;
+};
+
+}  // namespace medulla

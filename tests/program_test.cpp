@@ -1,0 +1,176 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/program_run.h"
+
+// The program as its users meet it: results, exit codes, one line per refusal, nothing half-written.
+namespace medulla {
+
+static const std::string kScene = std::string(MEDULLA_SOURCE_DIR) + "/scenes/gallbladder.xml";
+
+static std::string valueOf(const std::string& out, const std::string& name) {
+  const std::size_t at = ("\n" + out).find("\n" + name + " ");
+  if (at == std::string::npos) return {};
+  const std::size_t start = at + name.size() + 1;
+  return out.substr(start, out.find('\n', start) - start);
+}
+
+static void expectRefusal(const ProgramResult& r, int exitCode, const std::vector<std::string>& words) {
+  EXPECT_EQ(r.exitCode, exitCode) << r.err;
+  EXPECT_EQ(r.out, "");
+  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+  for (const std::string& word : words) EXPECT_NE(r.err.find(word), std::string::npos) << "no \"" << word << "\" in " << r.err;
+}
+
+static const std::vector<std::string> kShort = {"--set", "clock.duration=0.2", "--set", "output.golden=0"};
+
+static std::vector<std::string> command(std::vector<std::string> words, const std::vector<std::string>& more = kShort) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+TEST(Program, ReplayPrintsItsResultsAndTheSameHashTwice) {
+  const ProgramResult a = runProgram(command({"replay", kScene})), b = runProgram(command({"replay", kScene}));
+  ASSERT_EQ(a.exitCode, 0) << a.err;
+  for (const char* name : {"simulated", "cpu", "realtime", "substeps", "ticks", "force_max", "volume_ratio_min",
+                           "volume_ratio_max", "impulse_mismatch", "hash"})
+    EXPECT_NE(valueOf(a.out, name), "") << name << " is missing in\n" << a.out;
+  EXPECT_EQ(valueOf(a.out, "hash").size(), 16u);
+  EXPECT_EQ(valueOf(a.out, "hash"), valueOf(b.out, "hash"));
+}
+
+TEST(Program, DrawingOptionsLeaveTheHashAlone) {
+  const TemporaryFolder folder;
+  const std::string hash = valueOf(runProgram(command({"replay", kScene})).out, "hash");
+  const ProgramResult plain = runProgram(
+      command({"render", kScene, "-o", folder / "a", "--size", "64x48", "--fps", "24", "--frames", "0:2"}));
+  ASSERT_EQ(plain.exitCode, 0) << plain.err;
+  EXPECT_EQ(valueOf(plain.out, "hash"), hash);
+  const ProgramResult other = runProgram(command({"render", kScene, "-o", folder / "b", "--size", "96x64", "--fps", "17",
+                                                  "--view", "both", "--show", "proxy"}));
+  ASSERT_EQ(other.exitCode, 0) << other.err;
+  EXPECT_EQ(valueOf(other.out, "hash"), hash);
+  EXPECT_TRUE(std::filesystem::exists(folder / "a/00001.png"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "a/00002.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "b/00003.png"));
+}
+
+TEST(Program, LogsOfTwoRunsAreEqualByteForByte) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.csv", "b.csv"})
+    ASSERT_EQ(runProgram(command({"replay", kScene, "--log", folder / name})).exitCode, 0);
+  EXPECT_EQ(readFile(folder / "a.csv"), readFile(folder / "b.csv"));
+  EXPECT_NE(readFile(folder / "a.csv").find("grasper.device.x"), std::string::npos);
+}
+
+TEST(Program, SurfaceHasTheInputMeshsOrder) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(runProgram(command({"replay", kScene, "--surface-at", "end", folder / "end.obj"})).exitCode, 0);
+  const std::string text = readFile(folder / "end.obj");
+  EXPECT_NE(text.find("o gallbladder\n"), std::string::npos);
+  std::size_t faces = 0;
+  for (std::size_t at = text.find("\nf "); at != std::string::npos; at = text.find("\nf ", at + 1)) ++faces;
+  EXPECT_EQ(faces, 466u);
+}
+
+TEST(Program, BuildsAModelThatRenders) {
+  const TemporaryFolder folder;
+  const std::string mesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj";
+  const ProgramResult r = runProgram(
+      {"build", mesh, "-o", folder / "m.xml", "--spheres", "5", "--report", folder / "report.csv"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  for (const char* name : {"triangles", "skeleton_nodes", "skeleton_links", "spheres", "links", "gap_max", "gap_mean",
+                           "gap_cones_max", "cover", "cover_cones", "mass_error", "centre_error", "inertia_error",
+                           "components", "centres_outside", "attachments_crossing", "attachment_max", "degree_max",
+                           "seconds"})
+    EXPECT_NE(valueOf(r.out, name), "") << name;
+  EXPECT_EQ(valueOf(r.out, "spheres"), "5");
+  EXPECT_TRUE(std::filesystem::exists(folder / "report.csv"));
+  EXPECT_EQ(runProgram(command({"replay", kScene, "--set", "body.gallbladder.model=" + folder / "m.xml"})).exitCode, 0);
+}
+
+TEST(Program, HelpAndVersion) {
+  EXPECT_EQ(runProgram({"--help"}).exitCode, 0);
+  EXPECT_NE(runProgram({"--help"}).out.find("render"), std::string::npos);
+  for (const char* verb : {"render", "replay", "build", "golden"}) EXPECT_EQ(runProgram({verb, "--help"}).exitCode, 0);
+  const ProgramResult version = runProgram({"--version"});
+  for (const char* name : {"medulla", "compiler", "embree", "renderer"}) EXPECT_NE(valueOf(version.out, name), "") << name;
+}
+
+TEST(ProgramRefuses, WrongUsageWithCodeTwo) {
+  expectRefusal(runProgram({"replay"}), 2, {"SCENE"});
+  expectRefusal(runProgram({"rneder", kScene}), 2, {"rneder"});
+  expectRefusal(runProgram({"render", kScene, "--size", "10x"}), 2, {"--size"});
+  expectRefusal(runProgram({"render", kScene, "--view", "skin"}), 2, {"skin"});
+  expectRefusal(runProgram({"replay", kScene, "--set", "nonsense"}), 2, {"--set"});
+  expectRefusal(runProgram({"replay", kScene, "--surface-at", "soon", "/tmp/x.obj"}), 2, {"soon"});
+}
+
+TEST(ProgramRefuses, BadScenes) {
+  const TemporaryFolder folder;
+  expectRefusal(runProgram({"replay", folder / "none.xml"}), 1, {"none.xml"});
+  expectRefusal(runProgram({"replay", folder.path()}), 1, {folder.path()});
+  folder.write("broken.xml", "<scene name=\"x\">\n<clock servo=\"1200\"\n</scene>\n");
+  expectRefusal(runProgram({"replay", folder / "broken.xml"}), 1, {"broken.xml:"});
+  expectRefusal(runProgram({"replay", kScene, "--set", "body.gallbladder.model=none.xml"}), 1, {"none.xml", "gallbladder"});
+  expectRefusal(runProgram({"replay", kScene, "--set", "body.gallbladder.look=plastic"}), 1, {"plastic"});
+}
+
+TEST(ProgramRefuses, BadTrajectories) {
+  const TemporaryFolder folder;
+  const std::string header = "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n";
+  folder.write("nan.csv", header + "0,0,0,0,1,0,0,0,0\n1,nan,0,0,1,0,0,0,0\n");
+  folder.write("falling.csv", header + "0,0,0,0,1,0,0,0,0\n1,0,0,0,1,0,0,0,0\n0.5,0,0,0,1,0,0,0,0\n");
+  folder.write("missing.csv", "t[s],x[m],y[m],qw,qx,qy,qz,grip\n0,0,0,1,0,0,0,0\n");
+  expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "nan.csv"}), 1, {"nan.csv:3"});
+  expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "falling.csv"}), 1, {"falling.csv:4"});
+  expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "missing.csv"}), 1, {"missing.csv:1", "z[m]"});
+  expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "none.csv"}), 1, {"none.csv"});
+  expectRefusal(runProgram({"replay", kScene, "--trajectory", "hook=" + folder / "nan.csv"}), 1, {"hook"});
+}
+
+TEST(ProgramRefuses, OutputsThatCannotBeWritten) {
+  const TemporaryFolder folder;
+  folder.write("file", "x");
+  expectRefusal(runProgram(command({"render", kScene, "-o", folder / "none/video.mp4"})), 1, {"none"});
+  expectRefusal(runProgram(command({"render", kScene, "-o", folder / "file/frames"})), 1, {"file/frames"});
+  expectRefusal(runProgram(command({"replay", kScene, "--log", folder / "none/log.csv"})), 1, {"none/log.csv"});
+  const std::string mesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj";
+  expectRefusal(runProgram({"build", mesh, "-o", folder / "none/m.xml"}), 1, {"none/m.xml"});
+  EXPECT_EQ(folder.contents(), std::vector<std::string>{"file"});
+}
+
+TEST(ProgramRefuses, VideoWithoutFfmpeg) {
+  const TemporaryFolder folder;
+  ProgramOptions options;
+  options.path = folder.path();
+  expectRefusal(runProgram(command({"render", kScene, "-o", folder / "video.mp4", "--size", "64x48"}), options), 1,
+                {"ffmpeg"});
+  EXPECT_TRUE(folder.contents().empty());
+}
+
+TEST(ProgramRefuses, AStateThatStopsBeingFinite) {
+  const TemporaryFolder folder;
+  folder.write("log.csv", "earlier\n");
+  const ProgramResult r = runProgram({"replay", kScene, "--set", "dynamics.substeps=1", "--set", "tissue.bile_sac.young=1e8",
+                                      "--log", folder / "log.csv"});
+  expectRefusal(r, 1, {"gallbladder", "finite"});
+  EXPECT_EQ(readFile(folder / "log.csv"), "earlier\n");
+  EXPECT_EQ(folder.contents().size(), 1u);
+}
+
+TEST(Program, InterruptLeavesNothingHalfWritten) {
+  const TemporaryFolder folder;
+  folder.write("video.mp4", "earlier");
+  ProgramOptions options;
+  options.interruptAfter = 2.5;
+  const ProgramResult r = runProgram({"render", kScene, "-o", folder / "video.mp4", "--log", folder / "log.csv",
+                                      "--set", "clock.duration=200"},
+                                     options);
+  EXPECT_EQ(r.exitCode, 130) << r.err;
+  EXPECT_EQ(readFile(folder / "video.mp4"), "earlier");
+  EXPECT_EQ(folder.contents(), std::vector<std::string>{"video.mp4"});
+}
+
+}  // namespace medulla
