@@ -52,7 +52,7 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
   loaded.models = loadModels(scene);
   for (const SceneStatic& item : scene.statics) {
     requireFile(scene, item.line, "mesh", item.meshPath);
-    TriangleMesh mesh = readMesh(item.meshPath, item.metresPerUnit);
+    TriangleMesh mesh = readMesh(item.meshPath, metresPerUnit(item.unit));
     for (Eigen::Vector3d& v : mesh.vertices) v = item.worldFromMesh * v;
     loaded.statics.push_back(std::move(mesh));
   }

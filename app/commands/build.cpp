@@ -53,9 +53,10 @@ int runBuild(const BuildOptions& options) {
   model.name = std::filesystem::path(options.mesh).stem().string();
   model.meshHash = meshHash(input);
   model.settings = repeatingCommand(options);
-  if (!options.reportPath.empty()) writeReport(options.reportPath, report);
+  const std::vector<Result> results = buildResults(report);
   writeModel(options.output, model);
-  fmt::print("{}", reportLines(report));
+  if (!options.reportPath.empty()) writeReport(options.reportPath, results);
+  printResults(results);
   return 0;
 }
 

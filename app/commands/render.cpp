@@ -97,7 +97,7 @@ int runRender(const RenderOptions& options) {
   for (const std::string& path : options.outputs) fmt::print("file {}\n", fs::absolute(path).lexically_normal().string());
   fmt::print("pictures {}\n", last - first);
   fmt::print("pictures_per_second {:.4g}\n", (last - first) / wall);
-  printTotals(simulation, processCpuSeconds() - cpuStart, wall);
+  printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));
   return 0;
 }
 

@@ -13,7 +13,7 @@ int runReplay(const RunOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   runToEnd(loaded, options, simulation, [&] { progress.update(simulation.time()); });
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  printTotals(simulation, processCpuSeconds() - cpuStart, wall);
+  printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));
   return 0;
 }
 

@@ -32,73 +32,115 @@ LoadedScene loadRun(const RunOptions& options) {
 
 namespace {
 
-// Surfaces asked for, written when the run has passed their time.
-class SurfaceWriter {
+// Surfaces asked for, kept until the run is through: a run that fails later overwrites nothing.
+class SurfaceRecorder {
  public:
-  SurfaceWriter(const LoadedScene& loaded, const RunOptions& options) : loaded_(&loaded) {
+  SurfaceRecorder(const LoadedScene& loaded, const RunOptions& options) {
     for (const SurfaceRequest& request : options.surfaces) {
       const double time = request.time.value_or(loaded.scene.duration);
-      if (time < 0 || time > loaded.scene.duration)
+      if (!(time >= 0 && time <= loaded.scene.duration))
         throw std::runtime_error(fmt::format("--surface-at {}: expected a time from 0 to {} s or \"end\"", time,
                                              loaded.scene.duration));
-      pending_.push_back({time, std::make_unique<OutputFile>(request.path)});
+      const OutputFile writableAtAll(request.path);
+      requests_.push_back({time, request.path, {}});
     }
   }
   void afterFrame(const Simulation& simulation) {
-    const double end = simulation.time(), start = simulation.previous().time;
-    for (Pending& p : pending_) {
-      if (p.written || (p.time > end + 1e-9 && !simulation.finished())) continue;
-      DynamicsFrame frame;
-      blendFrames(simulation.previous(), simulation.current(), std::clamp((p.time - start) / (end - start), 0.0, 1.0),
-                  frame);
-      writeSurfaces(*p.file, *loaded_, frame);
-      p.written = true;
+    const double start = simulation.previous().time, end = simulation.current().time;
+    for (Request& r : requests_) {
+      const bool due = r.time <= end + 1e-9 || simulation.finished();
+      if (!due || !r.frame.bodies.empty()) continue;
+      const double alpha = std::clamp((r.time - start) / (end - start), 0.0, 1.0);
+      blendFrames(simulation.previous(), simulation.current(), alpha, r.frame);
     }
   }
-  void commit() {
-    for (Pending& p : pending_) p.file->commit();
+  void write(const Simulation& simulation) const {
+    for (const Request& r : requests_) writeSurface(r.path, simulation.world().bodies(), r.frame);
   }
 
  private:
-  struct Pending {
+  struct Request {
     double time;
-    std::unique_ptr<OutputFile> file;
-    bool written = false;
+    std::string path;
+    DynamicsFrame frame;
   };
-  const LoadedScene* loaded_;
-  std::vector<Pending> pending_;
+  std::vector<Request> requests_;
+};
+
+class LogRecorder {
+ public:
+  LogRecorder(const LoadedScene& loaded, const RunOptions& options) : everyTick_(options.logEveryTick) {
+    if (options.logPath.empty()) return;
+    std::vector<std::string> tools, bodies;
+    for (const SceneTool& tool : loaded.scene.tools) tools.push_back(tool.name);
+    for (const SceneBody& body : loaded.scene.bodies) bodies.push_back(body.name);
+    file_.emplace(options.logPath, tools, bodies);
+  }
+  // Bodies and energies are those of the end of the dynamics frame, in rows of ticks too.
+  void afterFrame(const Simulation& simulation) {
+    if (!file_) return;
+    const World& world = simulation.world();
+    const ServoRecord& record = simulation.record();
+    row_.bodies.resize(world.bodies().size());
+    for (std::size_t b = 0; b < row_.bodies.size(); ++b) {
+      const BodyDescription& body = world.bodies()[b];
+      row_.bodies[b].volumeRatio = world.volumeRatio(static_cast<int>(b));
+      row_.bodies[b].dynamicNodes =
+          body.surface == SurfaceMode::full ? static_cast<int>(body.model->restNodes.size()) : 0;
+    }
+    row_.energies = world.energies();
+    row_.impulseMismatch = simulation.lastImpulseMismatch() / 100;
+    const int ticks = static_cast<int>(record.tools.size()) - 1;
+    for (int tick = everyTick_ ? 1 : ticks; tick <= ticks; ++tick) {
+      row_.time = record.start + record.duration * tick / ticks;
+      row_.tools = record.tools[tick];
+      file_->write(row_);
+    }
+  }
+  void commit() {
+    if (file_) file_->commit();
+  }
+
+ private:
+  bool everyTick_;
+  std::optional<LogFile> file_;
+  LogRow row_;
 };
 
 }  // namespace
 
 void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
               const std::function<void()>& afterFrame) {
-  SurfaceWriter surfaces(loaded, options);
-  std::unique_ptr<LogFile> log;
-  if (!options.logPath.empty()) log = std::make_unique<LogFile>(options.logPath, loaded.scene, options.logEveryTick);
+  SurfaceRecorder surfaces(loaded, options);
+  LogRecorder log(loaded, options);
   while (!simulation.finished()) {
     checkInterrupt();
     simulation.advanceFrame();
-    if (log) log->append(simulation);
+    log.afterFrame(simulation);
     surfaces.afterFrame(simulation);
     afterFrame();
   }
-  if (log) log->commit();
-  surfaces.commit();
+  log.commit();
+  surfaces.write(simulation);
 }
 
-void printTotals(const Simulation& simulation, double cpuSeconds, double wallSeconds) {
+std::vector<Result> runResults(const Simulation& simulation, double cpuSeconds, double wallSeconds) {
   const RunTotals& totals = simulation.totals();
-  fmt::print("simulated {:.6g} s\n", totals.simulated);
-  fmt::print("cpu {:.4g} s\n", cpuSeconds);
-  fmt::print("realtime {:.4g} x\n", wallSeconds > 0 ? totals.simulated / wallSeconds : 0);
-  fmt::print("substeps {}\n", totals.substeps);
-  fmt::print("ticks {}\n", totals.ticks);
-  fmt::print("force_max {:.5g} N\n", totals.forceMax);
-  fmt::print("volume_ratio_min {:.5g}\n", totals.volumeRatioMin);
-  fmt::print("volume_ratio_max {:.5g}\n", totals.volumeRatioMax);
-  fmt::print("impulse_mismatch {:.4g} %\n", totals.impulseMismatch());
-  fmt::print("hash {:016x}\n", simulation.world().stateHash());
+  return {{"simulated", fmt::format("{:.6g}", totals.simulated), "s"},
+          {"cpu", fmt::format("{:.4g}", cpuSeconds), "s"},
+          {"realtime", fmt::format("{:.4g}", totals.simulated / std::max(wallSeconds, 1e-9)), "x"},
+          {"substeps", fmt::format("{}", totals.substeps), ""},
+          {"ticks", fmt::format("{}", totals.ticks), ""},
+          {"force_max", fmt::format("{:.5g}", totals.forceMax), "N"},
+          {"volume_ratio_min", fmt::format("{:.5g}", totals.volumeRatioMin), ""},
+          {"volume_ratio_max", fmt::format("{:.5g}", totals.volumeRatioMax), ""},
+          {"impulse_mismatch", fmt::format("{:.4g}", totals.impulseMismatch()), "%"},
+          {"hash", fmt::format("{:016x}", simulation.world().stateHash()), ""}};
+}
+
+void printResults(const std::vector<Result>& results) {
+  for (const Result& r : results)
+    fmt::print("{} {}{}\n", r.name, r.value, r.unit.empty() ? std::string() : " " + r.unit);
 }
 
 }  // namespace medulla

@@ -2,11 +2,11 @@
 
 #include <functional>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "app/files/report_file.h"
 #include "app/simulation.h"
 
 // What `replay` and `render` share: a scene run to its end in logical time, with its log and surface files.
@@ -36,7 +36,10 @@ LoadedScene loadRun(const RunOptions& options);
 void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
               const std::function<void()>& afterFrame);
 
-// The result lines of a run on standard output.
-void printTotals(const Simulation& simulation, double cpuSeconds, double wallSeconds);
+// The results of a run, in the order in which they are shown.
+std::vector<Result> runResults(const Simulation& simulation, double cpuSeconds, double wallSeconds);
+
+// "name value [unit]" lines on standard output.
+void printResults(const std::vector<Result>& results);
 
 }  // namespace medulla
