@@ -51,7 +51,7 @@ int runBuild(const BuildOptions& options) {
     throw std::runtime_error(fmt::format("{}: {}", options.mesh, error.what()));
   }
   model.name = std::filesystem::path(options.mesh).stem().string();
-  model.meshHash = meshHash(input);
+  model.meshHash = hashMesh(input);
   model.settings = repeatingCommand(options);
   const std::vector<Result> results = buildResults(report);
   writeModel(options.output, model);
