@@ -2,6 +2,7 @@
 
 #include <array>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "haptics/swept_triangle.h"
@@ -64,5 +65,8 @@ class Buckets {
   struct Data;
   std::unique_ptr<Data> data_;
 };
+
+// Of the library that runs, not of the headers: "3.13.5".
+std::string embreeVersion();
 
 }  // namespace medulla
