@@ -44,7 +44,8 @@ struct RunArguments {
 
 void addRunOptions(CLI::App& command, RunArguments& a) {
   command.add_option("SCENE", a.scene, "scene file (XML)")->required();
-  command.add_option("--set", a.sets, "replace one value of the scene, e.g. body.gallbladder.surface=skin (repeatable)")
+  command
+      .add_option("--set", a.sets, "replace one value of the scene, e.g. body.gallbladder.surface=skin (repeatable)")
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
   command.add_option("--trajectory", a.trajectories, "read a tool's motion from another file (repeatable)")
@@ -55,7 +56,8 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
   command.add_option("--log-rate", a.logRate, "rows of the log: per dynamics frame or per servo tick")
       ->check(CLI::IsMember({"frame", "tick"}))
       ->capture_default_str();
-  command.add_option("--surface-at", a.surfaces, "write the bodies' surfaces at time T (s) or \"end\" as OBJ (repeatable)")
+  command
+      .add_option("--surface-at", a.surfaces, "write the bodies' surfaces at time T (s) or \"end\" as OBJ (repeatable)")
       ->type_name("T FILE.obj")
       ->type_size(2)
       ->allow_extra_args(false);
@@ -124,7 +126,8 @@ RenderOptions renderOptions(const RenderArguments& a) {
 void addRender(CLI::App& app, RenderArguments& a) {
   CLI::App* c = app.add_subcommand("render", "run a scene and draw it into a video or numbered PNG files");
   addRunOptions(*c, a.run);
-  c->add_option("-o,--output", a.outputs, "FILE.mp4, or a folder for PNG files; repeatable (default: SCENE's name + .mp4)")
+  c->add_option("-o,--output", a.outputs,
+                "FILE.mp4, or a folder for PNG files; repeatable (default: SCENE's name + .mp4)")
       ->type_name("FILE.mp4|DIR")
       ->allow_extra_args(false);
   c->add_option("--view", a.view, "skin; or spheres, links and attachments; or both")

@@ -26,7 +26,9 @@ void watchInterrupts() {
   for (int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
 }
 
-bool interruptRequested() { return requested != 0; }
+bool interruptRequested() {
+  return requested != 0;
+}
 
 void checkInterrupt() {
   if (interruptRequested()) throw Interrupted();

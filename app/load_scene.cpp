@@ -1,5 +1,5 @@
-#include <filesystem>
 #include <fmt/format.h>
+#include <filesystem>
 
 #include "app/files/input_error.h"
 #include "app/files/mesh_file.h"
@@ -47,7 +47,8 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
       tool.line = 0;
       known = true;
     }
-    if (!known) throw std::runtime_error(fmt::format("--trajectory {}={}: the scene has no tool \"{}\"", name, path, name));
+    if (!known)
+      throw std::runtime_error(fmt::format("--trajectory {}={}: the scene has no tool \"{}\"", name, path, name));
   }
   loaded.models = loadModels(scene);
   for (const SceneStatic& item : scene.statics) {
@@ -57,7 +58,8 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
     loaded.statics.push_back(std::move(mesh));
   }
   for (const SceneTool& tool : scene.tools) {
-    if (tool.line > 0) requireFile(scene, tool.line, fmt::format("trajectory of tool \"{}\"", tool.name), tool.trajectoryPath);
+    if (tool.line > 0)
+      requireFile(scene, tool.line, fmt::format("trajectory of tool \"{}\"", tool.name), tool.trajectoryPath);
     loaded.trajectories.push_back(readTrajectory(tool.trajectoryPath));
   }
   loaded.scene = std::move(scene);

@@ -9,8 +9,12 @@ namespace medulla {
 
 namespace {
 
-glm::vec3 toGlm(const Eigen::Vector3d& v) { return {float(v.x()), float(v.y()), float(v.z())}; }
-glm::quat toGlm(const Eigen::Quaterniond& q) { return {float(q.w()), float(q.x()), float(q.y()), float(q.z())}; }
+glm::vec3 toGlm(const Eigen::Vector3d& v) {
+  return {float(v.x()), float(v.y()), float(v.z())};
+}
+glm::quat toGlm(const Eigen::Quaterniond& q) {
+  return {float(q.w()), float(q.x()), float(q.y()), float(q.z())};
+}
 
 // Colours of the model view, linear RGB: after the paper's figures, told apart by brightness too.
 constexpr glm::vec4 kBallColour{0.80f, 0.30f, 0.22f, 0.55f};
@@ -55,13 +59,14 @@ void addModel(const SceneBody& body, const SoftBodyModel& model, const BodyFrame
     picture.balls.push_back({toGlm(centre), float(sphere.radius), fixed ? kFixedBallColour : kBallColour});
     const float axis = 0.6f * float(sphere.radius), thin = 0.035f * float(sphere.radius);
     for (int a = 0; a < 3; ++a)
-      picture.segments.push_back({toGlm(pose.position), toGlm(pose.position) + axis * toGlm(worldFromSphere.col(a)), thin,
-                                  kAxisColours[a]});
+      picture.segments.push_back(
+          {toGlm(pose.position), toGlm(pose.position) + axis * toGlm(worldFromSphere.col(a)), thin, kAxisColours[a]});
   }
   for (const ElasticLink& link : model.links) {
-    const float radius = 0.08f * float(std::min(model.spheres[link.sphere0].radius, model.spheres[link.sphere1].radius));
-    picture.segments.push_back({toGlm(frame.spheres[link.sphere0].position), toGlm(frame.spheres[link.sphere1].position),
-                                std::max(radius, 0.0004f), kLinkColour});
+    const float radius =
+        0.08f * float(std::min(model.spheres[link.sphere0].radius, model.spheres[link.sphere1].radius));
+    picture.segments.push_back({toGlm(frame.spheres[link.sphere0].position),
+                                toGlm(frame.spheres[link.sphere1].position), std::max(radius, 0.0004f), kLinkColour});
   }
   for (std::size_t n = 0; n < model.attachments.size(); ++n) {
     picture.segments.push_back(

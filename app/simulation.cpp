@@ -15,8 +15,8 @@ static World makeWorld(const LoadedScene& loaded) {
   std::vector<BodyDescription> bodies;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const SceneBody& body = scene.bodies[b];
-    bodies.push_back({body.name, loaded.models[b], body.tissue, body.factors, body.surface, body.worldFromModel,
-                      body.fixed});
+    bodies.push_back(
+        {body.name, loaded.models[b], body.tissue, body.factors, body.surface, body.worldFromModel, body.fixed});
   }
   return World(settings, std::move(bodies));
 }

@@ -48,9 +48,9 @@ void stateAt(const ServoRecord& record, double time, PictureState& out);
 struct RunTotals {
   double simulated = 0;  // s
   long substeps = 0, ticks = 0;
-  double forceMax = 0;                              // N, of any tool
-  double volumeRatioMin = 1, volumeRatioMax = 1;    // of any body
-  double toolImpulse = 0, impulseDifference = 0;    // N s, sums over frames and tools of lengths
+  double forceMax = 0;                            // N, of any tool
+  double volumeRatioMin = 1, volumeRatioMax = 1;  // of any body
+  double toolImpulse = 0, impulseDifference = 0;  // N s, sums over frames and tools of lengths
   double impulseMismatch() const { return toolImpulse > 0 ? 100 * impulseDifference / toolImpulse : 0; }  // %
 };
 
@@ -66,7 +66,7 @@ class Simulation {
   int frame() const { return frame_; }  // dynamics frames done
   int frameCount() const { return frameCount_; }
   double time() const { return frame_ * frameDuration_; }
-  const ServoRecord& record() const { return record_; }       // of the last frame; before the first: the rest state
+  const ServoRecord& record() const { return record_; }        // of the last frame; before the first: the rest state
   const DynamicsFrame& previous() const { return previous_; }  // dynamics frames, not delayed by blending
   const DynamicsFrame& current() const { return current_; }
   double lastImpulseMismatch() const { return lastMismatch_; }  // %, of the last frame

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "haptics/buckets.h"
+#include "haptics/contact_patch.h"
 #include "haptics/grab.h"
 #include "haptics/proxy.h"
 
@@ -24,6 +25,7 @@ struct Tool {
   Grip grip;
   Vector3d coupled = Vector3d::Zero(), coupledAtFrameStart = Vector3d::Zero();
   Vector3d coupledSum = Vector3d::Zero();  // over the frame's ticks
+  ContactPatch patch;                      // of the frame's ticks
   ProxyContact lastContact;                // while isLeaving: in contact, or not yet clear of it
   double largestPush = 0;                  // N, of the coupling's spring during this contact
   double clampScale = 1;                   // of the force, at the last tick
@@ -38,6 +40,7 @@ struct Servo::Data {
   double alpha = 1;  // of the last tick
   std::vector<Tool> tools;
   std::vector<ToolState> states;
+  std::vector<ProxyContact> contacts;  // scratch of handOver
 };
 
 // ---- Checks ----------------------------------------------------------------------------------------------
@@ -162,6 +165,7 @@ static void tickTool(Buckets& buckets, double alphaBefore, double alpha, double 
     followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
     followLeaving(surface, alpha, tool);
     record(contactForce(surface, alpha, deviceVelocity, tool), tool, state);
+    addContacts(tool.proxy, (tool.proxy.centre - tool.device.position).norm(), tool.patch);
   }
 }
 
@@ -180,6 +184,7 @@ static void startFrame(Tool& tool) {
   tool.coupledAtFrameStart = tool.coupled;
   tool.coupledSum.setZero();
   tool.ticks = 0;
+  clearPatch(tool.patch);
 }
 
 void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to) {
@@ -235,13 +240,21 @@ static void handOverContact(const BlendedSurface& surface, double alpha, const T
   spring.damping = settings.damping * share;
 }
 
+// Several contacts stand oblique to the coupling's pull p (a groove, a dimple). The force on the proxy is the sum of
+// lambda_i n_i with lambda_i in the ratio of the shares s_i, and must be k D p: lambda_i = k D s_i / sum_j s_j c_j with
+// c_i = n_i . p. Spring i is compressed by D c_i only, so its stiffness is k s_i / (c_i sum_j s_j c_j); k s_i alone
+// would lose cos^2 of the groove's angle. Bounded, so that a wedge does not ask for ever smaller substeps.
 static void handOverContacts(const BlendedSurface& surface, double alpha, const Tool& tool, int index, const Path& path,
-                             Loads& out) {
-  const Proxy& proxy = tool.proxy;
-  for (int k = 0; k < proxy.contactCount; ++k)
-    handOverContact(surface, alpha, tool, index, path, proxy.contacts[k], proxy.contacts[k].share, out);
-  if (!proxy.inContact() && tool.isLeaving)
-    handOverContact(surface, alpha, tool, index, path, tool.lastContact, 1, out);
+                             std::vector<ProxyContact>& contacts, Loads& out) {
+  patchContacts(surface, alpha, tool.proxy, tool.patch, contacts);
+  const Vector3d pull = (tool.proxy.centre - path.end).normalized();
+  constexpr double leastCosine = 0.5;
+  const auto cosine = [&](const ProxyContact& contact) { return std::max(leastCosine, contact.normal.dot(pull)); };
+  double meanCosine = 0;
+  for (const ProxyContact& contact : contacts) meanCosine += contact.share * cosine(contact);
+  for (const ProxyContact& contact : contacts)
+    handOverContact(surface, alpha, tool, index, path, contact, contact.share / (cosine(contact) * meanCosine), out);
+  if (contacts.empty() && tool.isLeaving) handOverContact(surface, alpha, tool, index, path, tool.lastContact, 1, out);
 }
 
 // Every held node pulled to where the tool wants it, by an equal share of the tool's stiffness: pulling is as stiff as
@@ -277,7 +290,7 @@ void Servo::handOver(double frameDuration, Loads& out) const {
     if (!tool.grip.held.empty())
       handOverGrip(surface, data_->alpha, tool, int(k), path, frameDuration, out);
     else
-      handOverContacts(surface, data_->alpha, tool, int(k), path, out);
+      handOverContacts(surface, data_->alpha, tool, int(k), path, data_->contacts, out);
   }
 }
 
@@ -290,6 +303,7 @@ static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, const
   tool.coupled = start.position;
   tool.proxy = placeProxy(buckets, start.position, settings.radius);
   tool.grip.held.reserve(buckets.surface().from.size());
+  tool.patch.entries.reserve(contactPatchCapacity);
   startFrame(tool);
   return tool;
 }
@@ -309,7 +323,7 @@ static Buckets makeBuckets(const std::vector<TouchableBody>& bodies, const std::
 
 Servo::Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools, double tickDuration,
              const DynamicsFrame& rest, const std::vector<ToolSample>& start)
-    : data_(new Data{makeBuckets(bodies, tools, rest), tickDuration, 0, {}, {}}) {
+    : data_(new Data{makeBuckets(bodies, tools, rest), tickDuration, 0, {}, {}, {}}) {
   assert(tools.size() == start.size() && tickDuration > 0);
   data_->tools.reserve(tools.size());
   data_->states.reserve(tools.size());

@@ -21,8 +21,8 @@ struct ProgramResult {
 
 struct ProgramOptions {
   std::string folder = ".";
-  double interruptAfter = 0;      // s; > 0: SIGINT is sent then
-  std::string path;               // PATH of the child; empty: inherited
+  double interruptAfter = 0;  // s; > 0: SIGINT is sent then
+  std::string path;           // PATH of the child; empty: inherited
 };
 
 inline std::string readFile(const std::string& path) {
@@ -74,7 +74,8 @@ class TemporaryFolder {
   // Names in the folder, hidden ones too.
   std::vector<std::string> contents() const {
     std::vector<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(path_)) names.push_back(entry.path().filename().string());
+    for (const auto& entry : std::filesystem::directory_iterator(path_))
+      names.push_back(entry.path().filename().string());
     return names;
   }
   void write(const std::string& name, const std::string& text) const { std::ofstream(path_ + "/" + name) << text; }

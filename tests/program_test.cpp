@@ -20,7 +20,8 @@ static void expectRefusal(const ProgramResult& r, int exitCode, const std::vecto
   EXPECT_EQ(r.exitCode, exitCode) << r.err;
   EXPECT_EQ(r.out, "");
   EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
-  for (const std::string& word : words) EXPECT_NE(r.err.find(word), std::string::npos) << "no \"" << word << "\" in " << r.err;
+  for (const std::string& word : words)
+    EXPECT_NE(r.err.find(word), std::string::npos) << "no \"" << word << "\" in " << r.err;
 }
 
 static const std::vector<std::string> kShort = {"--set", "clock.duration=0.2", "--set", "output.golden=0"};
@@ -43,12 +44,12 @@ TEST(Program, ReplayPrintsItsResultsAndTheSameHashTwice) {
 TEST(Program, DrawingOptionsLeaveTheHashAlone) {
   const TemporaryFolder folder;
   const std::string hash = valueOf(runProgram(command({"replay", kScene})).out, "hash");
-  const ProgramResult plain = runProgram(
-      command({"render", kScene, "-o", folder / "a", "--size", "64x48", "--fps", "24", "--frames", "0:2"}));
+  const ProgramResult plain =
+      runProgram(command({"render", kScene, "-o", folder / "a", "--size", "64x48", "--fps", "24", "--frames", "0:2"}));
   ASSERT_EQ(plain.exitCode, 0) << plain.err;
   EXPECT_EQ(valueOf(plain.out, "hash"), hash);
-  const ProgramResult other = runProgram(command({"render", kScene, "-o", folder / "b", "--size", "96x64", "--fps", "17",
-                                                  "--view", "both", "--show", "proxy"}));
+  const ProgramResult other = runProgram(command(
+      {"render", kScene, "-o", folder / "b", "--size", "96x64", "--fps", "17", "--view", "both", "--show", "proxy"}));
   ASSERT_EQ(other.exitCode, 0) << other.err;
   EXPECT_EQ(valueOf(other.out, "hash"), hash);
   EXPECT_TRUE(std::filesystem::exists(folder / "a/00001.png"));
@@ -77,13 +78,13 @@ TEST(Program, SurfaceHasTheInputMeshsOrder) {
 TEST(Program, BuildsAModelThatRenders) {
   const TemporaryFolder folder;
   const std::string mesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj";
-  const ProgramResult r = runProgram(
-      {"build", mesh, "-o", folder / "m.xml", "--spheres", "5", "--report", folder / "report.csv"});
+  const ProgramResult r =
+      runProgram({"build", mesh, "-o", folder / "m.xml", "--spheres", "5", "--report", folder / "report.csv"});
   ASSERT_EQ(r.exitCode, 0) << r.err;
-  for (const char* name : {"triangles", "skeleton_nodes", "skeleton_links", "spheres", "links", "gap_max", "gap_mean",
-                           "gap_cones_max", "cover", "cover_cones", "mass_error", "centre_error", "inertia_error",
-                           "components", "centres_outside", "attachments_crossing", "attachment_max", "degree_max",
-                           "seconds"})
+  for (const char* name :
+       {"triangles", "skeleton_nodes", "skeleton_links", "spheres", "links", "gap_max", "gap_mean", "gap_cones_max",
+        "cover", "cover_cones", "mass_error", "centre_error", "inertia_error", "components", "centres_outside",
+        "attachments_crossing", "attachment_max", "degree_max", "seconds"})
     EXPECT_NE(valueOf(r.out, name), "") << name;
   EXPECT_EQ(valueOf(r.out, "spheres"), "5");
   EXPECT_TRUE(std::filesystem::exists(folder / "report.csv"));
@@ -95,7 +96,8 @@ TEST(Program, HelpAndVersion) {
   EXPECT_NE(runProgram({"--help"}).out.find("render"), std::string::npos);
   for (const char* verb : {"render", "replay", "build", "golden"}) EXPECT_EQ(runProgram({verb, "--help"}).exitCode, 0);
   const ProgramResult version = runProgram({"--version"});
-  for (const char* name : {"medulla", "compiler", "embree", "renderer"}) EXPECT_NE(valueOf(version.out, name), "") << name;
+  for (const char* name : {"medulla", "compiler", "embree", "renderer"})
+    EXPECT_NE(valueOf(version.out, name), "") << name;
 }
 
 TEST(ProgramRefuses, WrongUsageWithCodeTwo) {
@@ -113,7 +115,8 @@ TEST(ProgramRefuses, BadScenes) {
   expectRefusal(runProgram({"replay", folder.path()}), 1, {folder.path()});
   folder.write("broken.xml", "<scene name=\"x\">\n<clock servo=\"1200\"\n</scene>\n");
   expectRefusal(runProgram({"replay", folder / "broken.xml"}), 1, {"broken.xml:"});
-  expectRefusal(runProgram({"replay", kScene, "--set", "body.gallbladder.model=none.xml"}), 1, {"none.xml", "gallbladder"});
+  expectRefusal(runProgram({"replay", kScene, "--set", "body.gallbladder.model=none.xml"}), 1,
+                {"none.xml", "gallbladder"});
   expectRefusal(runProgram({"replay", kScene, "--set", "body.gallbladder.look=plastic"}), 1, {"plastic"});
 }
 
@@ -153,8 +156,8 @@ TEST(ProgramRefuses, VideoWithoutFfmpeg) {
 TEST(ProgramRefuses, AStateThatStopsBeingFinite) {
   const TemporaryFolder folder;
   folder.write("log.csv", "earlier\n");
-  const ProgramResult r = runProgram({"replay", kScene, "--set", "dynamics.substeps=1", "--set", "tissue.bile_sac.young=1e8",
-                                      "--log", folder / "log.csv"});
+  const ProgramResult r = runProgram({"replay", kScene, "--set", "dynamics.substeps=1", "--set",
+                                      "tissue.bile_sac.young=1e8", "--log", folder / "log.csv"});
   expectRefusal(r, 1, {"gallbladder", "finite"});
   EXPECT_EQ(readFile(folder / "log.csv"), "earlier\n");
   EXPECT_EQ(folder.contents().size(), 1u);
@@ -165,9 +168,9 @@ TEST(Program, InterruptLeavesNothingHalfWritten) {
   folder.write("video.mp4", "earlier");
   ProgramOptions options;
   options.interruptAfter = 2.5;
-  const ProgramResult r = runProgram({"render", kScene, "-o", folder / "video.mp4", "--log", folder / "log.csv",
-                                      "--set", "clock.duration=200"},
-                                     options);
+  const ProgramResult r = runProgram(
+      {"render", kScene, "-o", folder / "video.mp4", "--log", folder / "log.csv", "--set", "clock.duration=200"},
+      options);
   EXPECT_EQ(r.exitCode, 130) << r.err;
   EXPECT_EQ(readFile(folder / "video.mp4"), "earlier");
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"video.mp4"});

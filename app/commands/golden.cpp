@@ -84,8 +84,8 @@ bool passes(const Moment& moment, const std::string& goldenPath, const std::stri
   std::vector<PngText> texts;
   const Image golden = readPng(goldenPath, &texts);
   if (golden.width != moment.image.width || golden.height != moment.image.height)
-    return fail(fmt::format("size {}x{}, golden {}x{}", moment.image.width, moment.image.height, golden.width,
-                            golden.height));
+    return fail(
+        fmt::format("size {}x{}, golden {}x{}", moment.image.width, moment.image.height, golden.width, golden.height));
   const ImageDifference d = compareImages(moment.image, golden);
   // Same renderer and same state: the very same bytes. Another Mesa, instruction set or mathematical library: within
   // the noise of those, which a missing shadow or the next picture of the video exceeds.
@@ -101,7 +101,8 @@ bool passes(const Moment& moment, const std::string& goldenPath, const std::stri
   }
   fs::create_directories(options.failures);
   writePng(fmt::format("{}/{}_actual.png", options.failures, moment.name), moment.image);
-  writePng(fmt::format("{}/{}_difference.png", options.failures, moment.name), amplifiedDifference(moment.image, golden));
+  writePng(fmt::format("{}/{}_difference.png", options.failures, moment.name),
+           amplifiedDifference(moment.image, golden));
   return fail(fmt::format("{}; see {}/{}_*.png", figures, options.failures, moment.name));
 }
 
@@ -113,8 +114,8 @@ int runGolden(const GoldenOptions& options) {
   for (const std::string& path : scenes) {
     std::string renderedWith;
     const std::vector<Moment> moments = renderMoments(path, options.context, renderedWith);
-    const fs::path folder =
-        options.images.empty() ? fs::absolute(path).parent_path().parent_path() / "golden_images" : fs::path(options.images);
+    const fs::path folder = options.images.empty() ? fs::absolute(path).parent_path().parent_path() / "golden_images"
+                                                   : fs::path(options.images);
     bool scenePasses = true;
     for (const Moment& moment : moments) {
       const std::string goldenPath = (folder / (moment.name + ".png")).string();

@@ -15,7 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool isVideo(const std::string& path) { return fs::path(path).extension() == ".mp4"; }
+bool isVideo(const std::string& path) {
+  return fs::path(path).extension() == ".mp4";
+}
 
 // Where pictures go: any number of videos and folders of numbered PNG files.
 class PictureOutputs {
@@ -94,7 +96,8 @@ int runRender(const RenderOptions& options) {
   });
   outputs.finish();
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  for (const std::string& path : options.outputs) fmt::print("file {}\n", fs::absolute(path).lexically_normal().string());
+  for (const std::string& path : options.outputs)
+    fmt::print("file {}\n", fs::absolute(path).lexically_normal().string());
   fmt::print("pictures {}\n", last - first);
   fmt::print("pictures_per_second {:.4g}\n", (last - first) / wall);
   printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));

@@ -39,8 +39,8 @@ class SurfaceRecorder {
     for (const SurfaceRequest& request : options.surfaces) {
       const double time = request.time.value_or(loaded.scene.duration);
       if (!(time >= 0 && time <= loaded.scene.duration))
-        throw std::runtime_error(fmt::format("--surface-at {}: expected a time from 0 to {} s or \"end\"", time,
-                                             loaded.scene.duration));
+        throw std::runtime_error(
+            fmt::format("--surface-at {}: expected a time from 0 to {} s or \"end\"", time, loaded.scene.duration));
       const OutputFile writableAtAll(request.path);
       requests_.push_back({time, request.path, {}});
     }

@@ -1,17 +1,20 @@
 #include "app/files/report_file.h"
 
-#include "app/files/number_text.h"
+#include <fmt/format.h>
+
+#include <type_traits>
+
 #include "app/files/output_file.h"
 
 namespace medulla {
 
 namespace {
 
+// Quality figures: six digits are more than anyone compares.
 template <typename T>
 std::string numberText(T value) {
-  std::string text;
-  appendNumber(text, value);
-  return text;
+  if constexpr (std::is_floating_point_v<T>) return fmt::format("{:.6g}", value);
+  return fmt::format("{}", value);
 }
 
 }  // namespace

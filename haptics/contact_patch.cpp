@@ -1,0 +1,47 @@
+#include "haptics/contact_patch.h"
+
+#include <algorithm>
+
+namespace medulla {
+
+void clearPatch(ContactPatch& patch) {
+  patch.entries.clear();
+  patch.total = 0;
+}
+
+void addContacts(const Proxy& proxy, double push, ContactPatch& patch) {
+  for (int k = 0; k < proxy.contactCount; ++k) {
+    const ProxyContact& contact = proxy.contacts[k];
+    const double share = push * contact.share;
+    if (!(share > 0)) continue;
+    auto entry = std::find_if(patch.entries.begin(), patch.entries.end(),
+                              [&](const ContactPatch::Entry& e) { return e.triangle == contact.triangle; });
+    if (entry == patch.entries.end()) {
+      if (patch.entries.size() == contactPatchCapacity) continue;
+      entry = patch.entries.insert(patch.entries.end(), {contact.triangle, Eigen::Vector3d::Zero(), 0});
+    }
+    entry->weights += share * contact.weights;
+    entry->share += share;
+    patch.total += share;
+  }
+}
+
+void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ContactPatch& patch,
+                   std::vector<ProxyContact>& out) {
+  out.clear();
+  for (const ContactPatch::Entry& entry : patch.entries) {
+    ProxyContact contact;
+    contact.triangle = entry.triangle;
+    contact.weights = entry.weights / entry.share;
+    contact.share = entry.share / patch.total;
+    const Triangle t = surface.triangle(entry.triangle, alpha);
+    contact.point = contact.weights.x() * t.a + contact.weights.y() * t.b + contact.weights.z() * t.c;
+    const Eigen::Vector3d outward = proxy.centre - contact.point;
+    const double distance = outward.norm();
+    if (!(distance > 0)) continue;  // the point passed the proxy's centre: no direction to push it
+    contact.normal = outward / distance;
+    out.push_back(contact);
+  }
+}
+
+}  // namespace medulla
