@@ -5,6 +5,8 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 namespace medulla {
 
@@ -274,9 +276,11 @@ static void pushOut(Buckets& buckets, double alpha, double toolRadius, Proxy& pr
 }
 
 void followSurface(Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy) {
-  const Vector3d start = proxy.centre;
-  proxy.centre =
-      notPassedOver(buckets, alphaBefore, alpha, proxy.radius, start, start + carriedBy(buckets, alpha, proxy));
+  const Vector3d start = proxy.centre, carried = start + carriedBy(buckets, alpha, proxy);
+  if (!(carried.lpNorm<Eigen::Infinity>() <= toolReach))
+    throw std::runtime_error("a touched surface carried the tool beyond " + std::to_string(int(toolReach)) +
+                             " m: the state of its body is not finite any more in effect; use more substeps");
+  proxy.centre = notPassedOver(buckets, alphaBefore, alpha, proxy.radius, start, carried);
   pushOut(buckets, alpha, toolRadius, proxy);
   for (int k = 0; k < proxy.contactCount; ++k) {
     ProxyContact& contact = proxy.contacts[k];

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "tests/program_run.h"
+#include "tests/temporary_folder.h"
 
 // The program as its users meet it: results, exit codes, one line per refusal, nothing half-written.
 namespace medulla {

@@ -272,8 +272,8 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics) {
     return (std::sqrt(damping * damping + 4 * stiffness) - damping) / stiffness;
   };
   // The surface's own modes are fast and die within a few substeps even below their critical damping; giving them the
-  // body's beta would only cost step. Half critical at the fastest of them costs a third.
-  constexpr double kLargestSurfaceRatio = 0.5;
+  // body's beta would only cost step. A quarter of critical at the fastest of them costs a fifth of it, a half a third.
+  constexpr double kLargestSurfaceRatio = 0.25;
   // The links get the beta that damps the lowest mode as asked, unless the step would shrink by more than this.
   constexpr double kLargestCost = 8;
 

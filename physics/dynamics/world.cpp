@@ -48,9 +48,14 @@ void step(WorldData& d, const Loads& loads, double remaining, FrameReport& repor
   stepPositions(d);
 }
 
+// Beyond 1e4 (m, m/s) counts as infinite: a step that diverges passes there within one frame, and nothing downstream
+// is made for such numbers.
 bool isFinite(const WorldData& d, const BodyRange& r) {
+  constexpr double kOverflow = 1.8e304;
   double sum = 0;  // of zeros, unless something is not finite
-  const auto add = [&sum](const Quad& q) { sum += 0 * ((q.v[0] + q.v[1]) + (q.v[2] + q.v[3])); };
+  const auto add = [&sum](const Quad& q) {
+    for (double v : q.v) sum += 0 * (kOverflow * v);
+  };
   for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
     add(d.spheres.position[i]);
     add(d.spheres.velocity[i]);
