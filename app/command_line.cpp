@@ -154,7 +154,7 @@ void addBuild(CLI::App& app, BuildArguments& a) {
   c->add_option("MESH", a.options.mesh, "closed surface: OBJ, OFF, STL, PLY, ...")->required();
   c->add_option("-o,--output", a.options.output, "model file to write")->type_name("MODEL.xml")->required();
   c->add_option("--spheres", a.options.settings.spheres, "number of filling spheres")
-      ->check(CLI::Range(1, 10000))
+      ->check(CLI::Range(1, spheresMax))
       ->capture_default_str();
   c->add_option("--method", a.method, "cover: inscribed balls chosen to fill the body; skeleton: the raw edge collapse")
       ->check(CLI::IsMember({"cover", "skeleton"}))
@@ -163,6 +163,13 @@ void addBuild(CLI::App& app, BuildArguments& a) {
       ->check(CLI::IsMember({"m", "cm", "mm", "inch"}))
       ->capture_default_str();
   c->add_option("--fine", a.options.fine, "detailed shape that the drawn surface follows")->type_name("MESH");
+  c->add_option("--surface-mass", a.options.settings.surfaceMassFraction,
+                "share of the mass that surface nodes carry; more allows larger substeps")
+      ->check(CLI::Range(0.0, 0.4))
+      ->capture_default_str();
+  c->add_option("--render-levels", a.options.settings.renderLevels, "subdivisions of the mesh for the drawn surface")
+      ->check(CLI::Range(0, 4))
+      ->capture_default_str();
   c->add_option("--report", a.options.reportPath, "write the quality report as CSV too")->type_name("FILE.csv");
 }
 

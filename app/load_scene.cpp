@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <algorithm>
 #include <filesystem>
 
 #include "app/files/input_error.h"
@@ -6,6 +7,7 @@
 #include "app/files/model_file.h"
 #include "app/files/trajectory_file.h"
 #include "app/simulation.h"
+#include "render/renderer.h"
 
 namespace medulla {
 
@@ -37,6 +39,13 @@ static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene&
   return models;
 }
 
+// Known looks are the renderer's, but a run without pictures should not accept what a run with pictures refuses.
+static void requireLook(const Scene& scene, int line, const std::string& look) {
+  const std::vector<std::string> known = lookNames();
+  if (std::find(known.begin(), known.end(), look) != known.end()) return;
+  throw inputError(scene.path, line, fmt::format("unknown look \"{}\": expected {}", look, fmt::join(known, ", ")));
+}
+
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories) {
   LoadedScene loaded;
   for (const auto& [name, path] : trajectories) {
@@ -50,8 +59,10 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
     if (!known)
       throw std::runtime_error(fmt::format("--trajectory {}={}: the scene has no tool \"{}\"", name, path, name));
   }
+  for (const SceneBody& body : scene.bodies) requireLook(scene, body.line, body.look);
   loaded.models = loadModels(scene);
   for (const SceneStatic& item : scene.statics) {
+    requireLook(scene, item.line, item.look);
     requireFile(scene, item.line, "mesh", item.meshPath);
     TriangleMesh mesh = readMesh(item.meshPath, metresPerUnit(item.unit));
     for (Eigen::Vector3d& v : mesh.vertices) v = item.worldFromMesh * v;

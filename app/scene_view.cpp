@@ -78,11 +78,13 @@ void addModel(const SceneBody& body, const SoftBodyModel& model, const BodyFrame
 void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& state, const ViewOptions& options,
              Picture& picture) {
   Instrument instrument;
-  // The picture shows the proxy: an instrument never enters the tissue, its device may.
-  instrument.tip = toGlm(state.proxy);
+  // The picture shows the proxy: an instrument never enters the tissue, its device may. The proxy is a sphere, the jaws
+  // reach to its far side along the shaft.
+  instrument.tip = toGlm(state.proxy - tool.settings.radius * (input.worldFromTool * Eigen::Vector3d::UnitZ()));
   instrument.worldFromTool = toGlm(input.worldFromTool);
+  // A grip of 0.5 is where the jaws meet tissue and hold it.
   constexpr double kOpenJaw = 0.38, kClosedJaw = 0.05;  // rad
-  instrument.jawAngle = float(kClosedJaw + (kOpenJaw - kClosedJaw) * (1 - input.grip));
+  instrument.jawAngle = float(kClosedJaw + (kOpenJaw - kClosedJaw) * std::max(0.0, 1 - 2 * input.grip));
   instrument.touching = state.inContact || state.holding;
   picture.instruments.push_back(instrument);
   if (!options.showProxy) return;

@@ -270,7 +270,9 @@ const std::vector<int>& Buckets::near(const Vector3d& centre, double distance) {
 std::string embreeVersion() {
   const RTCDevice device = rtcNewDevice("threads=1,set_affinity=0");
   if (!device) return "does not start";
-  const auto number = [&](RTCDeviceProperty property) { return std::to_string(rtcGetDeviceProperty(device, property)); };
+  const auto number = [&](RTCDeviceProperty property) {
+    return std::to_string(rtcGetDeviceProperty(device, property));
+  };
   const std::string version = number(RTC_DEVICE_PROPERTY_VERSION_MAJOR) + "." +
                               number(RTC_DEVICE_PROPERTY_VERSION_MINOR) + "." +
                               number(RTC_DEVICE_PROPERTY_VERSION_PATCH);

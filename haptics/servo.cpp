@@ -240,16 +240,19 @@ static void handOverContact(const BlendedSurface& surface, double alpha, const T
   spring.damping = settings.damping * share;
 }
 
-// Several contacts stand oblique to the coupling's pull p (a groove, a dimple). The force on the proxy is the sum of
-// lambda_i n_i with lambda_i in the ratio of the shares s_i, and must be k D p: lambda_i = k D s_i / sum_j s_j c_j with
-// c_i = n_i . p. Spring i is compressed by D c_i only, so its stiffness is k s_i / (c_i sum_j s_j c_j); k s_i alone
-// would lose cos^2 of the groove's angle. Bounded, so that a wedge does not ask for ever smaller substeps.
+// Several contacts stand oblique to the direction p of their common push (a groove, a dimple). The force on the proxy
+// is the sum of lambda_i n_i with lambda_i in the ratio of the shares s_i, and must be k D p: lambda_i = k D s_i /
+// sum_j s_j c_j with c_i = n_i . p. Spring i is compressed by D c_i only, so its stiffness is k s_i / (c_i sum_j s_j
+// c_j); k s_i alone would lose cos^2 of the groove's angle. Bounded, so that a wedge does not ask for ever smaller
+// substeps.
 static void handOverContacts(const BlendedSurface& surface, double alpha, const Tool& tool, int index, const Path& path,
                              std::vector<ProxyContact>& contacts, Loads& out) {
   patchContacts(surface, alpha, tool.proxy, tool.patch, contacts);
-  const Vector3d pull = (tool.proxy.centre - path.end).normalized();
+  Vector3d push = Vector3d::Zero();
+  for (const ProxyContact& contact : contacts) push += contact.share * contact.normal;
+  push.normalize();
   constexpr double leastCosine = 0.5;
-  const auto cosine = [&](const ProxyContact& contact) { return std::max(leastCosine, contact.normal.dot(pull)); };
+  const auto cosine = [&](const ProxyContact& contact) { return std::max(leastCosine, contact.normal.dot(push)); };
   double meanCosine = 0;
   for (const ProxyContact& contact : contacts) meanCosine += contact.share * cosine(contact);
   for (const ProxyContact& contact : contacts)

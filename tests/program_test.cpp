@@ -80,14 +80,14 @@ TEST(Program, BuildsAModelThatRenders) {
   const TemporaryFolder folder;
   const std::string mesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj";
   const ProgramResult r =
-      runProgram({"build", mesh, "-o", folder / "m.xml", "--spheres", "5", "--report", folder / "report.csv"});
+      runProgram({"build", mesh, "-o", folder / "m.xml", "--spheres", "9", "--report", folder / "report.csv"});
   ASSERT_EQ(r.exitCode, 0) << r.err;
   for (const char* name :
        {"triangles", "skeleton_nodes", "skeleton_links", "spheres", "links", "gap_max", "gap_mean", "gap_cones_max",
         "cover", "cover_cones", "mass_error", "centre_error", "inertia_error", "components", "centres_outside",
         "attachments_crossing", "attachment_max", "degree_max", "seconds"})
     EXPECT_NE(valueOf(r.out, name), "") << name;
-  EXPECT_EQ(valueOf(r.out, "spheres"), "5");
+  EXPECT_EQ(valueOf(r.out, "spheres"), "9");
   EXPECT_TRUE(std::filesystem::exists(folder / "report.csv"));
   EXPECT_EQ(runProgram(command({"replay", kScene, "--set", "body.gallbladder.model=" + folder / "m.xml"})).exitCode, 0);
 }

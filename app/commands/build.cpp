@@ -14,10 +14,8 @@ namespace medulla {
 // The command that repeats the build, file names without folders: the model is the same wherever it is built.
 static std::string repeatingCommand(const BuildOptions& options) {
   namespace fs = std::filesystem;
-  const BuildSettings& s = options.settings;
-  std::string command = "medulla build " + fs::path(options.mesh).filename().string();
-  command += s.method == BuildMethod::cover ? fmt::format(" --method cover --spheres {}", s.spheres)
-                                            : std::string(" --method skeleton");
+  std::string command = fmt::format("medulla build {} {}", fs::path(options.mesh).filename().string(),
+                                    describeSettings(options.settings));
   if (options.unit != "m") command += " --unit " + options.unit;
   if (!options.fine.empty()) command += " --fine " + fs::path(options.fine).filename().string();
   return command;

@@ -1,0 +1,76 @@
+#include "app/simulation.h"
+
+#include <gtest/gtest.h>
+
+#include "app/scene_view.h"
+
+namespace medulla {
+
+static LoadedScene shortScene(double duration) {
+  const std::string path = std::string(MEDULLA_SOURCE_DIR) + "/scenes/gallbladder.xml";
+  return loadScene(readScene(path, {{"clock.duration", std::to_string(duration)}}));
+}
+
+TEST(Simulation, TheSameSceneTwiceStaysInLockstep) {
+  const LoadedScene loaded = shortScene(3);  // approach and press
+  Simulation a(loaded), b(loaded);
+  while (!a.finished()) {
+    a.advanceFrame();
+    b.advanceFrame();
+    ASSERT_EQ(a.world().stateHash(), b.world().stateHash()) << "first difference after frame " << a.frame();
+  }
+  EXPECT_GT(a.totals().forceMax, 0.05);
+}
+
+TEST(Simulation, PicturesOnTicksShowTheTickAndOthersLieBetween) {
+  const LoadedScene loaded = shortScene(1);
+  Simulation simulation(loaded);
+  for (int frame = 0; frame < 40; ++frame) simulation.advanceFrame();
+  const ServoRecord& record = simulation.record();
+  const double tick = record.duration / double(record.tools.size() - 1);
+  PictureState at, between;
+  stateAt(record, record.start + 5 * tick, at);
+  EXPECT_EQ(at.tools[0].proxy, record.tools[5][0].proxy);
+  stateAt(record, record.start + 5.25 * tick, between);
+  const Eigen::Vector3d expected = 0.75 * record.tools[5][0].proxy + 0.25 * record.tools[6][0].proxy;
+  EXPECT_LT((between.tools[0].proxy - expected).norm(), 1e-9);
+  stateAt(record, record.start, at);
+  EXPECT_EQ(at.frame.bodies[0].nodes[0], record.from.bodies[0].nodes[0]);
+  stateAt(record, record.start + record.duration, at);
+  EXPECT_EQ(at.frame.bodies[0].nodes[0], record.to.bodies[0].nodes[0]);
+}
+
+// Loop's limit weights sum to one and reproduce rigid motion: the drawn surface moves with the body.
+TEST(SceneView, DrawnSurfaceFollowsARigidMotion) {
+  const LoadedScene loaded = shortScene(1);
+  const SoftBodyModel& model = *loaded.models[0];
+  const Eigen::Isometry3d motion =
+      Eigen::Translation3d(0.1, -0.2, 0.3) * Eigen::AngleAxisd(1.2, Eigen::Vector3d(1, 2, 3).normalized());
+  std::vector<Eigen::Vector3d> moved;
+  for (const Eigen::Vector3d& x : model.restNodes) moved.push_back(motion * x);
+  std::vector<glm::vec3> rest, turned;
+  evaluateRenderSurface(model.renderSurface, model.restNodes, rest);
+  evaluateRenderSurface(model.renderSurface, moved, turned);
+  ASSERT_EQ(rest.size(), turned.size());
+  double worst = 0;
+  for (std::size_t k = 0; k < rest.size(); ++k) {
+    const Eigen::Vector3d expected = motion * Eigen::Vector3d(rest[k].x, rest[k].y, rest[k].z);
+    worst = std::max(worst, (expected - Eigen::Vector3d(turned[k].x, turned[k].y, turned[k].z)).norm());
+  }
+  EXPECT_LT(worst, 2e-6);
+}
+
+TEST(SceneView, CameraStandsStillOutsideItsKeysAndPassesThroughThem) {
+  CameraKey a, b;
+  a.position = {0, 0, 1};
+  b.position = {1, 0, 1};
+  b.time = 2;
+  a.fovDegrees = 40;
+  b.fovDegrees = 60;
+  EXPECT_EQ(cameraAt({a, b}, -1).position.x, 0);
+  EXPECT_EQ(cameraAt({a, b}, 5).position.x, 1);
+  EXPECT_NEAR(cameraAt({a, b}, 1).position.x, 0.5, 1e-6);
+  EXPECT_NEAR(cameraAt({a, b}, 1).fovDegrees, 50, 1e-4);
+}
+
+}  // namespace medulla
