@@ -21,6 +21,7 @@ constexpr glm::vec4 kBallColour{0.80f, 0.30f, 0.22f, 0.55f};
 constexpr glm::vec4 kFixedBallColour{0.30f, 0.32f, 0.36f, 0.70f};
 constexpr glm::vec4 kLinkColour{0.95f, 0.75f, 0.20f, 1};
 constexpr glm::vec4 kAttachmentColour{0.25f, 0.55f, 0.80f, 1};
+constexpr glm::vec4 kSkeletonColour{0.10f, 0.11f, 0.13f, 1};
 constexpr glm::vec4 kAxisColours[3] = {{0.85f, 0.15f, 0.12f, 1}, {0.15f, 0.65f, 0.15f, 1}, {0.15f, 0.30f, 0.90f, 1}};
 constexpr glm::vec4 kProxyColour{0.15f, 0.75f, 0.25f, 0.9f};
 constexpr glm::vec4 kDeviceColour{0.95f, 0.20f, 0.85f, 0.9f};
@@ -45,6 +46,27 @@ Eigen::Vector3d anchorOf(const SoftBodyModel& model, const BodyFrame& frame, con
   if (!attachment.onLink) return frame.spheres[attachment.host].position;
   const ElasticLink& link = model.links[attachment.host];
   return blendPoint(frame.spheres[link.sphere0].position, frame.spheres[link.sphere1].position, attachment.along);
+}
+
+// The raw skeleton is not simulated: each of its nodes rides on the sphere nearest to it at rest.
+Eigen::Vector3d carriedBySphere(const SoftBodyModel& model, const BodyFrame& frame, const Eigen::Vector3d& rest) {
+  std::size_t nearest = 0;
+  for (std::size_t i = 1; i < model.spheres.size(); ++i) {
+    const double distance = (model.spheres[i].restFrame - rest).squaredNorm();
+    if (distance < (model.spheres[nearest].restFrame - rest).squaredNorm()) nearest = i;
+  }
+  const SpherePose& pose = frame.spheres[nearest];
+  return pose.position + pose.worldFromSphere * (rest - model.spheres[nearest].restFrame);
+}
+
+void addSkeleton(const SoftBodyModel& model, const BodyFrame& frame, Picture& picture) {
+  std::vector<glm::vec3> nodes;
+  for (const Eigen::Vector3d& rest : model.skeleton.nodes) {
+    nodes.push_back(toGlm(carriedBySphere(model, frame, rest)));
+    picture.balls.push_back({nodes.back(), 0.0010f, kSkeletonColour});
+  }
+  for (const auto& [a, b] : model.skeleton.links)
+    picture.segments.push_back({nodes[a], nodes[b], 0.0004f, kSkeletonColour});
 }
 
 // Spheres with their frames, links and attachments: the paper's figures 2, 10 and 11.
@@ -158,7 +180,9 @@ void SceneView::compose(const PictureState& state, const ViewOptions& options, P
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyFrame& frame = state.frame.bodies[b];
     evaluateRenderSurface(loaded_->models[b]->renderSurface, frame.nodes, picture.surfaces[b].positions);
-    if (options.view != ViewKind::tissue) addModel(scene.bodies[b], *loaded_->models[b], frame, picture);
+    if (options.view == ViewKind::tissue) continue;
+    addModel(scene.bodies[b], *loaded_->models[b], frame, picture);
+    addSkeleton(*loaded_->models[b], frame, picture);
   }
   for (std::size_t k = 0; k < scene.tools.size(); ++k)
     addTool(scene.tools[k], state.inputs[k], state.tools[k], options, picture);
