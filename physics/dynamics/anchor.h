@@ -48,7 +48,12 @@ inline LinkHost linkHost(const WorldData& d, int link) {
 // the line and twisted by along * twist: the torsion is shared along the link.
 inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   Lanes c, s;
-  cosineSine(g.along * h.twist, c, s);
+  const Lanes angle = g.along * h.twist;
+  if (any(isLess(splat(kSmallAngle), magnitude(angle)))) {
+    cosineSine(angle, c, s);
+  } else {
+    smallCosineSine(angle, c, s);
+  }
   Anchor a;
   a.base = fma(g.along, h.line, h.origin);
   a.baseVelocity = fma(g.along, h.lineVelocity, h.originVelocity);

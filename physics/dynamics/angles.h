@@ -68,8 +68,18 @@ inline Lanes angleOf(Lanes cosine, Lanes sine) {
 
 constexpr double kTurn = 6.28318530717958647693;
 
+// Up to this angle (rad) the power series below are good to 1e-16 as they stand.
+constexpr double kSmallAngle = 0.25;
+
+inline void smallCosineSine(Lanes angle, Lanes& cosine, Lanes& sine) {
+  const Lanes q2 = angle * angle;
+  const Lanes r = polynomial(q2, -1.0 / 6, 1.0 / 120, -1.0 / 5040, 1.0 / 362880, -1.0 / 39916800);
+  sine = fma(r, angle * q2, angle);
+  cosine = polynomial(q2, 1.0, -0.5, 1.0 / 24, -1.0 / 720, 1.0 / 40320, -1.0 / 3628800);
+}
+
 // Cosine and sine of any angle: reduced to half a turn either side, the power series on a quarter of it, doubled twice.
-inline void cosineSine(Lanes angle, Lanes& cosine, Lanes& sine) {
+[[gnu::noinline]] inline void cosineSine(Lanes angle, Lanes& cosine, Lanes& sine) {
   const Lanes one = splat(1), two = splat(2);
   const Lanes q = splat(0.25) * fnma(nearest(angle * splat(1 / kTurn)), splat(kTurn), angle);
   const Lanes q2 = q * q;

@@ -142,6 +142,7 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
     n.mass[i] = mechanics[b].nodeMass[k];
     n.inverseMass[i] = n.mass[i] > 0 ? 1 / n.mass[i] : 0;
     NodeGroup& g = n.groups[i / 4];
+    g.mass[lane] = n.mass[i];
     g.stiffness[lane] = mechanics[b].attachmentStiffness[k];
     g.damping[lane] = mechanics[b].surfaceRelaxation * mechanics[b].attachmentStiffness[k];
     if (!a.onLink) {
@@ -155,13 +156,23 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   }
 }
 
+// An order in which neighbours of the list are kStride apart: edges are sorted by their nodes, and springs that follow
+// each other at one node would each wait for the sum that the one before has just stored. Blocks keep to the cache.
+std::vector<std::size_t> interleaved(std::size_t count) {
+  constexpr std::size_t kStride = 8, kBlock = kStride * kStride;
+  std::vector<std::size_t> order;
+  for (std::size_t block = 0; block < count; block += kBlock)
+    for (std::size_t first = block; first < std::min(count, block + kStride); ++first)
+      for (std::size_t i = first; i < std::min(count, block + kBlock); i += kStride) order.push_back(i);
+  return order;
+}
+
 void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   Springs& s = d.springs;
-  std::vector<std::vector<SpringEnd>> ends(d.nodes.dynamicEnd);
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     const SoftBodyModel& m = *d.bodies[b].model;
     if (d.bodies[b].surface != SurfaceMode::full) continue;
-    for (std::size_t e = 0; e < m.edges.size(); ++e) {
+    for (const std::size_t e : interleaved(m.edges.size())) {
       const int k = s.count++, lane = k % 4;
       if (lane == 0) s.groups.emplace_back();
       SpringGroup& g = s.groups.back();
@@ -172,18 +183,10 @@ void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
         g.node0[l] = offset0;
         g.node1[l] = offset1;
         g.restLength[l] = (m.restNodes[m.edges[e][1]] - m.restNodes[m.edges[e][0]]).norm();
-        g.stiffness[l] = mechanics[b].edgeStiffness[e];
-        g.damping[l] = mechanics[b].surfaceRelaxation * mechanics[b].edgeStiffness[e];
+        g.stiffness[l] = l == lane ? mechanics[b].edgeStiffness[e] : 0;
+        g.damping[l] = mechanics[b].surfaceRelaxation * g.stiffness[l];
       }
-      ends[n0].push_back({offset1, static_cast<std::uint32_t>(k)});
-      ends[n1].push_back({offset0, static_cast<std::uint32_t>(k)});
     }
-  }
-  s.tensionOverLength.resize(4 * s.groups.size());
-  s.firstEnd.push_back(0);
-  for (const std::vector<SpringEnd>& of : ends) {
-    s.ends.insert(s.ends.end(), of.begin(), of.end());
-    s.firstEnd.push_back(static_cast<std::uint32_t>(s.ends.size()));
   }
 }
 

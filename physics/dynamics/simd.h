@@ -36,6 +36,10 @@ inline Lanes splat(double a) {
 inline Lanes3 splat(const Quad& q) {
   return {splat(q.v[0]), splat(q.v[1]), splat(q.v[2])};
 }
+template <int lane>
+inline Lanes splatLane(Lanes a) {
+  return _mm256_permute4x64_pd(a, lane * 0x55);
+}
 inline Lanes3 splatLane(const Lanes3& a, int lane) {
   return {splat(a.x[lane]), splat(a.y[lane]), splat(a.z[lane])};
 }

@@ -6,13 +6,12 @@
 // substep's beginning; velocities follow, then loads from tools, then positions (semi-implicit Euler).
 namespace medulla {
 
-void evaluateLinks(WorldData&);           // link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
-void evaluateSpringTensions(WorldData&);  // surface.cpp: edge springs, one number each
-void sumNodeForces(WorldData&);           // weight and edge springs of every node
-void evaluateAttachments(WorldData&);     // pulls between nodes and hosts; sums of them per host
-void returnLinkForces(WorldData&);        // link_force.cpp: links and what hangs on them, to their two spheres
-void sumSphereForces(WorldData&);         // spheres.cpp
-void stepVelocities(WorldData&);          // spheres and nodes
+void evaluateLinks(WorldData&);        // link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
+void evaluateAttachments(WorldData&);  // surface.cpp: weight and host's pull of every node; pulls' sums per host
+void addEdgeSprings(WorldData&);       // to the nodes' forces
+void returnLinkForces(WorldData&);     // link_force.cpp: links and what hangs on them, to their two spheres
+void sumSphereForces(WorldData&);      // spheres.cpp
+void stepVelocities(WorldData&);       // spheres and nodes
 // loads.cpp: tool springs and held nodes, implicitly against the velocities of this substep, so that their stiffness
 // does not bound the step. `remaining` is the time (s) from the substep's end to the frame's. Adds N s to
 // `toolImpulse`.
@@ -22,9 +21,8 @@ void stepPositions(WorldData&);
 // All forces of the current state, left in Spheres::force, torque and Nodes::force.
 inline void evaluateForces(WorldData& d) {
   evaluateLinks(d);
-  evaluateSpringTensions(d);
-  sumNodeForces(d);
   evaluateAttachments(d);
+  addEdgeSprings(d);
   returnLinkForces(d);
   sumSphereForces(d);
 }

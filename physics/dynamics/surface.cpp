@@ -8,8 +8,11 @@ namespace medulla {
 
 namespace {
 
-const Quad& at(const std::vector<Quad>& nodes, std::uint32_t byteOffset) {
-  return *reinterpret_cast<const Quad*>(reinterpret_cast<const char*>(nodes.data()) + byteOffset);
+const Quad& at(const Quad* quads, std::uint32_t byteOffset) {
+  return *reinterpret_cast<const Quad*>(reinterpret_cast<const char*>(quads) + byteOffset);
+}
+Quad& at(Quad* quads, std::uint32_t byteOffset) {
+  return *reinterpret_cast<Quad*>(reinterpret_cast<char*>(quads) + byteOffset);
 }
 
 constexpr double kSmallestSquaredLength = 1e-30;  // m2; a spring whose ends coincide has no direction and pulls nowhere
@@ -31,31 +34,27 @@ struct Pull {
   Lanes3 force, moment;  // N on the nodes, N m about the anchors' bases
 };
 
-// Pull of the anchors on the four nodes of group g; adds it to their force. The spring pulls along the stretch, so that
-// its moment is the same whether it acts on the host at the anchor or at the node. The damper does not: it acts between
-// the node and the point of the carrying frame where the node *is*, or the pair would exert a couple on a free body.
-Pull pullNodes(Nodes& n, const NodeGroup& group, const Anchor& anchor, int g) {
+// Pull of the anchors on the four nodes of group g; with their weight it begins the sum of their forces. The spring
+// pulls along the stretch, so that its moment is the same whether it acts on the host at the anchor or at the node. The
+// damper does not: it acts between the node and the point of the carrying frame where the node *is*, or the pair would
+// exert a couple on a free body.
+Pull pullNodes(Nodes& n, const Lanes3& gravity, const NodeGroup& group, const Anchor& anchor, int g) {
   const Lanes3 lever = gatherNodes(n.position, 4 * g) - anchor.base;
   const Lanes3 rate = velocityAt(anchor, lever) - gatherNodes(n.velocity, 4 * g);
   const Lanes3 pull = fma(group.stiffness, anchor.offset - lever, group.damping * rate);
-  Lanes a = pull.x, b = pull.y, c = pull.z, d = splat(0);
-  transpose(a, b, c, d);
-  Quad* f = &n.force[4 * g];
-  store(f[0], load(f[0]) + a);
-  store(f[1], load(f[1]) + b);
-  store(f[2], load(f[2]) + c);
-  store(f[3], load(f[3]) + d);
+  storeNodes(fma(group.mass, gravity, pull), n.force, 4 * g);
   return {pull, cross(lever, pull)};
 }
 
 void evaluateOnLink(WorldData& d, const HostRange& range) {
   const LinkHost host = linkHost(d, range.host);
+  const Lanes3 gravity = splat(d.gravity);
   const Lanes zero = splat(0);
   Lanes3 sum{zero, zero, zero}, along = sum, moment = sum;
   Lanes twist = zero;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
-    const Pull pull = pullNodes(d.nodes, group, anchorOnLink(host, group), g);
+    const Pull pull = pullNodes(d.nodes, gravity, group, anchorOnLink(host, group), g);
     sum = sum + pull.force;
     along = fma(group.along, pull.force, along);
     moment = moment + pull.moment;
@@ -78,11 +77,12 @@ void evaluateOnLink(WorldData& d, const HostRange& range) {
 
 void evaluateOnSphere(WorldData& d, const HostRange& range) {
   const SphereHost host = sphereHost(d, range.host);
+  const Lanes3 gravity = splat(d.gravity);
   const Lanes zero = splat(0);
   Lanes3 sum{zero, zero, zero}, moment = sum;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
-    const Pull pull = pullNodes(d.nodes, group, anchorOnSphere(host, group), g);
+    const Pull pull = pullNodes(d.nodes, gravity, group, anchorOnSphere(host, group), g);
     sum = sum + pull.force;
     moment = moment + pull.moment;
   }
@@ -92,9 +92,22 @@ void evaluateOnSphere(WorldData& d, const HostRange& range) {
 
 }  // namespace
 
-void evaluateSpringTensions(WorldData& d) {
-  const std::vector<Quad>&x = d.nodes.position, &v = d.nodes.velocity;
-  double* tension = d.springs.tensionOverLength.data();
+void evaluateAttachments(WorldData& d) {
+  const Lanes zero = splat(0);
+  for (std::size_t i = 0; i < d.spheres.force.size(); ++i) {
+    store(d.spheres.force[i], zero);
+    store(d.spheres.torque[i], zero);
+  }
+  for (const HostRange& range : d.nodes.onLinks) evaluateOnLink(d, range);
+  for (const HostRange& range : d.nodes.onSpheres) evaluateOnSphere(d, range);
+}
+
+// One pass over the springs, each added to its two nodes while its direction is in registers. Rejected: one number per
+// spring first and a sum per node after, which reads every position again and costs half as many instructions more.
+void addEdgeSprings(WorldData& d) {
+  const Quad* x = d.nodes.position.data();
+  const Quad* v = d.nodes.velocity.data();
+  Quad* force = d.nodes.force.data();
   for (const SpringGroup& s : d.springs.groups) {
     Lanes line[4], rate[4];
     for (int k = 0; k < 4; ++k) {
@@ -105,42 +118,18 @@ void evaluateSpringTensions(WorldData& d) {
                                  splat(kSmallestSquaredLength));
     const Lanes lengthRate = dotOfFour(rate[0], rate[1], rate[2], rate[3]);  // times length
     const Lanes length = squareRoot(squared);
-    const Lanes force = fma(s.stiffness * (length - s.restLength), length, s.damping * lengthRate);  // times length
-    _mm256_storeu_pd(tension, force / squared);
-    tension += 4;
+    const Lanes pull = fma(s.stiffness * (length - s.restLength), length, s.damping * lengthRate);  // times length
+    const Lanes tension = pull / squared;                                                           // over length
+    const auto apply = [&](int k, Lanes tensionOfOne) {
+      Quad &end0 = at(force, s.node0[k]), &end1 = at(force, s.node1[k]);
+      store(end0, fma(tensionOfOne, line[k], load(end0)));
+      store(end1, fnma(tensionOfOne, line[k], load(end1)));
+    };
+    apply(0, splatLane<0>(tension));
+    apply(1, splatLane<1>(tension));
+    apply(2, splatLane<2>(tension));
+    apply(3, splatLane<3>(tension));
   }
-}
-
-void sumNodeForces(WorldData& d) {
-  const Lanes gravity = load(d.gravity);
-  // Plain pointers: through the vectors every store could change every address.
-  const std::vector<Quad>& x = d.nodes.position;
-  const char* positions = reinterpret_cast<const char*>(x.data());
-  Quad* force = d.nodes.force.data();
-  const double* mass = d.nodes.mass.data();
-  const double* tension = d.springs.tensionOverLength.data();
-  const SpringEnd* end = d.springs.ends.data();
-  const std::uint32_t* firstEnd = d.springs.firstEnd.data();
-  const int count = d.nodes.dynamicEnd;
-  for (int i = 0; i < count; ++i) {
-    const Lanes here = load(*reinterpret_cast<const Quad*>(positions + i * sizeof(Quad)));
-    Lanes sum = splat(mass[i]) * gravity;
-    for (std::uint32_t k = firstEnd[i]; k < firstEnd[i + 1]; ++k) {
-      const Lanes there = load(*reinterpret_cast<const Quad*>(positions + end[k].other));
-      sum = fma(splat(tension[end[k].spring]), there - here, sum);
-    }
-    store(force[i], sum);
-  }
-}
-
-void evaluateAttachments(WorldData& d) {
-  const Lanes zero = splat(0);
-  for (std::size_t i = 0; i < d.spheres.force.size(); ++i) {
-    store(d.spheres.force[i], zero);
-    store(d.spheres.torque[i], zero);
-  }
-  for (const HostRange& range : d.nodes.onLinks) evaluateOnLink(d, range);
-  for (const HostRange& range : d.nodes.onSpheres) evaluateOnSphere(d, range);
 }
 
 void placeSkin(WorldData& d) {
@@ -163,7 +152,7 @@ double surfaceEnergy(const WorldData& d) {
   for (int k = 0; k < d.springs.count; ++k) {
     const SpringGroup& s = d.springs.groups[k / 4];
     const Eigen::Vector3d line =
-        vectorOf(at(d.nodes.position, s.node1[k % 4])) - vectorOf(at(d.nodes.position, s.node0[k % 4]));
+        vectorOf(at(d.nodes.position.data(), s.node1[k % 4])) - vectorOf(at(d.nodes.position.data(), s.node0[k % 4]));
     const double stretch = line.norm() - s.restLength[k % 4];
     sum += 0.5 * s.stiffness[k % 4] * stretch * stretch;
   }

@@ -38,9 +38,8 @@ void checkLoads(const WorldData& d, const Loads& loads) {
 
 void step(WorldData& d, const Loads& loads, double remaining, FrameReport& report) {
   evaluateLinks(d);
-  evaluateSpringTensions(d);
-  sumNodeForces(d);
   evaluateAttachments(d);
+  addEdgeSprings(d);
   returnLinkForces(d);
   sumSphereForces(d);
   stepVelocities(d);

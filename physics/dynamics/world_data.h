@@ -72,6 +72,7 @@ struct NodeGroup {           // constants of four nodes
   Lanes along;               // 0..1 on a link
   Lanes3 restOffset;         // m; on a link (0, component on U, component on V), on a sphere in its frame
   Lanes stiffness, damping;  // N/m, N s/m of the attachment; 0 on pads
+  Lanes mass;                // kg; 0 on pads and on skin
 };
 
 struct HostRange {
@@ -96,24 +97,16 @@ struct Nodes {
   int dynamicEnd = 0;                                 // nodes [0, dynamicEnd) are dynamic
 };
 
-// ---- Edge springs between dynamic nodes: two passes, tension per spring, then the sum per node.
+// ---- Edge springs between dynamic nodes; the last group is filled up with copies that have no stiffness.
 
 struct SpringGroup {
   std::uint32_t node0[4], node1[4];      // byte offsets into Nodes::position
   Lanes restLength, stiffness, damping;  // m, N/m, N s/m
 };
 
-struct SpringEnd {
-  std::uint32_t other;   // byte offset of the node at the other end
-  std::uint32_t spring;  // index
-};
-
 struct Springs {
   int count = 0;
   std::vector<SpringGroup> groups;
-  std::vector<double> tensionOverLength;  // N/m, of the current substep
-  std::vector<std::uint32_t> firstEnd;    // per dynamic node
-  std::vector<SpringEnd> ends;
 };
 
 // ---- A body's share of the arrays.

@@ -38,9 +38,8 @@ static void runStage(benchmark::State& state, void (*stage)(WorldData&)) {
   for ([[maybe_unused]] auto _ : state) stage(world.data());
 }
 BENCHMARK_CAPTURE(runStage, links, evaluateLinks);
-BENCHMARK_CAPTURE(runStage, tensions, evaluateSpringTensions);
-BENCHMARK_CAPTURE(runStage, nodeSums, sumNodeForces);
 BENCHMARK_CAPTURE(runStage, attachments, evaluateAttachments);
+BENCHMARK_CAPTURE(runStage, edgeSprings, addEdgeSprings);
 BENCHMARK_CAPTURE(runStage, returned, returnLinkForces);
 BENCHMARK_CAPTURE(runStage, sphereSums, sumSphereForces);
 BENCHMARK_CAPTURE(runStage, velocities, stepVelocities);
