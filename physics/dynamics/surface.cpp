@@ -30,20 +30,17 @@ void storeNodes(const Lanes3& v, std::vector<Quad>& q, int i) {
   store(q[i + 3], d);
 }
 
-struct Pull {
-  Lanes3 force, moment;  // N on the nodes, N m about the anchors' bases
-};
-
 // Pull of the anchors on the four nodes of group g; with their weight it begins the sum of their forces. The spring
 // pulls along the stretch, so that its moment is the same whether it acts on the host at the anchor or at the node. The
 // damper does not: it acts between the node and the point of the carrying frame where the node *is*, or the pair would
 // exert a couple on a free body.
-Pull pullNodes(Nodes& n, const Lanes3& gravity, const NodeGroup& group, const Anchor& anchor, int g) {
+MEDULLA_INLINE void pullNodes(Nodes& n, const Lanes3& gravity, const NodeGroup& group, const Anchor& anchor, int g,
+                              Lanes3& force, Lanes3& moment) {
   const Lanes3 lever = gatherNodes(n.position, 4 * g) - anchor.base;
   const Lanes3 rate = velocityAt(anchor, lever) - gatherNodes(n.velocity, 4 * g);
-  const Lanes3 pull = fma(group.stiffness, anchor.offset - lever, group.damping * rate);
-  storeNodes(fma(group.mass, gravity, pull), n.force, 4 * g);
-  return {pull, cross(lever, pull)};
+  force = fma(group.stiffness, anchor.offset - lever, group.damping * rate);
+  storeNodes(fma(group.mass, gravity, force), n.force, 4 * g);
+  moment = cross(lever, force);
 }
 
 void evaluateOnLink(WorldData& d, const HostRange& range) {
@@ -54,11 +51,12 @@ void evaluateOnLink(WorldData& d, const HostRange& range) {
   Lanes twist = zero;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
-    const Pull pull = pullNodes(d.nodes, gravity, group, anchorOnLink(host, group), g);
-    sum = sum + pull.force;
-    along = fma(group.along, pull.force, along);
-    moment = moment + pull.moment;
-    twist = fma(group.along, dot(host.n, pull.moment), twist);
+    Lanes3 pull, turn;
+    pullNodes(d.nodes, gravity, group, anchorOnLink(host, group), g, pull, turn);
+    sum = sum + pull;
+    along = fma(group.along, pull, along);
+    moment = moment + turn;
+    twist = fma(group.along, dot(host.n, turn), twist);
   }
   LinkFrame& f = d.links.frames[range.host / 4];
   const int lane = range.host % 4;
@@ -82,9 +80,10 @@ void evaluateOnSphere(WorldData& d, const HostRange& range) {
   Lanes3 sum{zero, zero, zero}, moment = sum;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
-    const Pull pull = pullNodes(d.nodes, gravity, group, anchorOnSphere(host, group), g);
-    sum = sum + pull.force;
-    moment = moment + pull.moment;
+    Lanes3 pull, turn;
+    pullNodes(d.nodes, gravity, group, anchorOnSphere(host, group), g, pull, turn);
+    sum = sum + pull;
+    moment = moment + turn;
   }
   store(d.spheres.force[range.host], zero - sumOfLanes(sum, zero));
   store(d.spheres.torque[range.host], zero - sumOfLanes(moment, zero));
