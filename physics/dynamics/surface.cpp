@@ -109,9 +109,12 @@ void addEdgeSprings(WorldData& d) {
   Quad* force = d.nodes.force.data();
   for (const SpringGroup& s : d.springs.groups) {
     Lanes line[4], rate[4];
+    std::uint32_t node0[4], node1[4];  // copies: the stores below could change the group's for all the compiler knows
     for (int k = 0; k < 4; ++k) {
-      line[k] = load(at(x, s.node1[k])) - load(at(x, s.node0[k]));
-      rate[k] = (load(at(v, s.node1[k])) - load(at(v, s.node0[k]))) * line[k];
+      node0[k] = s.node0[k];
+      node1[k] = s.node1[k];
+      line[k] = load(at(x, node1[k])) - load(at(x, node0[k]));
+      rate[k] = (load(at(v, node1[k])) - load(at(v, node0[k]))) * line[k];
     }
     const Lanes squared = larger(dotOfFour(line[0] * line[0], line[1] * line[1], line[2] * line[2], line[3] * line[3]),
                                  splat(kSmallestSquaredLength));
@@ -120,7 +123,7 @@ void addEdgeSprings(WorldData& d) {
     const Lanes pull = fma(s.stiffness * (length - s.restLength), length, s.damping * lengthRate);  // times length
     const Lanes tension = pull / squared;                                                           // over length
     const auto apply = [&](int k, Lanes tensionOfOne) {
-      Quad &end0 = at(force, s.node0[k]), &end1 = at(force, s.node1[k]);
+      Quad &end0 = at(force, node0[k]), &end1 = at(force, node1[k]);
       store(end0, fma(tensionOfOne, line[k], load(end0)));
       store(end1, fnma(tensionOfOne, line[k], load(end1)));
     };
