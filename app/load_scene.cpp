@@ -43,7 +43,9 @@ static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene&
 static void requireLook(const Scene& scene, int line, const std::string& look) {
   const std::vector<std::string> known = lookNames();
   if (std::find(known.begin(), known.end(), look) != known.end()) return;
-  throw inputError(scene.path, line, fmt::format("unknown look \"{}\": expected {}", look, fmt::join(known, ", ")));
+  std::string expected;  // by hand: g++ 12 sees an overflow in fmt::join where there is none
+  for (const std::string& name : known) expected += (expected.empty() ? "" : ", ") + name;
+  throw inputError(scene.path, line, fmt::format("unknown look \"{}\": expected {}", look, expected));
 }
 
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories) {

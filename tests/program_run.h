@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <string>
 #include <vector>
@@ -21,8 +22,8 @@ struct ProgramResult {
 
 struct ProgramOptions {
   std::string folder = ".";
-  double interruptAfter = 0;  // s; > 0: SIGINT is sent then
-  std::string path;           // PATH of the child; empty: inherited
+  std::function<bool()> interruptWhen;  // asked every 10 ms; SIGINT is sent once it holds
+  std::string path;                     // PATH of the child; empty: inherited
 };
 
 inline std::string readFile(const std::string& path) {
@@ -45,12 +46,13 @@ inline ProgramResult runProgram(const std::vector<std::string>& arguments, const
     execv(MEDULLA_PROGRAM, argv.data());
     _exit(98);
   }
-  if (options.interruptAfter > 0) {
-    usleep(static_cast<useconds_t>(1e6 * options.interruptAfter));
-    kill(child, SIGINT);
-  }
   int status = 0;
-  waitpid(child, &status, 0);
+  bool ended = false;
+  if (options.interruptWhen) {
+    while (!(ended = waitpid(child, &status, WNOHANG) == child) && !options.interruptWhen()) usleep(10000);
+    if (!ended) kill(child, SIGINT);
+  }
+  if (!ended) waitpid(child, &status, 0);
   ProgramResult result;
   result.exitCode = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   result.out = readFile(folder + "/out");
