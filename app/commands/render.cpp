@@ -70,7 +70,8 @@ int runRender(const RenderOptions& options) {
   LoadedScene loaded = loadRun(options.run);
   applyOverrides(options, loaded.scene);
   const Scene& scene = loaded.scene;
-  const auto [first, last] = frameRange(options, scene);
+  const std::pair<int, int> range = frameRange(options, scene);
+  const int first = range.first, last = range.second;  // the lambda below: clang 14 captures no structured bindings
 
   Simulation simulation(loaded);
   PictureOutputs outputs(options.outputs, scene.width, scene.height, scene.fps);
