@@ -165,17 +165,18 @@ TEST(ProgramRefuses, AStateThatStopsBeingFinite) {
 }
 
 TEST(Program, InterruptLeavesNothingHalfWritten) {
-  const TemporaryFolder folder;
+  const TemporaryFolder folder, pictures;
   folder.write("video.mp4", "earlier");
+  std::size_t unfinished = 0;
   ProgramOptions options;
-  options.interruptWhen = [&] {  // in the middle: the unfinished log has reached the disk
-    for (const std::string& name : folder.contents())
-      if (name.rfind("log.csv.", 0) == 0 && std::filesystem::file_size(folder / name) > 0) return true;
-    return false;
+  options.interruptWhen = [&] {  // in the middle: pictures are being drawn
+    unfinished = folder.contents().size() - 1;
+    return std::filesystem::exists(pictures / "00002.png");
   };
-  const ProgramResult r = runProgram({"render", kScene, "-o", folder / "video.mp4", "--log", folder / "log.csv",
-                                      "--set", "clock.duration=200", "--size", "64x48"},
+  const ProgramResult r = runProgram({"render", kScene, "-o", folder / "video.mp4", "-o", pictures.path(), "--log",
+                                      folder / "log.csv", "--set", "clock.duration=200", "--size", "64x48"},
                                      options);
+  EXPECT_GT(unfinished, 0u);
   EXPECT_EQ(r.exitCode, 130) << r.err;
   EXPECT_EQ(readFile(folder / "video.mp4"), "earlier");
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"video.mp4"});
