@@ -128,7 +128,7 @@ void ModelView::setCamera(const Viewpoint& v) const {
   glUniform3fv(uniform("back"), 1, glm::value_ptr(v.back));
 }
 
-void ModelView::draw(const Viewpoint& view, const std::vector<Ball>& balls, const std::vector<Segment>& segments) {
+void ModelView::draw(const Viewpoint& view, const std::vector<DrawnBall>& balls, const std::vector<Segment>& segments) {
   const auto instanceOf = [](glm::vec3 origin, glm::vec3 x, glm::vec3 y, glm::vec3 z, glm::vec4 colour) {
     return Instance{{{x.x, y.x, z.x, origin.x}, {x.y, y.y, z.y, origin.y}, {x.z, y.z, z.z, origin.z}}, colour};
   };
@@ -139,7 +139,7 @@ void ModelView::draw(const Viewpoint& view, const std::vector<Ball>& balls, cons
     Instance instance;
   };
   std::vector<SeenThrough> seenThrough;
-  for (const Ball& ball : balls) {
+  for (const DrawnBall& ball : balls) {
     const float depth = pictureFromWorld(view, ball.centre).z;
     const float size = 0.5f * ball.radius / (std::max(depth, kNearPlane) * view.tangent);
     const std::size_t level = std::size_t(size > kFinerAbove[0]) + std::size_t(size > kFinerAbove[1]);

@@ -17,7 +17,7 @@ class ModelView {
   ModelView& operator=(const ModelView&) = delete;
 
   void drawBackdrop() const;
-  void draw(const Viewpoint& viewpoint, const std::vector<Ball>& balls, const std::vector<Segment>& segments);
+  void draw(const Viewpoint& viewpoint, const std::vector<DrawnBall>& balls, const std::vector<Segment>& segments);
 
  private:
   // Rows of the 3x4 matrix that places the unit mesh, and a colour.

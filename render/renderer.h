@@ -49,7 +49,7 @@ struct Instrument {
 };
 
 // Model view, after the paper's figures 2 and 11, and proxy and device.
-struct Ball {
+struct DrawnBall {  // not Ball: the model has one of its own
   glm::vec3 centre{0};
   float radius = 0;
   glm::vec4 colour{1};  // linear RGB, alpha < 1 is seen through
@@ -71,7 +71,7 @@ struct Picture {
   bool endoscopeMask = true;           // round picture with a soft rim
   std::vector<SurfaceState> surfaces;  // index: order of addSurface
   std::vector<Instrument> instruments;
-  std::vector<Ball> balls;
+  std::vector<DrawnBall> balls;
   std::vector<Segment> segments;
 };
 
