@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "app/commands/commands.h"
+#include "app/files/number_text.h"
 #include "app/interrupt.h"
 
 namespace medulla {
@@ -24,11 +25,11 @@ constexpr const char* kExitCodes =
     "Exit codes: 0 done, 1 input or run failed, 2 wrong usage, 3 golden mismatch, 130 interrupted.";
 
 std::optional<std::pair<int, int>> splitPair(const std::string& text, char separator) {
-  int a = 0, b = 0, used = 0;
-  const std::string format = std::string("%d") + separator + "%d%n";
-  if (std::sscanf(text.c_str(), format.c_str(), &a, &b, &used) != 2 || used != static_cast<int>(text.size()))
-    return std::nullopt;
-  return std::make_pair(a, b);
+  const std::size_t at = text.find(separator);
+  if (at == std::string::npos) return std::nullopt;
+  const auto a = parseNumber<int>(text.substr(0, at)), b = parseNumber<int>(text.substr(at + 1));
+  if (!a || !b) return std::nullopt;
+  return std::make_pair(*a, *b);
 }
 
 [[noreturn]] void usageError(const std::string& option, const std::string& value, const std::string& expected) {
@@ -84,9 +85,8 @@ RunOptions runOptions(const RunArguments& a) {
     SurfaceRequest r;
     r.path = request.at(1);
     if (request[0] != "end") {
-      char* rest = nullptr;
-      r.time = std::strtod(request[0].c_str(), &rest);
-      if (rest == request[0].c_str() || *rest) usageError("--surface-at", request[0], "a time in seconds or \"end\"");
+      r.time = parseNumber<double>(request[0]);
+      if (!r.time) usageError("--surface-at", request[0], "a time in seconds or \"end\"");
     }
     options.surfaces.push_back(std::move(r));
   }
@@ -96,9 +96,8 @@ RunOptions runOptions(const RunArguments& a) {
 struct RenderArguments {
   RunArguments run;
   std::vector<std::string> outputs;
-  std::string view = "tissue", size, frames, context = "auto";
+  std::string view = "tissue", size, fps, frames, context = "auto";
   std::vector<std::string> show;
-  double fps = 0;
 };
 
 RenderOptions renderOptions(const RenderArguments& a) {
@@ -118,7 +117,10 @@ RenderOptions renderOptions(const RenderArguments& a) {
     options.frames = splitPair(a.frames, ':');
     if (!options.frames) usageError("--frames", a.frames, "A:B, whole numbers, B excluded");
   }
-  if (a.fps != 0) options.fps = a.fps;
+  if (!a.fps.empty()) {
+    options.fps = parseNumber<double>(a.fps);
+    if (!options.fps || *options.fps < 1 || *options.fps > 240) usageError("--fps", a.fps, "a number from 1 to 240");
+  }
   options.context = a.context;
   return options;
 }
@@ -137,7 +139,7 @@ void addRender(CLI::App& app, RenderArguments& a) {
       ->check(CLI::IsMember({"proxy"}))
       ->allow_extra_args(false);
   c->add_option("--size", a.size, "picture size in pixels (default: the scene's)")->type_name("WxH");
-  c->add_option("--fps", a.fps, "pictures per second (default: the scene's)")->check(CLI::Range(1.0, 240.0));
+  c->add_option("--fps", a.fps, "pictures per second, 1 to 240 (default: the scene's)");
   c->add_option("--frames", a.frames, "only pictures A to B-1, counted from 0")->type_name("A:B");
   c->add_option("--context", a.context, "how to draw off screen")
       ->check(CLI::IsMember({"auto", "osmesa", "egl"}))

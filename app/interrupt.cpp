@@ -1,7 +1,5 @@
 #include "app/interrupt.h"
 
-#include <unistd.h>
-
 #include <csignal>
 #include <initializer_list>
 
@@ -11,8 +9,7 @@ namespace {
 
 volatile std::sig_atomic_t requested = 0;
 
-extern "C" void onSignal(int signal) {
-  if (requested && signal == SIGINT) _exit(130);
+extern "C" void onSignal(int) {
   requested = 1;
 }
 

@@ -9,7 +9,8 @@ struct Interrupted : std::exception {
   const char* what() const noexcept override { return "interrupted"; }
 };
 
-// From now on SIGINT, SIGTERM and SIGHUP only raise a flag. A second SIGINT ends the process at once.
+// From now on SIGINT, SIGTERM and SIGHUP only raise a flag, however often they come: ending at once would leave
+// unfinished files behind. SIGQUIT still ends the process.
 void watchInterrupts();
 bool interruptRequested();
 void checkInterrupt();  // throws Interrupted once a signal came

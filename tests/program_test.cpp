@@ -145,6 +145,39 @@ TEST(ProgramRefuses, OutputsThatCannotBeWritten) {
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"file"});
 }
 
+TEST(ProgramRefuses, OneFileForTwoPurposes) {
+  const TemporaryFolder folder;
+  const std::string csv = folder / "x.csv", video = folder / "v.mp4";
+  expectRefusal(runProgram(command({"replay", kScene, "--log", csv, "--surface-at", "end", csv})), 1, {"x.csv", "two"});
+  expectRefusal(runProgram(command({"render", kScene, "-o", video, "-o", video})), 1, {"v.mp4", "two"});
+  folder.write("scene.xml", readFile(kScene));
+  folder.write("m.obj", readFile(std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj"));
+  expectRefusal(runProgram({"build", folder / "m.obj", "-o", folder / "m.obj"}), 1, {"m.obj", "input"});
+  EXPECT_EQ(folder.contents().size(), 2u);
+}
+
+TEST(ProgramRefuses, NumbersThatAreNone) {
+  expectRefusal(runProgram(command({"render", kScene, "--fps", "nan"})), 2, {"--fps"});
+  expectRefusal(runProgram(command({"render", kScene, "--frames", "0:99999999999"})), 2, {"--frames"});
+  expectRefusal(runProgram({"replay", kScene, "--surface-at", "nan", "/tmp/x.obj"}), 2, {"--surface-at"});
+  expectRefusal(runProgram({"replay", kScene, "--set", "tissue.bile_sac.young=1e20"}), 1, {"substep"});
+}
+
+TEST(Program, PicturesMoveIntoTheirFolderWhenAllAreThere) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "frames");
+  folder.write("frames/00000.png", "earlier");
+  const ProgramResult failed = runProgram({"render", kScene, "-o", folder / "frames", "--size", "64x48", "--set",
+                                           "dynamics.substeps=1", "--set", "tissue.bile_sac.young=1e8"});
+  EXPECT_EQ(failed.exitCode, 1);
+  EXPECT_EQ(readFile(folder / "frames/00000.png"), "earlier");
+  EXPECT_EQ(folder.contents().size(), 1u);
+  const ProgramResult done = runProgram(command({"render", kScene, "-o", folder / "frames", "--size", "64x48"}));
+  EXPECT_EQ(done.exitCode, 0) << done.err;
+  EXPECT_NE(readFile(folder / "frames/00000.png"), "earlier");
+  EXPECT_EQ(folder.contents().size(), 1u);
+}
+
 TEST(ProgramRefuses, VideoWithoutFfmpeg) {
   const TemporaryFolder folder;
   ProgramOptions options;

@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <filesystem>
 
 #include "app/commands/commands.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
+#include "app/files/output_file.h"
 #include "app/files/report_file.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
@@ -29,9 +31,22 @@ static RepairedMesh repaired(const std::string& path, const TriangleMesh& mesh) 
   }
 }
 
+// An organ of 60 m is a mesh in millimetres read as metres.
+static void warnOfSize(const std::string& path, const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& v : mesh.vertices) box.extend(v);
+  const double size = box.diagonal().norm();
+  if (size > 5 || size < 0.005)
+    fmt::print(stderr, "{}: note: the mesh is {:.3g} m across; is --unit right?\n", path, size);
+}
+
 int runBuild(const BuildOptions& options) {
+  requireDistinctFiles({options.output, options.reportPath}, {options.mesh, options.fine});
+  { const OutputFile writableAtAll(options.output); }
+  if (!options.reportPath.empty()) const OutputFile writableAtAll(options.reportPath);
   const double scale = metresPerUnit(options.unit);
   const TriangleMesh input = readMesh(options.mesh, scale);
+  warnOfSize(options.mesh, input);
   const RepairedMesh mesh = repaired(options.mesh, input);
   for (const std::string& note : mesh.notes) fmt::print(stderr, "{}: {}\n", options.mesh, note);
   TriangleMesh fine;

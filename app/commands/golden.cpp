@@ -42,10 +42,13 @@ std::vector<Moment> renderMoments(const std::string& path, const std::string& co
   Renderer renderer({.width = scene.width, .height = scene.height, .context = context});
   renderedWith = renderer.description();
   const SceneView view(loaded, simulation.current(), renderer);
+  if (scene.goldenTimes.empty())
+    throw std::runtime_error(path + ": names no golden moments: expected <output golden=\"...\"/>");
+  const int pictures = static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9));
   std::vector<Moment> moments;
   for (double time : scene.goldenTimes) {
     Moment moment;
-    moment.frame = static_cast<int>(std::lround(time * scene.fps));
+    moment.frame = std::min(static_cast<int>(std::lround(time * scene.fps)), pictures - 1);
     moment.name = fmt::format("{}_{}", fs::path(path).stem().string(), moment.frame);
     moments.push_back(std::move(moment));
   }
@@ -106,6 +109,13 @@ bool passes(const Moment& moment, const std::string& goldenPath, const std::stri
   return fail(fmt::format("{}; see {}/{}_*.png", figures, options.failures, moment.name));
 }
 
+std::string repeatingCommand(const std::string& path, const GoldenOptions& options) {
+  std::string command = "medulla golden " + path;
+  if (!options.images.empty()) command += " --images " + options.images;
+  if (options.context != "auto") command += " --context " + options.context;
+  return command + " --failures " + options.failures;
+}
+
 }  // namespace
 
 int runGolden(const GoldenOptions& options) {
@@ -127,7 +137,7 @@ int runGolden(const GoldenOptions& options) {
         scenePasses = passes(moment, goldenPath, renderedWith, options) && scenePasses;
       }
     }
-    if (!scenePasses) fmt::print(stderr, "repeat with: medulla golden {}\n", path);
+    if (!scenePasses) fmt::print(stderr, "repeat with: {}\n", repeatingCommand(path, options));
     allPass = allPass && scenePasses;
   }
   return allPass ? 0 : 3;

@@ -1,9 +1,10 @@
 #include <fmt/format.h>
-#include <sys/stat.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 
 #include "app/commands/commands.h"
 #include "app/progress.h"
@@ -19,6 +20,41 @@ bool isVideo(const std::string& path) {
   return fs::path(path).extension() == ".mp4";
 }
 
+std::string withoutSlash(std::string path) {
+  while (path.size() > 1 && path.back() == '/') path.pop_back();
+  return path;
+}
+
+// A folder of numbered PNG files. They collect in a folder of their own beside it and move in when all are there: a run
+// that ends early harms no earlier picture.
+class PngFolder {
+ public:
+  explicit PngFolder(const std::string& path)
+      : folder_(path), collecting_(fmt::format("{}.{}.part", withoutSlash(path), getpid())) {
+    std::error_code error;
+    fs::create_directories(folder_, error);
+    if (!error) fs::create_directory(collecting_, error);
+    if (error) throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", path, error.message()));
+  }
+  ~PngFolder() {
+    std::error_code ignored;
+    fs::remove_all(collecting_, ignored);
+    fs::remove(folder_, ignored);  // only if nothing came into it
+  }
+  PngFolder(const PngFolder&) = delete;
+  PngFolder& operator=(const PngFolder&) = delete;
+  void write(int number, const Image& image) const {
+    writePng((collecting_ / fmt::format("{:05d}.png", number)).string(), image);
+  }
+  void finish() const {
+    for (const auto& entry : fs::directory_iterator(collecting_))
+      fs::rename(entry.path(), folder_ / entry.path().filename());
+  }
+
+ private:
+  fs::path folder_, collecting_;
+};
+
 // Where pictures go: any number of videos and folders of numbered PNG files.
 class PictureOutputs {
  public:
@@ -30,23 +66,21 @@ class PictureOutputs {
       }
       if (!fs::path(path).extension().empty() && !fs::is_directory(path))
         throw std::runtime_error(fmt::format("{}: expected FILE.mp4 or a folder for PNG files", path));
-      std::error_code error;
-      fs::create_directories(path, error);
-      if (error) throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", path, error.message()));
-      folders_.push_back(path);
+      folders_.push_back(std::make_unique<PngFolder>(path));
     }
   }
   void write(int number, const Image& image) {
     for (VideoWriter& video : videos_) video.write(image);
-    for (const std::string& folder : folders_) writePng(fmt::format("{}/{:05d}.png", folder, number), image);
+    for (const auto& folder : folders_) folder->write(number, image);
   }
   void finish() {
     for (VideoWriter& video : videos_) video.finish();
+    for (const auto& folder : folders_) folder->finish();
   }
 
  private:
   std::vector<VideoWriter> videos_;
-  std::vector<std::string> folders_;
+  std::vector<std::unique_ptr<PngFolder>> folders_;
 };
 
 void applyOverrides(const RenderOptions& options, Scene& scene) {
@@ -73,6 +107,7 @@ int runRender(const RenderOptions& options) {
   const std::pair<int, int> range = frameRange(options, scene);
   const int first = range.first, last = range.second;  // the lambda below: clang 14 captures no structured bindings
 
+  requireDistinctOutputs(loaded, options.run, options.outputs);
   Simulation simulation(loaded);
   PictureOutputs outputs(options.outputs, scene.width, scene.height, scene.fps);
   Renderer renderer({.width = scene.width, .height = scene.height, .context = options.context});
@@ -85,7 +120,7 @@ int runRender(const RenderOptions& options) {
   Picture picture;
   Image image;
   int next = first;
-  runToEnd(loaded, options.run, simulation, [&] {
+  const auto drawFrame = [&] {
     const double end = simulation.record().start + simulation.record().duration;
     for (; next < last && next / scene.fps <= end + 1e-9; ++next) {
       stateAt(simulation.record(), next / scene.fps, state);
@@ -94,8 +129,8 @@ int runRender(const RenderOptions& options) {
       outputs.write(next, image);
       progress.update(next - first + 1);
     }
-  });
-  outputs.finish();
+  };
+  runToEnd(loaded, options.run, simulation, drawFrame, [&] { outputs.finish(); });
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   for (const std::string& path : options.outputs)
     fmt::print("file {}\n", fs::absolute(path).lexically_normal().string());

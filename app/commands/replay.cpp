@@ -7,6 +7,7 @@ namespace medulla {
 
 int runReplay(const RunOptions& options) {
   const LoadedScene loaded = loadRun(options);
+  requireDistinctOutputs(loaded, options);
   Simulation simulation(loaded);
   Progress progress("replay", loaded.scene.duration, "s");
   const double cpuStart = processCpuSeconds();

@@ -89,7 +89,7 @@ class LogRecorder {
           body.surface == SurfaceMode::full ? static_cast<int>(body.model->restNodes.size()) : 0;
     }
     row_.energies = world.energies();
-    row_.impulseMismatch = simulation.lastImpulseMismatch() / 100;
+    row_.impulseMismatch = simulation.lastImpulseMismatch();
     const int ticks = static_cast<int>(record.tools.size()) - 1;
     for (int tick = everyTick_ ? 1 : ticks; tick <= ticks; ++tick) {
       row_.time = record.start + record.duration * tick / ticks;
@@ -109,8 +109,20 @@ class LogRecorder {
 
 }  // namespace
 
+void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options,
+                            const std::vector<std::string>& pictures) {
+  const Scene& scene = loaded.scene;
+  std::vector<std::string> inputs{options.scene}, outputs = pictures;
+  for (const SceneBody& body : scene.bodies) inputs.push_back(body.modelPath);
+  for (const SceneStatic& item : scene.statics) inputs.push_back(item.meshPath);
+  for (const SceneTool& tool : scene.tools) inputs.push_back(tool.trajectoryPath);
+  outputs.push_back(options.logPath);
+  for (const SurfaceRequest& request : options.surfaces) outputs.push_back(request.path);
+  requireDistinctFiles(outputs, inputs);
+}
+
 void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
-              const std::function<void()>& afterFrame) {
+              const std::function<void()>& afterFrame, const std::function<void()>& finish) {
   SurfaceRecorder surfaces(loaded, options);
   LogRecorder log(loaded, options);
   while (!simulation.finished()) {
@@ -120,6 +132,7 @@ void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& 
     surfaces.afterFrame(simulation);
     afterFrame();
   }
+  if (finish) finish();
   log.commit();
   surfaces.write(simulation);
 }

@@ -31,10 +31,15 @@ double processCpuSeconds();
 
 LoadedScene loadRun(const RunOptions& options);
 
-// Runs the simulation to its end; `afterFrame` is called after every dynamics frame. Log and surfaces appear under
-// their names when the run is through. Throws Interrupted after a signal.
+// Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` after the last, before
+// log and surfaces appear under their names: what fails there leaves those as they were. Throws Interrupted after a
+// signal.
 void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
-              const std::function<void()>& afterFrame);
+              const std::function<void()>& afterFrame, const std::function<void()>& finish = {});
+
+// Every file that the run writes besides `pictures` must differ from the others and from what it reads.
+void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options,
+                            const std::vector<std::string>& pictures = {});
 
 // The results of a run, in the order in which they are shown.
 std::vector<Result> runResults(const Simulation& simulation, double cpuSeconds, double wallSeconds);

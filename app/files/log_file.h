@@ -21,8 +21,7 @@ struct LogRow {
   std::vector<ToolState> tools;  // in the order of the names given to LogFile
   std::vector<LogBody> bodies;   // the same
   Energies energies;
-  double impulseMismatch =
-      0;  // ratio over the last dynamics frame: impulse felt by the hand against that given to bodies
+  double impulseMismatch = 0;  // %, over the last dynamics frame: impulse felt by the hand against that given to bodies
 };
 
 // CSV, a row per dynamics frame or per tick. Columns, in SI units: t, then per tool NAME.device.x, .y, .z,

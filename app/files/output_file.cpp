@@ -1,5 +1,7 @@
 #include "app/files/output_file.h"
 
+#include <stdexcept>
+
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -70,6 +72,21 @@ void OutputFile::commit() {
   if (::close(descriptor) != 0) throw systemError(path_, "cannot be written");
   if (std::rename(temporaryPath_.c_str(), path_.c_str()) != 0) throw systemError(path_, "cannot be written");
   temporaryPath_.clear();
+}
+
+void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
+  const auto place = [](const std::string& path) {
+    std::error_code error;
+    const std::filesystem::path canonical = std::filesystem::weakly_canonical(path, error);
+    return error ? std::filesystem::path(path) : canonical;
+  };
+  for (std::size_t k = 0; k < outputs.size(); ++k) {
+    if (outputs[k].empty()) continue;
+    for (const std::string& input : inputs)
+      if (place(input) == place(outputs[k])) throw std::runtime_error(outputs[k] + ": would be written over an input");
+    for (std::size_t e = 0; e < k; ++e)
+      if (place(outputs[e]) == place(outputs[k])) throw std::runtime_error(outputs[k] + ": named for two outputs");
+  }
 }
 
 }  // namespace medulla

@@ -1,8 +1,13 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace medulla {
+
+// Throws std::runtime_error when a command would write one file twice, or over a file that it reads. Links and "./"
+// are seen through; empty names are skipped.
+void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
 
 // A text file that appears under its name only when whole: it is collected beside the target under a name of its own
 // (TARGET.PID-N.part) and renamed by commit(). Destroyed before that, it leaves nothing and an earlier file stays as it
