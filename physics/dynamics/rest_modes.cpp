@@ -272,8 +272,8 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics) {
     return (std::sqrt(damping * damping + 4 * stiffness) - damping) / stiffness;
   };
   // The surface's own modes are fast and die within a few substeps even below their critical damping; giving them the
-  // body's beta would only cost step. A quarter of critical at the fastest of them costs a fifth of it, a half a third.
-  constexpr double kLargestSurfaceRatio = 0.25;
+  // body's beta would only cost step. An eighth of critical at the fastest of them costs a tenth of it, a half a third.
+  constexpr double kLargestSurfaceRatio = 0.125;
   // The links get the beta that damps the lowest mode as asked, unless the step would shrink by more than this.
   constexpr double kLargestCost = 8;
 
@@ -288,8 +288,16 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics) {
   const double largestDamping = (4 / shortest - shortest * all) / 2;
   const double bound = links > 0 ? (largestDamping - mechanics.surfaceRelaxation * surface) / links : asked;
   mechanics.linkRelaxation = std::min(asked, std::max(0.0, bound));
-  const double damping = rest.largestEigenvalue(mechanics.linkRelaxation, mechanics.surfaceRelaxation);
-  return stableStep(all, damping);
+  // Both matrices are sums of the links' and the surface's, and the modes that are stiffest are not those damped most:
+  // the step is searched for where the largest eigenvalue of h^2 K + 2 h C itself reaches 4.
+  const double linkBeta = mechanics.linkRelaxation, surfaceBeta = mechanics.surfaceRelaxation;
+  double stable = stableStep(all, rest.largestEigenvalue(linkBeta, surfaceBeta)), unstable = stableStep(all, 0);
+  constexpr int kBisections = 8;  // to half a per cent at most
+  for (int i = 0; i < kBisections && unstable < std::numeric_limits<double>::infinity(); ++i) {
+    const double h = 0.5 * (stable + unstable), square = h * h;
+    (rest.largestEigenvalue(square + 2 * h * linkBeta, square + 2 * h * surfaceBeta) < 4 ? stable : unstable) = h;
+  }
+  return stable;
 }
 
 }  // namespace medulla

@@ -123,8 +123,10 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies)
   // Below this a second of simulation takes over an hour: a wrong unit rather than a stiff tissue.
   constexpr double kLeastSubstep = 1e-8;
   if (settings.substeps == 0 && kStepSafety * stable < kLeastSubstep)
-    throw std::runtime_error(fmt::format("the stable substep is {:.3g} s: expected at least {:.0e} s; lower Young's "
-                                         "modulus or raise the density", stable, kLeastSubstep));
+    throw std::runtime_error(
+        fmt::format("the stable substep is {:.3g} s: expected at least {:.0e} s; lower Young's "
+                    "modulus or raise the density",
+                    stable, kLeastSubstep));
   data_->substeps = settings.substeps;
   if (settings.substeps == 0)
     data_->substeps = std::max(1, static_cast<int>(std::ceil(settings.frameDuration / (kStepSafety * stable))));
