@@ -105,7 +105,7 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   instrument.tip = toGlm(state.proxy - tool.settings.radius * (input.worldFromTool * Eigen::Vector3d::UnitZ()));
   instrument.worldFromTool = toGlm(input.worldFromTool);
   // A grip of 0.5 is where the jaws meet tissue and hold it.
-  constexpr double kOpenJaw = 0.38, kClosedJaw = 0.0;  // rad
+  constexpr double kOpenJaw = 0.38, kClosedJaw = 0.03;  // rad
   instrument.jawAngle = float(kClosedJaw + (kOpenJaw - kClosedJaw) * std::max(0.0, 1 - 2 * input.grip));
   instrument.touching = state.inContact || state.holding;
   picture.instruments.push_back(instrument);
