@@ -46,7 +46,8 @@ SoftBodyModel smallModel() {
 template <typename T>
 bool sameBits(const T& a, const T& b) {
   if constexpr (std::is_arithmetic_v<T>) {
-    return std::memcmp(&a, &b, sizeof(T)) == 0;
+    // Bits on purpose: -0 and 0 differ, and so would two NaN that == calls different.
+    return std::memcmp(&a, &b, sizeof(T)) == 0;  // NOLINT(bugprone-suspicious-memory-comparison)
   } else {
     return std::equal(a.data(), a.data() + a.size(), b.data(), b.data() + b.size(),
                       [](const auto& x, const auto& y) { return sameBits(x, y); });

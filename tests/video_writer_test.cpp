@@ -42,7 +42,9 @@ class VideoWriterTest : public testing::Test {
   static std::string outputOf(const std::string& command) {
     std::string text;
     FILE* pipe = popen(command.c_str(), "r");
-    for (char buffer[4096]; const std::size_t n = fread(buffer, 1, sizeof buffer, pipe);) text.append(buffer, n);
+    char buffer[4096];
+    std::size_t n = 0;
+    while ((n = fread(buffer, 1, sizeof buffer, pipe)) > 0) text.append(buffer, n);
     pclose(pipe);
     return text;
   }
