@@ -161,8 +161,9 @@ TEST(Shapes, WallIsSeenFromInside) {
 
 TEST(Shapes, ProgramRepeatsTheCommittedMeshToTheByte) {
   const std::filesystem::path directory = std::filesystem::path(testing::TempDir()) / "medulla_shapes_test";
-  const std::string command =
-      std::string("\"") + MEDULLA_SHAPES + "\" -o \"" + directory.string() + "\" gallbladder > /dev/null";
+  std::string command = "\"" MEDULLA_SHAPES "\" -o \"";
+  command += directory.string();
+  command += "\" gallbladder > /dev/null";
   ASSERT_EQ(std::system(command.c_str()), 0);
   const auto bytes = [](const std::filesystem::path& path) {
     std::ifstream file(path, std::ios::binary);

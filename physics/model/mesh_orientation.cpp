@@ -135,8 +135,10 @@ void orientBodyAndCavities(MeshUnderRepair& repair) {
     }
     if ((c.volume < 0) == cavity) continue;
     for (const int t : c.triangles) turn(repair.mesh.triangles[t]);
-    repair.notes.push_back(cavity ? "turned the cavity's surface to face into the cavity"
-                                  : "turned the surface inside out: it faced inward");
+    if (cavity)
+      repair.notes.emplace_back("turned the cavity's surface to face into the cavity");
+    else
+      repair.notes.emplace_back("turned the surface inside out: it faced inward");
   }
 }
 
