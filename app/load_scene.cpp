@@ -34,6 +34,11 @@ static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene&
         throw inputError(scene.path, body.line,
                          fmt::format("body \"{}\" fixes sphere {}, its model has spheres 0 to {}", body.name,
                                      fixed.sphere, spheres - 1));
+    for (const DrivenSphere& driven : body.driven)
+      if (driven.sphere >= spheres)
+        throw inputError(scene.path, body.line,
+                         fmt::format("body \"{}\" drives sphere {}, its model has spheres 0 to {}", body.name,
+                                     driven.sphere, spheres - 1));
     models.push_back(std::move(model));
   }
   return models;

@@ -19,6 +19,7 @@ struct SceneBody {
   Tissue tissue;
   LinkFactors factors;
   std::vector<FixedSphere> fixed;
+  std::vector<DrivenSphere> driven;
   Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
 };
 
@@ -48,6 +49,7 @@ struct Scene {
   double servoRate = 1200, dynamicsRate = 50;  // Hz, up to 20000 and 20 to 1200; the first a multiple of the second
   double duration = 1;                         // s, > 0, <= 86400
   Eigen::Vector3d gravity{0, -9.81, 0};        // m/s2
+  double ambientDrag = 0;                      // 1/s, >= 0
   int substeps = 0;                            // per dynamics frame; 0: as many as the stability estimate asks for
   std::vector<SceneBody> bodies;
   std::vector<SceneStatic> statics;

@@ -10,13 +10,14 @@ static World makeWorld(const LoadedScene& loaded) {
   const Scene& scene = loaded.scene;
   WorldSettings settings;
   settings.gravity = scene.gravity;
+  settings.ambientDrag = scene.ambientDrag;
   settings.frameDuration = 1 / scene.dynamicsRate;
   settings.substeps = scene.substeps;
   std::vector<BodyDescription> bodies;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const SceneBody& body = scene.bodies[b];
-    bodies.push_back(
-        {body.name, loaded.models[b], body.tissue, body.factors, body.surface, body.worldFromModel, body.fixed});
+    bodies.push_back({body.name, loaded.models[b], body.tissue, body.factors, body.surface, body.worldFromModel,
+                      body.fixed, body.driven});
   }
   return World(settings, std::move(bodies));
 }

@@ -21,7 +21,7 @@ const char* completeScene = R"(<?xml version="1.0"?>
 <?xml-model href="scene.xsd"?>
 <scene name="complete">
   <clock servo="1000" dynamics="40" duration="12"/>
-  <dynamics integrator="explicit" order="1" gravity="0 0 -9.5" substeps="16"/>
+  <dynamics integrator="explicit" order="1" gravity="0 0 -9.5" ambient_drag="0.3" substeps="16"/>
   <!-- tissues -->
   <tissue name="bile_sac" young="6e3" poisson="0.4" density="1030" damping="0.2"/>
   <tissue name="liver"/>
@@ -29,7 +29,7 @@ const char* completeScene = R"(<?xml version="1.0"?>
         position="0.1 0.2 0.3"
         orientation="0.707 0 0.707 0" links="springs" surface="skin">
     <fix spheres="0 1" dof="translation"/>
-    <fix spheres="4" dof="all"/>
+    <fix spheres="4" dof="all"/> <drive sphere="2" axis="0 1 1" amplitude="0.1" frequency="2" phase="0.5" velocity="1 0 0"/>
     <links select="all" elongation="2" flexion="3" torsion="0.5"/>
   </body>
   <body name="second" model="second.model.xml" tissue="liver" look="liver"/>
@@ -81,6 +81,7 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(s.dynamicsRate, 40);
   EXPECT_EQ(s.duration, 12);
   EXPECT_EQ(s.gravity, Eigen::Vector3d(0, 0, -9.5));
+  EXPECT_EQ(s.ambientDrag, 0.3);
   EXPECT_EQ(s.substeps, 16);
   ASSERT_EQ(s.bodies.size(), 2u);
   const SceneBody& body = s.bodies[0];
@@ -104,6 +105,13 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(body.fixed[1].freedom, FixedFreedom::translation);
   EXPECT_EQ(body.fixed[2].sphere, 4);
   EXPECT_EQ(body.fixed[2].freedom, FixedFreedom::all);
+  ASSERT_EQ(body.driven.size(), 1u);
+  EXPECT_EQ(body.driven[0].sphere, 2);
+  EXPECT_EQ(body.driven[0].axis, Eigen::Vector3d(0, 1, 1));
+  EXPECT_EQ(body.driven[0].amplitude, 0.1);
+  EXPECT_EQ(body.driven[0].frequency, 2);
+  EXPECT_EQ(body.driven[0].phase, 0.5);
+  EXPECT_EQ(body.driven[0].velocity, Eigen::Vector3d(1, 0, 0));
   EXPECT_EQ(s.bodies[1].tissue.young, Tissue().young);
   EXPECT_EQ(s.bodies[1].modelPath, folder + "/second.model.xml");
 }
@@ -218,6 +226,11 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
        R"(x.xml:11: <body> orientation="0.7 0 0.7 0": expected a unit quaternion w x y z (length within 1e-3 of 1))"},
       {"\"springs\"", "\"beam\"", R"(x.xml:11: <body> links="beam": unknown value; known: "springs")"},
       {"\"skin\"", "\"contact\"", R"(x.xml:11: <body> surface="contact": unknown value; known: "full", "skin")"},
+      {"sphere=\"2\"", "sphere=\"4\"", R"(x.xml:13: <drive> sphere="4": this sphere is fixed)"},
+      {"axis=\"0 1 1\"", "axis=\"0 0 0\"", R"(x.xml:13: <drive> axis="0 0 0": expected a direction)"},
+      {"frequency=\"2\"", "frequency=\"0\"", R"(x.xml:13: <drive> frequency="0": expected 1 number > 0)"},
+      {"ambient_drag=\"0.3\"", "ambient_drag=\"-1\"",
+       R"(x.xml:5: <dynamics> ambient_drag="-1": expected 1 number >= 0)"},
       {"\"explicit\"", "\"implicit\"",
        R"(x.xml:5: <dynamics> integrator="implicit": unknown value; known: "explicit")"},
       {"order=\"1\"", "order=\"2\"", R"(x.xml:5: <dynamics> order="2": unknown value; known: "1")"},

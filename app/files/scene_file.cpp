@@ -145,6 +145,7 @@ void readDynamics(const XmlElement& dynamics, Scene& scene) {
   readChoice(dynamics, "integrator", {"explicit"}, 0);
   readChoice(dynamics, "order", {"1"}, 0);
   scene.gravity = readVector(dynamics, "gravity", scene.gravity);
+  scene.ambientDrag = readNumber(dynamics, "ambient_drag", scene.ambientDrag, notNegative);
   scene.substeps = readInteger(dynamics, "substeps", scene.substeps, {0, 100000});
 }
 
@@ -192,6 +193,25 @@ std::vector<FixedSphere> readFixedSpheres(const XmlElement& body) {
   return out;
 }
 
+std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::vector<FixedSphere>& fixed) {
+  std::vector<DrivenSphere> out;
+  for (const XmlElement* drive : childrenOf(body, "drive")) {
+    DrivenSphere d;
+    d.sphere = readInteger(*drive, "sphere", d.sphere, notNegative);
+    const auto isThis = [&](const auto& other) { return other.sphere == d.sphere; };
+    if (std::any_of(fixed.begin(), fixed.end(), isThis)) refuse(*drive, "sphere", "this sphere is fixed");
+    if (std::any_of(out.begin(), out.end(), isThis)) refuse(*drive, "sphere", "this sphere is driven twice");
+    d.axis = readVector(*drive, "axis", d.axis);
+    if (d.axis.isZero()) refuse(*drive, "axis", "expected a direction");
+    d.amplitude = readNumber(*drive, "amplitude", d.amplitude, notNegative);
+    d.frequency = readNumber(*drive, "frequency", d.frequency, positive);
+    d.phase = readNumber(*drive, "phase", d.phase);
+    d.velocity = readVector(*drive, "velocity", d.velocity);
+    out.push_back(d);
+  }
+  return out;
+}
+
 LinkFactors readLinkFactors(const XmlElement& links) {
   LinkFactors out;
   readChoice(links, "select", {"all"}, 0);
@@ -215,6 +235,7 @@ void readBodies(const XmlElement& root, Scene& scene) {
     body.surface = readChoice(*e, "surface", {"full", "skin"}, 0) == 0 ? SurfaceMode::full : SurfaceMode::skin;
     body.worldFromModel = readPlacement(*e);
     body.fixed = readFixedSpheres(*e);
+    body.driven = readDrivenSpheres(*e, body.fixed);
     body.factors = readLinkFactors(onlyChild(*e, "links"));
     scene.bodies.push_back(std::move(body));
   }

@@ -54,6 +54,18 @@ void checkDescription(const BodyDescription& body) {
   for (const FixedSphere& f : body.fixed)
     require(f.sphere >= 0 && f.sphere < spheres,
             fmt::format("it fixes sphere {}: expected 0 to {}", f.sphere, spheres - 1));
+  for (const DrivenSphere& driven : body.driven) {
+    require(driven.sphere >= 0 && driven.sphere < spheres,
+            fmt::format("it drives sphere {}: expected 0 to {}", driven.sphere, spheres - 1));
+    require(std::none_of(body.fixed.begin(), body.fixed.end(),
+                         [&](const FixedSphere& f) { return f.sphere == driven.sphere; }),
+            fmt::format("it both fixes and drives sphere {}", driven.sphere));
+    check(driven.amplitude, driven.amplitude >= 0, "drive's amplitude", "0 m or more");
+    check(driven.frequency, driven.frequency > 0, "drive's frequency", "more than 0 Hz");
+    check(driven.phase, true, "drive's phase", "a finite angle");
+    require(driven.axis.allFinite() && driven.axis.norm() > 0, "its drive's axis has no direction");
+    require(driven.velocity.allFinite(), "its drive's velocity is not finite");
+  }
   for (const ElasticLink& l : m.links)
     require(
         std::min(l.sphere0, l.sphere1) >= 0 && std::max(l.sphere0, l.sphere1) < spheres && l.sphere0 != l.sphere1,
@@ -206,6 +218,7 @@ BodyMechanics bodyMechanics(const BodyDescription& body) {
     out.moves[f.sphere] = false;
     if (f.freedom == FixedFreedom::all) out.turns[f.sphere] = false;
   }
+  for (const DrivenSphere& driven : body.driven) out.moves[driven.sphere] = false;
   out.links = linkStiffness(body);
   out.attachments = perpendicularAttachments(*body.model);
   setSurfaceStiffness(body, out);

@@ -190,6 +190,21 @@ void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   }
 }
 
+void addDrives(WorldData& d, const BodyDescription& body, const BodyRange& r) {
+  for (const DrivenSphere& driven : body.driven) {
+    SphereDrive drive;
+    drive.sphere = r.firstSphere + driven.sphere;
+    drive.rest = d.spheres.position[drive.sphere];
+    drive.velocity = quadOf(driven.velocity);
+    drive.swing = quadOf(driven.amplitude * driven.axis.normalized());
+    drive.frequency = driven.frequency;
+    drive.phase = driven.phase;
+    d.drives.push_back(drive);
+    for (int i = 0; i < r.sphereCount; ++i) d.spheres.velocity[r.firstSphere + i] = drive.velocity;
+    for (int i : r.node) d.nodes.velocity[i] = drive.velocity;
+  }
+}
+
 void listSlots(WorldData& d) {
   std::vector<std::vector<int>> slots(d.spheres.count);
   for (int k = 0; k < d.links.count; ++k) {
@@ -236,6 +251,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
   d.links.slots.resize(8 * d.links.groups.size());
   addNodes(d, mechanics);
   addSprings(d, mechanics);
+  for (std::size_t b = 0; b < d.bodies.size(); ++b) addDrives(d, d.bodies[b], d.ranges[b]);
   listSlots(d);
   refreshAngularVelocities(d);
   evaluateLinks(d);

@@ -12,6 +12,9 @@ void addEdgeSprings(WorldData&);       // to the nodes' forces
 void returnLinkForces(WorldData&);     // link_force.cpp: links and what hangs on them, to their two spheres
 void sumSphereForces(WorldData&);      // spheres.cpp
 void stepVelocities(WorldData&);       // spheres and nodes
+void dragVelocities(WorldData&);       // driven.cpp: the medium's resistance
+// driven.cpp: driven spheres get the velocity that takes them to their path at `time`, the substep's end (s).
+void driveSpheres(WorldData&, double time);
 // loads.cpp: tool springs and held nodes, implicitly against the velocities of this substep, so that their stiffness
 // does not bound the step. `remaining` is the time (s) from the substep's end to the frame's. Adds N s to
 // `toolImpulse`.

@@ -23,6 +23,8 @@ void checkSettings(const WorldSettings& s) {
     throw std::runtime_error(fmt::format("the dynamics frame lasts {} s: expected more than 0", s.frameDuration));
   if (s.substeps < 0) throw std::runtime_error(fmt::format("{} substeps: expected 0 (automatic) or more", s.substeps));
   if (!s.gravity.allFinite()) throw std::runtime_error("gravity is not finite");
+  if (!(s.ambientDrag >= 0) || !std::isfinite(s.ambientDrag))
+    throw std::runtime_error(fmt::format("the ambient drag is {} /s: expected 0 or more", s.ambientDrag));
 }
 
 void checkLoads(const WorldData& d, const Loads& loads) {
@@ -43,6 +45,8 @@ void step(WorldData& d, const Loads& loads, double remaining, FrameReport& repor
   returnLinkForces(d);
   sumSphereForces(d);
   stepVelocities(d);
+  dragVelocities(d);
+  driveSpheres(d, static_cast<double>(d.frame + 1) * d.settings.frameDuration - remaining);
   applyLoads(d, loads, remaining, report.toolImpulse);
   stepPositions(d);
 }

@@ -36,6 +36,18 @@ struct FixedSphere {
   FixedFreedom freedom = FixedFreedom::all;
 };
 
+// A sphere led along a path, whatever pulls at it: rest + velocity t + ramp(t) amplitude sin(2 pi frequency t + phase)
+// along the axis, where the ramp rises smoothly from 0 to 1 over the first period. It still turns freely (paper 6: the
+// dolphin's head). The whole body starts at `velocity`.
+struct DrivenSphere {
+  int sphere = 0;
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitY();     // world; any length but 0
+  double amplitude = 0;                                // m, >= 0
+  double frequency = 1;                                // Hz, > 0
+  double phase = 0;                                    // rad
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s, world
+};
+
 struct BodyDescription {
   std::string name;
   std::shared_ptr<const SoftBodyModel> model;
@@ -44,10 +56,12 @@ struct BodyDescription {
   SurfaceMode surface = SurfaceMode::full;
   Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
   std::vector<FixedSphere> fixed;
+  std::vector<DrivenSphere> driven;
 };
 
 struct WorldSettings {
   Eigen::Vector3d gravity{0, -9.81, 0};  // m/s2
+  double ambientDrag = 0;                // 1/s, >= 0: everything loses this share of its speed; 0 but under water
   double frameDuration = 0.02;           // s, one dynamics frame
   int substeps = 0;                      // per dynamics frame; 0: as many as the stability estimate asks for
 };

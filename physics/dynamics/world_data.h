@@ -118,6 +118,13 @@ struct BodyRange {
   double restVolume = 0;  // m3, enclosed by the rest nodes
 };
 
+// A driven sphere; DrivenSphere with everything in world units.
+struct SphereDrive {
+  int sphere = 0;
+  Quad rest, velocity, swing;  // m, m/s, m: axis times amplitude
+  double frequency = 0, phase = 0;
+};
+
 struct WorldData {
   WorldSettings settings;
   std::vector<BodyDescription> bodies;
@@ -127,6 +134,7 @@ struct WorldData {
   Links links;
   Nodes nodes;
   Springs springs;
+  std::vector<SphereDrive> drives;
 
   // Force of each tool load in the current substep, tool springs first, then held nodes; sized once per frame.
   std::vector<Eigen::Vector3d> loadForces;

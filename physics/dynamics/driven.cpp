@@ -1,0 +1,44 @@
+#include "physics/dynamics/angles.h"
+#include "physics/dynamics/stages.h"
+
+// Motion that does not come from within: spheres led along a path, and the resistance of the medium around.
+namespace medulla {
+
+namespace {
+
+double sineOf(double angle) {
+  Lanes c, s;
+  cosineSine(splat(angle), c, s);
+  return s[0];
+}
+
+Lanes pathAt(const SphereDrive& drive, double time) {
+  const double periods = time * drive.frequency, u = periods < 1 ? periods : 1;
+  const double ramp = u * u * (3 - 2 * u);
+  const double swing = ramp * sineOf(kTurn * periods + drive.phase);
+  return fma(splat(swing), load(drive.swing), fma(splat(time), load(drive.velocity), load(drive.rest)));
+}
+
+}  // namespace
+
+// The path's secant rather than its derivative: the sphere stays on the path whatever the substep.
+void driveSpheres(WorldData& d, double time) {
+  for (const SphereDrive& drive : d.drives)
+    store(d.spheres.velocity[drive.sphere],
+          (pathAt(drive, time) - load(d.spheres.position[drive.sphere])) / splat(d.substep));
+}
+
+// Linear drag per mass, solved implicitly, so that no drag is too much for a step. A driven sphere is dragged too, and
+// then led back to its path.
+void dragVelocities(WorldData& d) {
+  if (d.settings.ambientDrag == 0) return;
+  const Lanes kept = splat(1 / (1 + d.substep * d.settings.ambientDrag));
+  const auto drag = [kept](std::vector<Quad>& velocities, int count) {
+    for (int i = 0; i < count; ++i) store(velocities[i], kept * load(velocities[i]));
+  };
+  drag(d.spheres.velocity, d.spheres.count);
+  drag(d.spheres.angularMomentum, d.spheres.count);
+  drag(d.nodes.velocity, d.nodes.dynamicEnd);
+}
+
+}  // namespace medulla

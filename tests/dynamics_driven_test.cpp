@@ -1,0 +1,99 @@
+#include <cmath>
+#include <numbers>
+
+#include "tests/dynamics_states.h"
+#include "tests/synthetic_model.h"
+
+// Spheres led along a path, and the drag of the medium.
+namespace medulla {
+
+using namespace states;
+
+static BodyDescription tube(SurfaceMode surface) {
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
+  b.surface = surface;
+  return b;
+}
+
+static WorldSettings weightless() {
+  WorldSettings s;
+  s.gravity.setZero();
+  return s;
+}
+
+TEST(DrivenSphere, IsOnItsPathAtEveryFrame) {
+  for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    BodyDescription b = tube(surface);
+    DrivenSphere drive;
+    drive.sphere = 1;
+    drive.axis = {0, 3, 4};
+    drive.amplitude = 0.01;
+    drive.frequency = 2;
+    drive.phase = 0.7;
+    drive.velocity = {0.1, 0, -0.05};
+    b.driven = {drive};
+    World world({}, {b});  // its weight does not draw it off
+    const Vector3d rest = vectorOf(world.data().spheres.position[1]);
+    for (int frame = 1; frame <= 60; ++frame) {
+      world.advance({});
+      const double t = world.time(), u = std::min(1.0, 2 * t), ramp = u * u * (3 - 2 * u);
+      const double swing = 0.01 * ramp * std::sin(2 * std::numbers::pi * 2 * t + 0.7);
+      const Vector3d expected = rest + t * drive.velocity + swing * Vector3d(0, 0.6, 0.8);
+      ASSERT_LT((vectorOf(world.data().spheres.position[1]) - expected).norm(), 1e-13);
+    }
+  }
+}
+
+TEST(DrivenSphere, ASteadyDriveIsFreeMotionOfTheWholeBody) {
+  BodyDescription b = tube(SurfaceMode::full);
+  b.driven = {DrivenSphere{.sphere = 0, .velocity = Vector3d(0.2, 0.1, 0)}};
+  World world(weightless(), {b});
+  const double rest = world.energies().kinetic;
+  for (int frame = 0; frame < 25; ++frame) world.advance({});
+  EXPECT_NEAR(world.energies().kinetic, rest, 1e-9 * rest);
+  EXPECT_LT(world.energies().elastic, 1e-9 * rest);
+}
+
+TEST(DrivenSphere, RefusedWhereItContradictsItself) {
+  const auto message = [](const DrivenSphere& drive) -> std::string {
+    BodyDescription b = tube(SurfaceMode::skin);
+    b.name = "eel";
+    b.fixed = {{0, FixedFreedom::translation}};
+    b.driven = {drive};
+    try {
+      World world({}, {b});
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message({.sphere = 1}), "");
+  EXPECT_EQ(message({.sphere = 0}), "body 'eel' cannot be simulated: it both fixes and drives sphere 0");
+  EXPECT_EQ(message({.sphere = 5}), "body 'eel' cannot be simulated: it drives sphere 5: expected 0 to 4");
+  EXPECT_EQ(message({.sphere = 1, .axis = Vector3d::Zero()}),
+            "body 'eel' cannot be simulated: its drive's axis has no direction");
+  EXPECT_EQ(message({.sphere = 1, .frequency = 0}),
+            "body 'eel' cannot be simulated: its drive's frequency is 0: expected more than 0 Hz");
+}
+
+// v' = -c v by backward Euler is v0 / (1 + h c)^n, for a body at rest within itself exactly.
+TEST(AmbientDrag, SlowsEveryPartAlike) {
+  for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    WorldSettings settings = weightless();
+    settings.ambientDrag = 0.8;
+    settings.substeps = 50;
+    World world(settings, {tube(surface)});
+    WorldData& d = world.data();
+    const Vector3d start(0.3, -0.2, 0.1);
+    for (int i = 0; i < d.spheres.count; ++i) d.spheres.velocity[i] = quadOf(start);
+    for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+      if (d.nodes.mass[i] > 0) d.nodes.velocity[i] = quadOf(start);
+    for (int frame = 0; frame < 10; ++frame) world.advance({});
+    const Vector3d expected = start / std::pow(1 + d.substep * 0.8, 500);
+    for (int i = 0; i < d.spheres.count; ++i)
+      EXPECT_LT((vectorOf(d.spheres.velocity[i]) - expected).norm(), 1e-12) << i;
+    EXPECT_LT(world.energies().elastic, 1e-20);
+  }
+}
+
+}  // namespace medulla
