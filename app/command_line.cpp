@@ -17,7 +17,9 @@ constexpr const char* kIntroduction =
     "pressed, pulled and grabbed by a recorded or scripted haptic trajectory.\n\n"
     "  medulla render scenes/gallbladder.xml -o gallbladder.mp4   draw a scene into a video\n"
     "  medulla replay scenes/gallbladder.xml --log run.csv        run it without pictures\n"
-    "  medulla build organ.obj -o organ.model.xml --spheres 12    make a model of your own mesh\n"
+    "  medulla new organ.obj -o organ                             make a scene around your own mesh\n"
+    "  medulla build organ.obj -o organ.model.xml --spheres 12    make a model of it alone\n"
+    "  medulla check organ/organ.xml                              find mistakes without running\n"
     "  medulla golden                                             compare with the golden images";
 
 constexpr const char* kExitCodes =
@@ -43,7 +45,7 @@ struct RunArguments {
   std::vector<std::vector<std::string>> surfaces;
 };
 
-void addRunOptions(CLI::App& command, RunArguments& a) {
+void addSceneOptions(CLI::App& command, RunArguments& a) {
   command.add_option("SCENE", a.scene, "scene file (XML)")->required();
   command
       .add_option("--set", a.sets, "replace one value of the scene, e.g. body.gallbladder.surface=skin (repeatable)")
@@ -52,6 +54,10 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
   command.add_option("--trajectory", a.trajectories, "read a tool's motion from another file (repeatable)")
       ->type_name("[TOOL=]FILE")
       ->allow_extra_args(false);
+}
+
+void addRunOptions(CLI::App& command, RunArguments& a) {
+  addSceneOptions(command, a);
   command.add_option("--log", a.log, "write a CSV row per dynamics frame: tools, forces, volume, energies")
       ->type_name("FILE");
   command.add_option("--log-rate", a.logRate, "rows of the log: per dynamics frame or per servo tick")
@@ -175,6 +181,20 @@ void addBuild(CLI::App& app, BuildArguments& a) {
   c->add_option("--report", a.options.reportPath, "write the quality report as CSV too")->type_name("FILE.csv");
 }
 
+void addNew(CLI::App& app, NewOptions& o) {
+  CLI::App* c = app.add_subcommand("new", "make a scene, a model and a trajectory around a mesh, ready to render");
+  c->add_option("MESH", o.build.mesh, "closed surface: OBJ, OFF, STL, PLY, ...")->required();
+  c->add_option("-o,--output", o.folder, "folder for NAME.xml, NAME.model.xml and NAME.csv; made where missing")
+      ->type_name("DIR")
+      ->required();
+  c->add_option("--spheres", o.build.settings.spheres, "number of filling spheres")
+      ->check(CLI::Range(1, spheresMax))
+      ->capture_default_str();
+  c->add_option("--unit", o.build.unit, "unit of the mesh file")
+      ->check(CLI::IsMember({"m", "cm", "mm", "inch"}))
+      ->capture_default_str();
+}
+
 void addGolden(CLI::App& app, GoldenOptions& o) {
   CLI::App* c = app.add_subcommand("golden", "render the scenes' golden moments and compare with the stored images");
   c->add_option("SCENE", o.scenes, "scene files (default: scenes/*.xml)");
@@ -195,21 +215,26 @@ int dispatch(int argc, char** argv) {
   bool version = false;
   app.add_flag("--version", version, "version, and those of Mesa, Embree and the compiler");
   RenderArguments render;
-  RunArguments replay;
+  RunArguments replay, check;
   BuildArguments build;
+  NewOptions starter;
   GoldenOptions golden;
   addRender(app, render);
   CLI::App* replayCommand =
       app.add_subcommand("replay", "run a scene without pictures, as fast as it goes, and print its results");
   addRunOptions(*replayCommand, replay);
+  CLI::App* checkCommand = app.add_subcommand("check", "say whether a scene and all that it names can run");
+  addSceneOptions(*checkCommand, check);
   addBuild(app, build);
+  addNew(app, starter);
   addGolden(app, golden);
   RenderOptions renderRun;
-  RunOptions replayRun;
+  RunOptions replayRun, checkRun;
   try {
     app.parse(argc, argv);
     if (app.got_subcommand("render")) renderRun = renderOptions(render);
     if (app.got_subcommand("replay")) replayRun = runOptions(replay);
+    if (app.got_subcommand("check")) checkRun = runOptions(check);
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
@@ -219,6 +244,8 @@ int dispatch(int argc, char** argv) {
   if (version) return printVersion();
   if (app.got_subcommand("render")) return runRender(renderRun);
   if (app.got_subcommand("replay")) return runReplay(replayRun);
+  if (app.got_subcommand("check")) return runCheck(checkRun);
+  if (app.got_subcommand("new")) return runNew(starter);
   if (app.got_subcommand("golden")) return runGolden(golden);
   if (app.got_subcommand("build")) {
     build.options.settings.method = build.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;

@@ -17,6 +17,14 @@ struct BuildOptions {
 };
 int runBuild(const BuildOptions& options);
 
+struct NewOptions {
+  BuildOptions build;  // its output is chosen here
+  std::string folder;
+};
+int runNew(const NewOptions& options);
+
+int runCheck(const RunOptions& options);
+
 int runReplay(const RunOptions& options);
 
 struct RenderOptions {

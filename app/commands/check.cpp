@@ -1,0 +1,15 @@
+#include <fmt/format.h>
+
+#include "app/commands/commands.h"
+
+namespace medulla {
+
+// Everything that a run does before its first step: reading, looking up, laying out.
+int runCheck(const RunOptions& options) {
+  const LoadedScene loaded = loadRun(options);
+  const Simulation simulation(loaded);
+  fmt::print("valid yes\n");
+  return 0;
+}
+
+}  // namespace medulla

@@ -1,0 +1,168 @@
+#include "app/starter_scene.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace medulla {
+
+namespace {
+
+using Eigen::Vector3d;
+
+// Where things are on the body; everything else follows from these and from its size.
+struct Layout {
+  Eigen::AlignedBox3d box;
+  double size = 0;  // m, the box's diagonal
+  int axis = 0;     // of the box's longest side
+  double held = 0;  // -1 or 1: which end along the axis
+  Vector3d touch = Vector3d::Zero(), normal = Vector3d::UnitZ();
+};
+
+std::vector<Vector3d> nodeNormals(const SoftBodyModel& m) {
+  std::vector<Vector3d> normals(m.restNodes.size(), Vector3d::Zero());
+  for (const auto& t : m.triangles) {
+    const Vector3d a = m.restNodes[t[0]], b = m.restNodes[t[1]], c = m.restNodes[t[2]];
+    for (const int node : t) normals[node] += (b - a).cross(c - a);
+  }
+  for (Vector3d& n : normals) n.normalize();
+  return normals;
+}
+
+// The node towards the free end that faces the camera best.
+int touchedNode(const SoftBodyModel& m, const Layout& l, const std::vector<Vector3d>& normals) {
+  Vector3d wanted = l.box.center();
+  wanted[l.axis] -= 0.15 * l.held * l.box.sizes()[l.axis];
+  wanted.z() = l.box.max().z();
+  const auto distance = [&](std::size_t i) {
+    const double turnedAway = l.size * (1 - normals[i].z());
+    return (m.restNodes[i] - wanted).norm() + turnedAway;
+  };
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < m.restNodes.size(); ++i)
+    if (distance(i) < distance(best)) best = i;
+  return static_cast<int>(best);
+}
+
+// How far towards an end of the longest axis, in box lengths from the middle: 0.5 at the very end.
+double towards(const Layout& l, double end, const FillingSphere& s) {
+  return end * (s.restBallCentre - l.box.center())[l.axis] / l.box.sizes()[l.axis];
+}
+
+constexpr double kOuterQuarter = 0.25;
+
+double volumeBeyond(const SoftBodyModel& m, const Layout& l, double end) {
+  double volume = 0;
+  for (const FillingSphere& s : m.spheres) volume += towards(l, end, s) > kOuterQuarter ? s.volume : 0;
+  return volume;
+}
+
+// Held at the upper end where the body stands, otherwise at the bulkier one: a tail would not hold it.
+Layout layOutScene(const SoftBodyModel& m) {
+  Layout l;
+  for (const Vector3d& x : m.restNodes) l.box.extend(x);
+  l.size = l.box.diagonal().norm();
+  l.box.sizes().maxCoeff(&l.axis);
+  l.held = l.axis == 1 || volumeBeyond(m, l, 1) > volumeBeyond(m, l, -1) ? 1 : -1;
+  const std::vector<Vector3d> normals = nodeNormals(m);
+  const int node = touchedNode(m, l, normals);
+  l.touch = m.restNodes[node];
+  l.normal = normals[node];
+  return l;
+}
+
+// The spheres in the outer quarter of the held end, or the outermost.
+std::string heldSpheres(const SoftBodyModel& m, const Layout& l) {
+  std::string out;
+  std::size_t outermost = 0;
+  for (std::size_t i = 0; i < m.spheres.size(); ++i) {
+    if (towards(l, l.held, m.spheres[i]) > towards(l, l.held, m.spheres[outermost])) outermost = i;
+    if (towards(l, l.held, m.spheres[i]) > kOuterQuarter) out += fmt::format("{}{}", out.empty() ? "" : " ", i);
+  }
+  return out.empty() ? fmt::format("{}", outermost) : out;
+}
+
+std::string vectorText(const Vector3d& v) {
+  return fmt::format("{:.6g} {:.6g} {:.6g}", v.x(), v.y(), v.z());
+}
+
+std::string sceneText(const std::string& name, const SoftBodyModel& model, const Layout& l) {
+  // A body ten times as long of the same tissue would hang limp: stiffness grows with size, as in structures of one
+  // shape that sag alike. Couplings and force limit follow.
+  const double scale = l.size / 0.1, young = 5e3 * scale;
+  constexpr double fov = 42, aspect = 16.0 / 9;
+  const Vector3d half = 0.5 * l.box.sizes(), centre = l.box.center();
+  const double halfHeight = 1.2 * std::max(half.y(), half.x() / aspect);
+  const double distance = half.z() + halfHeight / std::tan(0.5 * fov * std::numbers::pi / 180);
+  std::string out =
+      fmt::format("<!-- {} with a tool that presses, grabs, pulls and twists it. SI units; y up. -->\n", name);
+  out += fmt::format("<scene name=\"{}\">\n", name);
+  out += "  <clock servo=\"1200\" dynamics=\"50\" duration=\"9\"/>\n";
+  out += "  <!-- the mesh is taken as the shape under weight; for free fall: gravity=\"0 -9.81 0\" -->\n";
+  out += "  <dynamics gravity=\"0 0 0\"/>\n";
+  out += fmt::format("  <tissue name=\"soft\" young=\"{:.3g}\" poisson=\"0.45\" density=\"1040\" damping=\"0.15\"/>\n",
+                     young);
+  out += fmt::format("  <body name=\"{0}\" model=\"{0}.model.xml\" tissue=\"soft\" look=\"stomach\">\n", name);
+  out += "    <!-- numbers of filling spheres: medulla render SCENE --view model shows the held ones grey -->\n";
+  out += fmt::format("    <fix spheres=\"{}\"/>\n  </body>\n", heldSpheres(model, l));
+  out += fmt::format(
+      "  <tool name=\"grasper\" trajectory=\"{}.csv\" radius=\"{:.3g}\" stiffness=\"{:.3g}\" damping=\"{:.3g}\" "
+      "friction=\"0.3 0.2\"\n        force_max=\"{:.3g}\" grip_radius=\"{:.3g}\"/>\n",
+      name, 0.03 * l.size, 0.6 * young * l.size, std::pow(scale, 2.5), 8 * std::pow(scale, 3), 0.08 * l.size);
+  out += fmt::format("  <camera position=\"{}\" target=\"{}\" fov=\"{}\"/>\n",
+                     vectorText(centre + distance * Vector3d::UnitZ()), vectorText(centre), fov);
+  out += fmt::format("  <light offset=\"{}\" reference_distance=\"{:.3g}\"/>\n",
+                     vectorText(distance * Vector3d(-0.1, 0.12, 0)), distance);
+  out += "  <output size=\"1280 720\" fps=\"30\" golden=\"0 2.2 5.5\"/>\n</scene>\n";
+  return out;
+}
+
+std::string trajectoryText(const Layout& l) {
+  const Vector3d shaft = (l.normal + Vector3d(0.35, 0.3, 0.2)).normalized();  // comes in from the upper right
+  const Eigen::Quaterniond straight = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), shaft);
+  const Eigen::Quaterniond twisted = straight * Eigen::AngleAxisd(1.2, Vector3d::UnitZ());
+  Vector3d sideways = Vector3d::Zero();
+  sideways[l.axis] = -l.held;
+  const Vector3d pulled = l.touch + 0.2 * l.size * (0.8 * l.normal + 0.6 * sideways).normalized();
+  std::string out =
+      "# Key poses; the tool moves smoothly through them. grip above 0.5 holds what is touched.\n"
+      "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n";
+  const auto key = [&](double t, const Vector3d& x, const Eigen::Quaterniond& q, double grip) {
+    out += fmt::format("{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{}\n", t, x.x(), x.y(), x.z(), q.w(), q.x(),
+                       q.y(), q.z(), grip);
+  };
+  const auto above = [&](double share) -> Vector3d { return l.touch + share * l.size * l.normal; };
+  out += "# approach\n";
+  key(0, above(0.4), straight, 0);
+  key(1, above(0.06), straight, 0.3);
+  out += "# press and hold\n";
+  key(1.8, above(-0.05), straight, 0.3);
+  key(2.4, above(-0.05), straight, 0.3);
+  out += "# back, open, touch, grab\n";
+  key(3.1, above(0.05), straight, 0);
+  key(3.6, above(-0.025), straight, 0);  // deep enough to stay in touch with a body that gives way
+  key(4, above(-0.025), straight, 0);
+  key(4.2, above(-0.025), straight, 1);
+  out += "# pull\n";
+  key(5.2, pulled, straight, 1);
+  key(5.6, pulled, straight, 1);
+  out += "# twist\n";
+  key(6.4, pulled, twisted, 1);
+  key(6.7, pulled, twisted, 1);
+  out += "# let go and leave\n";
+  key(6.8, pulled, twisted, 0);
+  key(8, above(0.4), straight, 0);
+  return out;
+}
+
+}  // namespace
+
+StarterScene starterScene(const std::string& name, const SoftBodyModel& model) {
+  const Layout layout = layOutScene(model);
+  return {sceneText(name, model, layout), trajectoryText(layout)};
+}
+
+}  // namespace medulla

@@ -1,0 +1,82 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/program_run.h"
+#include "tests/temporary_folder.h"
+
+// medulla new and medulla check: from somebody's mesh to a scene that runs.
+namespace medulla {
+
+static const std::string kMesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj";
+
+static ProgramResult makeStarter(const TemporaryFolder& folder, const std::string& mesh = kMesh) {
+  return runProgram({"new", mesh, "-o", folder / "mine", "--spheres", "5"});
+}
+
+TEST(StarterScene, IsCheckedAndItsToolPressesAndHoldsTheBody) {
+  const TemporaryFolder folder;
+  const ProgramResult made = makeStarter(folder);
+  ASSERT_EQ(made.exitCode, 0) << made.err;
+  const std::string scene = folder / "mine/gallbladder.xml";
+  EXPECT_NE(made.out.find("scene " + scene), std::string::npos) << made.out;
+  const ProgramResult checked = runProgram({"check", scene});
+  EXPECT_EQ(checked.exitCode, 0) << checked.err;
+  EXPECT_EQ(checked.out, "valid yes\n");
+
+  ASSERT_EQ(runProgram({"replay", scene, "--log", folder / "log.csv"}).exitCode, 0);
+  const std::string log = readFile(folder / "log.csv");
+  const std::string header = log.substr(0, log.find('\n'));
+  const auto column = [&](const std::string& name) {
+    return std::count(header.begin(), header.begin() + static_cast<long>(header.find(name)), ',');
+  };
+  int pressing = 0, holding = 0;
+  for (std::size_t at = log.find('\n') + 1; at < log.size(); at = log.find('\n', at) + 1) {
+    const std::string row = log.substr(at, log.find('\n', at) - at);
+    const auto field = [&](long k) {
+      std::size_t start = 0;
+      for (; k > 0; --k) start = row.find(',', start) + 1;
+      return row.substr(start, row.find(',', start) - start);
+    };
+    pressing += field(column("grasper.contact")) == "1" && field(column("grasper.held")) == "0";
+    holding += field(column("grasper.held")) != "0";
+  }
+  EXPECT_GT(pressing, 25);  // of 50 per second
+  EXPECT_GT(holding, 100);
+}
+
+TEST(StarterScene, HarmsNothingThatIsThere) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(makeStarter(folder).exitCode, 0);
+  const std::string before = readFile(folder / "mine/gallbladder.csv");
+  const ProgramResult again = makeStarter(folder);
+  EXPECT_EQ(again.exitCode, 1);
+  EXPECT_EQ(again.out, "");
+  EXPECT_NE(again.err.find("gallbladder.xml: exists already; nothing was written"), std::string::npos) << again.err;
+  EXPECT_EQ(readFile(folder / "mine/gallbladder.csv"), before);
+}
+
+TEST(StarterScene, LeavesNothingBehindWhereTheMeshIsRefused) {
+  const TemporaryFolder folder;
+  folder.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const ProgramResult made = makeStarter(folder, folder / "flat.obj");
+  EXPECT_EQ(made.exitCode, 1);
+  EXPECT_EQ(std::count(made.err.begin(), made.err.end(), '\n'), 1) << made.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "mine"));
+}
+
+TEST(Check, NamesFileAndLineOfWhatCannotRun) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(makeStarter(folder).exitCode, 0);
+  const std::string scene = folder / "mine/gallbladder.xml";
+  const ProgramResult wrong = runProgram({"check", scene, "--set", "body.gallbladder.look=livr"});
+  EXPECT_EQ(wrong.exitCode, 1);
+  EXPECT_EQ(wrong.out, "");
+  EXPECT_NE(wrong.err.find("unknown look \"livr\""), std::string::npos) << wrong.err;
+  std::filesystem::remove(folder / "mine/gallbladder.csv");
+  const ProgramResult missing = runProgram({"check", scene});
+  EXPECT_EQ(missing.exitCode, 1);
+  EXPECT_NE(missing.err.find("gallbladder.csv\" does not exist"), std::string::npos) << missing.err;
+}
+
+}  // namespace medulla
