@@ -4,16 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <charconv>
 #include <cmath>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <vector>
 
 #include "app/files/input_error.h"
+#include "app/files/number_text.h"
+#include "app/files/text_file.h"
 
 namespace medulla {
 
@@ -54,12 +50,10 @@ static void checkHeader(const std::vector<std::string_view>& cells, const std::s
                      fmt::format("{} columns, expected {}[,fx[N],fy[N],fz[N]]", cells.size(), requiredHeader));
 }
 
-static double parseNumber(std::string_view cell, std::string_view column, const std::string& name, int line) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error != std::errc{} || end != cell.data() + cell.size() || !std::isfinite(value))
-    throw inputError(name, line, fmt::format("column {} is '{}', expected a finite number", column, cell));
-  return value;
+static double numberIn(std::string_view cell, std::string_view column, const std::string& name, int line) {
+  const std::optional<double> value = parseNumber<double>(cell);
+  if (!value) throw inputError(name, line, fmt::format("column {} is '{}', expected a finite number", column, cell));
+  return *value;
 }
 
 static ToolSample sampleOfRow(const std::vector<double>& row, const std::string& name, int line) {
@@ -102,7 +96,7 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name) {
       throw inputError(name, line,
                        fmt::format("{} columns in this row, expected {} as in the header", cells.size(), columns));
     row.clear();
-    for (std::size_t k = 0; k < columns; ++k) row.push_back(parseNumber(cells[k], columnNames[k], name, line));
+    for (std::size_t k = 0; k < columns; ++k) row.push_back(numberIn(cells[k], columnNames[k], name, line));
     const ToolSample sample = sampleOfRow(row, name, line);
     if (!trajectory.samples.empty() && sample.time <= trajectory.samples.back().time)
       throw inputError(name, line,
@@ -116,13 +110,7 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name) {
 }
 
 Trajectory readTrajectory(const std::string& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) throw inputError(path, 0, "is a folder, expected a trajectory CSV");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw inputError(path, 0, std::string("cannot read the trajectory: ") + std::strerror(errno));
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (file.bad()) throw inputError(path, 0, "cannot read the trajectory: read error");
-  return parseTrajectory(text, path);
+  return parseTrajectory(readTextFile(path), path);
 }
 
 }  // namespace medulla
