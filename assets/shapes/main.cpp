@@ -29,10 +29,23 @@ struct MeshRecipe {
 
 static std::vector<MeshRecipe> recipes() {
   const Box gallbladderBox{{-85, -80, -35}, {-5, 10, 45}};
+  const Box liverBox{{-160, -85, -100}, {100, 125, 60}}, stomachBox{{-60, -140, -110}, {155, 130, 75}};
+  const Box colonBox{{-165, -315, -110}, {185, 30, 90}}, intestineBox{{-130, -300, -60}, {150, -110, 100}};
+  const Box dolphinBox{{-1290, -480, -520}, {1290, 480, 520}};
+  const auto thinFins = [](const Eigen::Vector3d& p) { return dolphin(p, 6); };
+  const auto thickFins = [](const Eigen::Vector3d& p) { return dolphin(p, 20); };
   return {{"gallbladder", "gallbladder", gallbladder, gallbladderBox, 1.0, {466, 15, 0.4}},
           {"gallbladder", "gallbladder_fine", gallbladder, gallbladderBox, 0.8, {20000, 15, 0.4}},
-          {"scenery", "liver", liver, {{-175, -65, -105}, {140, 145, 75}}, 2.5, {9000, 40, 0.4}},
-          {"scenery", "stomach", stomach, {{-55, -135, -125}, {150, 125, 75}}, 2.5, {5000, 30, 0.5}},
+          {"liver", "liver", liver, liverBox, 2.5, {2000, 40, 0.4}},
+          {"liver", "liver_fine", liver, liverBox, 1.6, {24000, 40, 0.4}},
+          {"stomach", "stomach", stomach, stomachBox, 2.5, {1500, 30, 0.4}},
+          {"stomach", "stomach_fine", stomach, stomachBox, 1.6, {16000, 30, 0.5}},
+          {"gut", "colon", colon, colonBox, 2.2, {3200, 20, 0.4}},
+          {"gut", "colon_fine", colon, colonBox, 1.6, {24000, 15, 0.4}},
+          {"gut", "small_intestine", smallIntestine, intestineBox, 1.8, {2800, 12, 0.5}},
+          {"gut", "small_intestine_fine", smallIntestine, intestineBox, 1.5, {20000, 12, 0.5}},
+          {"dolphin", "dolphin", thickFins, dolphinBox, 12, {1120, 250, 0.3, true}},
+          {"dolphin", "dolphin_fine", thinFins, dolphinBox, 8, {16000, 150, 0.3, true}},
           {"scenery", "fat", fat, {{-220, -240, -125}, {190, -20, 150}}, 2.5, {6000, 15, 0.6}},
           {"scenery", "wall", cavity, {{-270, -220, -195}, {240, 190, 295}}, 9, {4000, 60, 0.6}, true}};
 }

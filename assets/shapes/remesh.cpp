@@ -17,6 +17,7 @@ struct Remeshing {
   RemeshSettings settings;
   EditableMesh mesh;
   std::vector<double> relativeLength;  // per vertex, 0..1: wanted edge length over edgeLength
+  std::vector<bool> onRim;             // per vertex: the surface turns by more than a radian over an edge
   double edgeLength = 1;               // mm
 };
 
@@ -41,13 +42,15 @@ static double curvatureAt(const SignedDistance& sdf, const Vector3d& p, double r
 
 static void updateRelativeLengths(Remeshing& r) {
   EditableMesh& mesh = r.mesh;
-  const double reach = std::max(0.5, 0.25 * r.edgeLength);
+  const double reach = std::max(0.5, (r.settings.keepRims ? 0.1 : 0.25) * r.edgeLength);
   r.relativeLength.assign(mesh.positions.size(), 1);
+  r.onRim.assign(mesh.positions.size(), false);
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
     if (mesh.trianglesOf[v].empty()) continue;
     const double curvature = curvatureAt(r.sdf, mesh.positions[v], reach);
     const double relative = std::sqrt(1 / std::max(r.settings.fullSizeRadius * curvature, 1e-6));
     r.relativeLength[v] = std::clamp(relative, r.settings.smallestRelative, 1.0);
+    r.onRim[v] = r.settings.keepRims && curvature * r.edgeLength * r.relativeLength[v] > 1;
   }
   // Neighbouring edges may differ by half: graded sizes keep triangles near equilateral.
   for (int pass = 0; pass < 6; ++pass) {
@@ -78,6 +81,7 @@ static bool split(Remeshing& r, int a, int b) {
   const Vector3d middle = projectToSurface(r.sdf, 0.5 * (p + q), 0.5 * (p - q).norm());
   splitEdge(r.mesh, sides, a, b, middle);
   r.relativeLength.push_back(0.5 * (r.relativeLength[a] + r.relativeLength[b]));
+  r.onRim.push_back(r.onRim[a] && r.onRim[b]);
   return true;
 }
 
@@ -104,15 +108,37 @@ static bool collapseIsGood(const Remeshing& r, const EdgeSides& sides, int a, in
   return true;
 }
 
+// Volume between the surface before and after a and b go to `position`.
+static double sweptVolume(const EditableMesh& mesh, int a, int b, const Vector3d& position) {
+  double volume = 0;
+  for (const int v : {a, b})
+    for (const int t : mesh.trianglesOf[v])
+      volume += std::abs(areaVector(mesh, t).dot(position - mesh.positions[v])) / 6;
+  return volume;
+}
+
+// The middle, or with keepRims an end that changes the volume clearly less, if one does: a rim that goes to the middle
+// between itself and a flank wears away.
+static Vector3d collapsePosition(const Remeshing& r, int a, int b) {
+  const Vector3d &p = r.mesh.positions[a], &q = r.mesh.positions[b];
+  const Vector3d middle = projectToSurface(r.sdf, 0.5 * (p + q), 0.5 * (p - q).norm());
+  if (!r.settings.keepRims) return middle;
+  const double atP = sweptVolume(r.mesh, a, b, p), atQ = sweptVolume(r.mesh, a, b, q);
+  if (sweptVolume(r.mesh, a, b, middle) < 1.2 * std::min(atP, atQ)) return middle;
+  return atP < atQ ? p : q;
+}
+
 static bool collapse(Remeshing& r, int a, int b, double maxRatio) {
   const EdgeSides sides = sidesOf(r.mesh, a, b);
   if (!sides.valid || !mayCollapse(r.mesh, sides, a, b)) return false;
   if (valence(r.mesh, a) + valence(r.mesh, b) > 14) return false;  // the merged vertex would have more than ten
-  const Vector3d &p = r.mesh.positions[a], &q = r.mesh.positions[b];
-  const Vector3d middle = projectToSurface(r.sdf, 0.5 * (p + q), 0.5 * (p - q).norm());
-  if (!collapseIsGood(r, sides, a, b, middle, maxRatio)) return false;
-  collapseEdge(r.mesh, sides, a, b, middle);
+  const Vector3d position = collapsePosition(r, a, b);
+  if (!collapseIsGood(r, sides, a, b, position, maxRatio)) return false;
+  const double length = wantedLength(r, a, b);
+  if (r.settings.keepRims && sweptVolume(r.mesh, a, b, position) > 0.2 * length * length * length) return false;
+  collapseEdge(r.mesh, sides, a, b, position);
   r.relativeLength[b] = std::min(r.relativeLength[a], r.relativeLength[b]);
+  r.onRim[b] = r.onRim[a] || r.onRim[b];
   return true;
 }
 
@@ -179,6 +205,22 @@ static void tryMove(EditableMesh& mesh, int vertex, const Vector3d& position) {
   if (!good) mesh.positions[vertex] = old;
 }
 
+static Vector3d meanNormal(const EditableMesh& mesh, int vertex) {
+  Vector3d sum = Vector3d::Zero();
+  for (const int t : mesh.trianglesOf[vertex]) sum += areaVector(mesh, t);
+  return sum.normalized();
+}
+
+// To the surface along the mesh's own normal, which points out of a rim where the triangles of both flanks meet: the
+// nearest surface point would lie on one flank and leave the rim jagged.
+static Vector3d projectToCrest(const SignedDistance& sdf, Vector3d p, const Vector3d& direction, double reach) {
+  for (int i = 0; i < 4; ++i) {
+    const double step = sdf(p) / std::max(gradient(sdf, p).dot(direction), 0.3);
+    p -= direction * std::clamp(step, -reach, reach);
+  }
+  return p;
+}
+
 // Each vertex goes towards the centroid of its triangles, weighted so that small wanted sizes attract (a centroidal
 // Voronoi step with density 1/L^3), along the surface only.
 static void smooth(Remeshing& r, double weight) {
@@ -194,11 +236,13 @@ static void smooth(Remeshing& r, double weight) {
       sum += mass * (mesh.positions[q[0]] + mesh.positions[q[1]] + mesh.positions[q[2]]) / 3;
       total += mass;
     }
-    const Vector3d normal = normalAt(r.sdf, mesh.positions[v]);
+    const Vector3d normal = r.onRim[v] ? meanNormal(mesh, static_cast<int>(v)) : normalAt(r.sdf, mesh.positions[v]);
     Vector3d move = sum / total - mesh.positions[v];
     move -= normal * normal.dot(move);
     const double reach = 0.5 * r.edgeLength * r.relativeLength[v];
-    tryMove(mesh, static_cast<int>(v), projectToSurface(r.sdf, mesh.positions[v] + weight * move, reach));
+    const Vector3d wanted = mesh.positions[v] + weight * move;
+    tryMove(mesh, static_cast<int>(v),
+            r.onRim[v] ? projectToCrest(r.sdf, wanted, normal, reach) : projectToSurface(r.sdf, wanted, reach));
   }
 }
 
@@ -225,7 +269,7 @@ static void reachExactCount(Remeshing& r) {
 }
 
 TriangleMesh remesh(const TriangleMesh& start, const SignedDistance& sdf, const RemeshSettings& settings) {
-  Remeshing r{sdf, settings, makeEditable(start), {}, 2};
+  Remeshing r{sdf, settings, makeEditable(start), {}, {}, 2};
   updateRelativeLengths(r);
   r.edgeLength = edgeLengthForCount(r);
   const int rounds = 12;

@@ -9,6 +9,7 @@ struct RemeshSettings {
   int triangles = 1000;           // exactly as many come out; even
   double fullSizeRadius = 15;     // mm; where the surface bends tighter than this, edges shrink with sqrt(radius)
   double smallestRelative = 0.4;  // 0..1, limit of that; 1 makes all edges equally long
+  bool keepRims = false;          // vertices of rims thinner than an edge stay on their crest: for fins
 };
 
 // Isotropic remeshing (Botsch and Kobbelt 2004) of a closed mesh onto the zero set that it approximates: split long

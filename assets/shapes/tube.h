@@ -15,11 +15,24 @@ struct Tube {
   };
   std::vector<Eigen::Vector4d> samples;
   std::vector<Chunk> chunks;
+  std::vector<double> along;                       // mm of arc from the first sample to each
+  std::vector<double> curvature;                   // 1/mm, over about a diameter
+  std::vector<Eigen::Vector3d> tangents, normals;  // a frame that turns with the axis, not about it
 };
 
 // Samples stand `step` mm apart: 1/30 of the smallest bending radius leaves no visible facets.
 Tube makeTube(const std::vector<Eigen::Vector4d>& controls, double step);
 
 double tubeDistance(const Tube& tube, const Eigen::Vector3d& p);
+
+// The ball of the tube whose surface is nearest to a point.
+struct TubePlace {
+  double fromAxis, radius, along, curvature;  // mm, 1/mm
+  Eigen::Vector2d side;                       // unit: where around the axis the point lies, from normal to binormal
+};
+
+// Continuous in p wherever curvature x radius < 1, unlike the nearest sample: what is modelled on the tube shows no
+// facets.
+TubePlace tubePlace(const Tube& tube, const Eigen::Vector3d& p);
 
 }  // namespace medulla
