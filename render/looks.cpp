@@ -69,14 +69,35 @@ Look stomach() {
   return l;
 }
 
+// The small intestine: moist, with many fine vessels that reach over it from its mesentery.
 Look gut() {
   Look l = stomach();
   l.name = "gut";
-  l.albedoLow = {0.52f, 0.20f, 0.15f};
-  l.albedoHigh = {0.70f, 0.36f, 0.27f};
-  l.vessels = 0.5f;
-  l.detailScale = 12;
-  l.detail.vesselHeading = 1.2f;
+  l.albedoLow = {0.46f, 0.150f, 0.118f};
+  l.albedoHigh = {0.66f, 0.30f, 0.235f};
+  l.mottleFrequency = 30;
+  l.patches[0] = {{0.60f, 0.14f, 0.12f}, 34, 5, 1, {}, 0.52f, 0.72f, 0.45f};
+  l.vessels = 0.85f;
+  l.vesselTint = {0.68f, 0.12f, 0.18f};
+  l.bump = 0.42f;
+  l.specular = 1.1f;
+  l.detailScale = 11;
+  l.detail = {1024, 9, 2.0f, 1.2f, 0, 0, 0};
+  return l;
+}
+
+// The large intestine: paler and greyer, less wet, with lobules of fat.
+Look colon() {
+  Look l = gut();
+  l.name = "colon";
+  l.albedoLow = {0.34f, 0.172f, 0.130f};
+  l.albedoHigh = {0.52f, 0.315f, 0.245f};
+  l.patches[0] = {{0.74f, 0.45f, 0.14f}, 26, 8, 1, {}, 0.58f, 0.66f, 0.85f};
+  l.vessels = 0.75f;
+  l.bump = 0.38f;
+  l.specular = 0.8f;
+  l.detailScale = 10;
+  l.detail.vesselHeading = 0.3f;
   return l;
 }
 
@@ -125,19 +146,76 @@ Look wall() {
   return l;
 }
 
+// Countershaded. Under water no film lies on the skin: what shines in air is matt there.
 Look dolphin() {
   Look l;
   l.name = "dolphin";
-  l.albedoLow = {0.16f, 0.20f, 0.25f};
-  l.albedoHigh = {0.24f, 0.29f, 0.34f};
+  l.albedoLow = {0.085f, 0.100f, 0.120f};
+  l.albedoHigh = {0.130f, 0.150f, 0.175f};
   l.mottleFrequency = 2;
-  l.patches[0] = {{0.62f, 0.64f, 0.64f}, 3, 5, 0.15f, {0, -1, 0}, -0.42f, -0.24f, 0.9f};  // pale belly
+  l.patches[0] = {{0.30f, 0.325f, 0.34f}, 4, 7, 0.12f, {0, -1, 0}, -0.46f, -0.30f, 0.9f};  // grey flanks
+  l.patches[1] = {{0.72f, 0.70f, 0.68f}, 3, 5, 0.10f, {0, -1, 0}, -0.26f, -0.16f, 0.95f};  // pale belly
   l.wrap = {0.10f, 0.12f, 0.14f};
-  l.roughness = 0.40f;
-  l.wetRoughness = 0.20f;
-  l.mottle = 0.20f;
-  l.bump = 0.08f;
+  l.roughness = 0.50f;
+  l.wetRoughness = 0.30f;
+  l.specular = 0.45f;
+  l.mottle = 0.16f;
+  l.bump = 0.06f;
   l.detailScale = 1.5f;
+  l.detail = {256, 0, 0, 0, 0, 0, 0};
+  return l;
+}
+
+// Sand with darker growth, to be seen from above.
+Look seabed() {
+  Look l;
+  l.name = "seabed";
+  l.albedoLow = {0.36f, 0.31f, 0.215f};
+  l.albedoHigh = {0.58f, 0.51f, 0.37f};
+  l.mottleFrequency = 0.6f;
+  l.patches[0] = {{0.085f, 0.105f, 0.06f}, 0.22f, 12, 1, {}, 0.55f, 0.66f, 0.8f};
+  l.roughness = 0.7f;
+  l.wetRoughness = 0.6f;
+  l.specular = 0.1f;
+  l.mottle = 0.55f;
+  l.bump = 0.8f;
+  l.detailScale = 0.3f;
+  l.unrollRadius = 1;
+  l.unrollTilt = 1.5708f;
+  l.castsShadow = false;
+  l.encloses = true;
+  l.detail = {512, 0, 0, 0, 0, 0, 0};
+  return l;
+}
+
+// Matt ceramic.
+Look bowl() {
+  Look l;
+  l.name = "bowl";
+  l.albedoLow = {0.52f, 0.50f, 0.46f};
+  l.albedoHigh = {0.60f, 0.58f, 0.54f};
+  l.mottleFrequency = 12;
+  l.roughness = 0.55f;
+  l.wetRoughness = 0.40f;
+  l.specular = 0.35f;
+  l.mottle = 0.10f;
+  l.bump = 0.04f;
+  l.detail = {256, 0, 0, 0, 0, 0, 0};
+  return l;
+}
+
+// Soft toys of coloured jelly.
+Look candy(const std::string& colourName, vec3 albedo) {
+  Look l;
+  l.name = "candy_" + colourName;
+  l.albedoLow = 0.9f * albedo;
+  l.albedoHigh = albedo;
+  l.wrap = vec3(0.15f) + 0.2f * albedo;
+  l.roughness = 0.34f;
+  l.wetRoughness = 0.20f;
+  l.specular = 0.8f;
+  l.mottle = 0.12f;
+  l.bump = 0.05f;
   l.detail = {256, 0, 0, 0, 0, 0, 0};
   return l;
 }
@@ -170,8 +248,22 @@ Look matte() {
 }  // namespace
 
 const std::vector<Look>& looks() {
-  static const std::vector<Look> table = {liver(), stomach(), gallbladder(), gut(),  fat(),
-                                          wall(),  dolphin(), steel(),       matte()};
+  // A look's place seeds its texture: new ones go to the end, or the pictures of those behind them change.
+  static const std::vector<Look> table = {liver(),
+                                          stomach(),
+                                          gallbladder(),
+                                          gut(),
+                                          fat(),
+                                          wall(),
+                                          dolphin(),
+                                          steel(),
+                                          matte(),
+                                          colon(),
+                                          seabed(),
+                                          bowl(),
+                                          candy("red", {0.74f, 0.045f, 0.040f}),
+                                          candy("yellow", {0.88f, 0.50f, 0.035f}),
+                                          candy("blue", {0.035f, 0.17f, 0.66f})};
   return table;
 }
 

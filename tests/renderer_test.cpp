@@ -320,18 +320,22 @@ TEST(Renderer, OrganBesideAnotherIsDarkerInTheCrease) {
 TEST(Renderer, EveryLookDraws) {
   Renderer renderer(settingsOf(64, 64));
   const std::vector<std::string> names = lookNames();
-  for (const char* wanted : {"liver", "stomach", "gallbladder", "gut", "fat", "wall", "dolphin", "steel"})
+  for (const char* wanted : {"liver", "stomach", "gallbladder", "gut", "colon", "fat", "wall", "dolphin", "seabed",
+                             "bowl", "candy_red", "candy_yellow", "candy_blue", "steel"})
     EXPECT_NE(std::find(names.begin(), names.end(), wanted), names.end()) << wanted;
-  for (std::size_t k = 0; k < names.size(); ++k)
-    renderer.addSurface(
-        sphere(names[k], {0.03f * float(int(k % 3) - 1), 0.03f * float(int(k / 3) - 1), 0}, 0.012f, 12));
+  // On a grid of four by four.
+  ASSERT_LE(names.size(), 16u);
+  const auto place = [](std::size_t k) { return 0.03f * (vec3(k % 4, k / 4, 0) - vec3(1.5f, 1.5f, 0)); };
+  for (std::size_t k = 0; k < names.size(); ++k) renderer.addSurface(sphere(names[k], place(k), 0.012f, 12));
   Image image;
   Picture p = viewFromFront(0.2f);
   renderer.render(p, image);
   for (std::size_t k = 0; k < names.size(); ++k) {
     const double scale = 64 / 2 / 0.2 / std::tan(glm::radians(20.0));
-    const int x = 32 + int(0.03 * (int(k % 3) - 1) * scale), y = 32 - int(0.03 * (int(k / 3) - 1) * scale);
-    EXPECT_GT(red(image, x, y), 40) << names[k];
+    const int x = 32 + int(place(k).x * scale), y = 32 - int(place(k).y * scale);
+    // Whatever its hue: the brightest of the three channels.
+    const std::uint8_t* rgb = &image.pixels[4ul * (std::size_t(y) * 64 + std::size_t(x))];
+    EXPECT_GT(std::max({rgb[0], rgb[1], rgb[2]}), 40) << names[k];
   }
 }
 
