@@ -6,6 +6,7 @@
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/trajectory_file.h"
+#include "app/shape_mesh.h"
 #include "app/simulation.h"
 #include "render/renderer.h"
 
@@ -69,11 +70,10 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
   for (const SceneBody& body : scene.bodies) requireLook(scene, body.line, body.look);
   loaded.models = loadModels(scene);
   for (const SceneStatic& item : scene.statics) {
-    requireLook(scene, item.line, item.look);
-    requireFile(scene, item.line, "mesh", item.meshPath);
-    TriangleMesh mesh = readMesh(item.meshPath, metresPerUnit(item.unit));
-    for (Eigen::Vector3d& v : mesh.vertices) v = item.worldFromMesh * v;
-    loaded.statics.push_back(std::move(mesh));
+    if (!item.look.empty()) requireLook(scene, item.line, item.look);
+    if (!item.meshPath.empty()) requireFile(scene, item.line, "mesh", item.meshPath);
+    loaded.statics.push_back(item.meshPath.empty() ? shapeMesh(item.shape)
+                                                   : readMesh(item.meshPath, metresPerUnit(item.unit)));
   }
   for (const SceneTool& tool : scene.tools) {
     if (tool.line > 0)

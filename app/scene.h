@@ -20,15 +20,17 @@ struct SceneBody {
   LinkFactors factors;
   std::vector<FixedSphere> fixed;
   std::vector<DrivenSphere> driven;
+  std::optional<std::vector<int>> neighbours;  // indices of bodies
   Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
 };
 
-// Scenery: drawn, not simulated, not touched yet.
+// What does not move: drawn if it has a look, holding bodies if it says so.
 struct SceneStatic {
   int line = 0;
-  std::string meshPath, look;
-  std::string unit = "m";  // of the mesh file; a name that metresPerUnit() knows
-  Eigen::Isometry3d worldFromMesh = Eigen::Isometry3d::Identity();
+  StaticShape shape;           // without its mesh
+  bool contact = false;        // by default meshes are scenery, and simple shapes are there to be lain on
+  std::string meshPath, look;  // empty: no mesh, not drawn
+  std::string unit = "m";      // of the mesh file; a name that metresPerUnit() knows
 };
 
 struct SceneTool {
@@ -51,6 +53,7 @@ struct Scene {
   Eigen::Vector3d gravity{0, -9.81, 0};        // m/s2
   double ambientDrag = 0;                      // 1/s, >= 0
   int substeps = 0;                            // per dynamics frame; 0: as many as the stability estimate asks for
+  ContactMode contact = ContactMode::balls;
   std::vector<SceneBody> bodies;
   std::vector<SceneStatic> statics;
   std::vector<SceneTool> tools;

@@ -26,10 +26,10 @@ constexpr glm::vec4 kAxisColours[3] = {{0.85f, 0.15f, 0.12f, 1}, {0.15f, 0.65f, 
 constexpr glm::vec4 kProxyColour{0.15f, 0.75f, 0.25f, 0.9f};
 constexpr glm::vec4 kDeviceColour{0.95f, 0.20f, 0.85f, 0.9f};
 
-SurfaceShape shapeOf(const TriangleMesh& mesh, const std::string& look) {
+SurfaceShape shapeOf(const TriangleMesh& mesh, const Eigen::Isometry3d& worldFromMesh, const std::string& look) {
   SurfaceShape shape;
   shape.look = look;
-  for (const Eigen::Vector3d& v : mesh.vertices) shape.restPositions.push_back(toGlm(v));
+  for (const Eigen::Vector3d& v : mesh.vertices) shape.restPositions.push_back(toGlm(worldFromMesh * v));
   for (const auto& t : mesh.triangles) shape.triangles.push_back({unsigned(t[0]), unsigned(t[1]), unsigned(t[2])});
   return shape;
 }
@@ -164,8 +164,12 @@ SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Rende
   };
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
     add(scene.bodies[b].line, shapeOf(loaded.models[b]->renderSurface, rest.bodies[b].nodes, scene.bodies[b].look));
-  for (std::size_t s = 0; s < scene.statics.size(); ++s)
-    add(scene.statics[s].line, shapeOf(loaded.statics[s], scene.statics[s].look));
+  for (std::size_t s = 0; s < scene.statics.size(); ++s) {
+    const SceneStatic& item = scene.statics[s];
+    if (item.look.empty()) continue;
+    add(item.line, shapeOf(loaded.statics[s], item.shape.worldFromShape, item.look));
+    ++drawnStatics_;
+  }
 }
 
 void SceneView::compose(const PictureState& state, const ViewOptions& options, Picture& picture) const {
@@ -176,7 +180,7 @@ void SceneView::compose(const PictureState& state, const ViewOptions& options, P
   picture.instruments.clear();
   picture.balls.clear();
   picture.segments.clear();
-  picture.surfaces.resize(scene.bodies.size() + scene.statics.size());
+  picture.surfaces.resize(scene.bodies.size() + drawnStatics_);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyFrame& frame = state.frame.bodies[b];
     evaluateRenderSurface(loaded_->models[b]->renderSurface, frame.nodes, picture.surfaces[b].positions);

@@ -25,6 +25,7 @@ class SceneView {
 
  private:
   const LoadedScene* loaded_;
+  std::size_t drawnStatics_ = 0;
 };
 
 // The drawn surface of a body in its present shape: `out` gets one position per render vertex (RenderSurface's comment

@@ -13,13 +13,20 @@ static World makeWorld(const LoadedScene& loaded) {
   settings.ambientDrag = scene.ambientDrag;
   settings.frameDuration = 1 / scene.dynamicsRate;
   settings.substeps = scene.substeps;
+  settings.contact = scene.contact;
   std::vector<BodyDescription> bodies;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const SceneBody& body = scene.bodies[b];
     bodies.push_back({body.name, loaded.models[b], body.tissue, body.factors, body.surface, body.worldFromModel,
-                      body.fixed, body.driven});
+                      body.fixed, body.driven, body.neighbours});
   }
-  return World(settings, std::move(bodies));
+  std::vector<StaticShape> statics;
+  for (std::size_t k = 0; k < scene.statics.size(); ++k) {
+    if (!scene.statics[k].contact) continue;
+    statics.push_back(scene.statics[k].shape);
+    if (statics.back().kind == StaticShape::Kind::mesh) statics.back().mesh = loaded.statics[k];
+  }
+  return World(settings, std::move(bodies), statics);
 }
 
 Simulation::Simulation(const LoadedScene& loaded)

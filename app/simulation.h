@@ -16,7 +16,7 @@ namespace medulla {
 struct LoadedScene {
   Scene scene;
   std::vector<std::shared_ptr<const SoftBodyModel>> models;  // one per body
-  std::vector<TriangleMesh> statics;                         // one per static, world frame
+  std::vector<TriangleMesh> statics;                         // one per static, in its frame; what is drawn
   std::vector<Trajectory> trajectories;                      // one per tool
 };
 

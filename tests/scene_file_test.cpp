@@ -21,19 +21,19 @@ const char* completeScene = R"(<?xml version="1.0"?>
 <?xml-model href="scene.xsd"?>
 <scene name="complete">
   <clock servo="1000" dynamics="40" duration="12"/>
-  <dynamics integrator="explicit" order="1" gravity="0 0 -9.5" ambient_drag="0.3" substeps="16"/>
+  <dynamics integrator="explicit" order="1" gravity="0 0 -9.5" ambient_drag="0.3" substeps="16" contact="swept"/>
   <!-- tissues -->
-  <tissue name="bile_sac" young="6e3" poisson="0.4" density="1030" damping="0.2"/>
+  <tissue name="bile_sac" young="6e3" poisson="0.4" density="1030" damping="0.2" friction="0.3"/>
   <tissue name="liver"/>
   <body name="gallbladder" model="../assets/gallbladder.model.xml" tissue="bile_sac" look="gallbladder"
         position="0.1 0.2 0.3"
         orientation="0.707 0 0.707 0" links="springs" surface="skin">
     <fix spheres="0 1" dof="translation"/>
     <fix spheres="4" dof="all"/> <drive sphere="2" axis="0 1 1" amplitude="0.1" frequency="2" phase="0.5" velocity="1 0 0"/>
-    <links select="all" elongation="2" flexion="3" torsion="0.5"/>
+    <links select="all" elongation="2" flexion="3" torsion="0.5"/><neighbours names="second"/>
   </body>
   <body name="second" model="second.model.xml" tissue="liver" look="liver"/>
-  <static shape="mesh" mesh="/abs/wall.obj" look="wall" position="1 0 0" orientation="0 1 0 0" unit="mm"/>
+  <static shape="mesh" mesh="/abs/wall.obj" look="wall" position="1 0 0" orientation="0 1 0 0" unit="mm" contact="true" friction="0.4"/><static shape="plane" normal="0 0 2" position="0 0 3"/><static shape="box" size="1 2 3" look="fat" contact="false"/><static shape="sphere" radius="4"/>
   <tool name="grasper" trajectory="gallbladder.csv" radius="0.004" stiffness="300" damping="2" friction="0.4 0.1"
         force_max="5" grip_radius="0.007"/>
   <camera position="0 0 0.2" target="0 0.01 0" fov="50">
@@ -83,6 +83,7 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(s.gravity, Eigen::Vector3d(0, 0, -9.5));
   EXPECT_EQ(s.ambientDrag, 0.3);
   EXPECT_EQ(s.substeps, 16);
+  EXPECT_EQ(s.contact, ContactMode::swept);
   ASSERT_EQ(s.bodies.size(), 2u);
   const SceneBody& body = s.bodies[0];
   EXPECT_EQ(body.line, 9);
@@ -93,6 +94,9 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(body.tissue.poisson, 0.4);
   EXPECT_EQ(body.tissue.density, 1030);
   EXPECT_EQ(body.tissue.damping, 0.2);
+  EXPECT_EQ(body.tissue.friction, 0.3);
+  EXPECT_EQ(body.neighbours, std::vector<int>{1});
+  EXPECT_EQ(s.bodies[1].neighbours, std::nullopt);
   EXPECT_EQ(body.surface, SurfaceMode::skin);
   EXPECT_EQ(body.factors.elongation, 2);
   EXPECT_EQ(body.factors.flexion, 3);
@@ -118,11 +122,23 @@ TEST_F(SceneFile, EveryValueArrives) {
 
 TEST_F(SceneFile, EveryValueOfScenerysToolsAndPictureArrives) {
   const Scene s = read(completeScene);
-  ASSERT_EQ(s.statics.size(), 1u);
+  ASSERT_EQ(s.statics.size(), 4u);
   EXPECT_EQ(s.statics[0].meshPath, "/abs/wall.obj");
   EXPECT_EQ(s.statics[0].look, "wall");
   EXPECT_EQ(s.statics[0].unit, "mm");
-  EXPECT_EQ(s.statics[0].worldFromMesh.translation(), Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(s.statics[0].shape.worldFromShape.translation(), Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(s.statics[0].shape.friction, 0.4);
+  EXPECT_TRUE(s.statics[0].contact);
+  EXPECT_EQ(s.statics[1].shape.kind, StaticShape::Kind::plane);
+  EXPECT_EQ(s.statics[1].shape.worldFromShape.translation(), Eigen::Vector3d(0, 0, 3));
+  EXPECT_NEAR((s.statics[1].shape.worldFromShape.linear().col(1) - Eigen::Vector3d::UnitZ()).norm(), 0, 1e-15);
+  EXPECT_TRUE(s.statics[1].contact);
+  EXPECT_EQ(s.statics[2].shape.kind, StaticShape::Kind::box);
+  EXPECT_EQ(s.statics[2].shape.size, Eigen::Vector3d(1, 2, 3));
+  EXPECT_FALSE(s.statics[2].contact);
+  EXPECT_EQ(s.statics[3].shape.kind, StaticShape::Kind::sphere);
+  EXPECT_EQ(s.statics[3].shape.radius, 4);
+  EXPECT_EQ(s.statics[3].look, "");
   ASSERT_EQ(s.tools.size(), 1u);
   EXPECT_EQ(s.tools[0].name, "grasper");
   EXPECT_EQ(s.tools[0].trajectoryPath, folder + "/gallbladder.csv");
@@ -162,6 +178,7 @@ TEST_F(SceneFile, DefaultsStandWhereNothingIsSaid) {
   EXPECT_EQ(s.dynamicsRate, 50);
   EXPECT_EQ(s.gravity, Eigen::Vector3d(0, -9.81, 0));
   EXPECT_EQ(s.substeps, 0);
+  EXPECT_EQ(s.contact, ContactMode::balls);
   EXPECT_EQ(s.bodies[0].surface, SurfaceMode::full);
   EXPECT_TRUE(s.bodies[0].worldFromModel.isApprox(Eigen::Isometry3d::Identity(), 0));
   ASSERT_EQ(s.camera.size(), 1u);
@@ -236,7 +253,33 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {"order=\"1\"", "order=\"2\"", R"(x.xml:5: <dynamics> order="2": unknown value; known: "1")"},
       {"substeps=\"16\"", "substeps=\"1.5\"",
        R"(x.xml:5: <dynamics> substeps="1.5": expected 1 integer >= 0 and <= 1e+05)"},
-      {"shape=\"mesh\"", "shape=\"box\"", R"(x.xml:17: <static> shape="box": unknown value; known: "mesh")"},
+      {"\"swept\"", "\"cones\"",
+       R"(x.xml:5: <dynamics> contact="cones": unknown value; known: "none", "balls", "swept")"},
+      {"friction=\"0.3\"", "friction=\"-0.3\"", R"(x.xml:7: <tissue> friction="-0.3": expected 1 number >= 0)"},
+      {"names=\"second\"", "names=\"secnd\"",
+       R"(x.xml:14: <neighbours> names="secnd": no <body> is named "secnd"; did you mean "second"?)"},
+      {"names=\"second\"", "names=\"second gallbladder\"",
+       R"(x.xml:14: <neighbours> names="second gallbladder": a body is no neighbour of itself)"},
+      {"names=\"second\"", "names=\"\"", R"(x.xml:14: <neighbours> names="": is empty)"},
+      {"shape=\"mesh\"", "shape=\"cone\"",
+       R"(x.xml:17: <static> shape="cone": unknown value; known: "plane", "box", "sphere", "mesh")"},
+      {"shape=\"mesh\"", "shape=\"box\"",
+       R"(x.xml:17: <static> shape="box": expected the attribute "size" with this shape)"},
+      {"shape=\"box\"", "shape=\"box\" radius=\"1\"",
+       R"(x.xml:17: <static> radius="1": only shape="sphere" has this attribute)"},
+      {" normal=\"0 0 2\"", "", R"(x.xml:17: <static> shape="plane": expected the attribute "normal" with this shape)"},
+      {"normal=\"0 0 2\"", "normal=\"0 0 0\"", R"(x.xml:17: <static> normal="0 0 0": expected a direction)"},
+      {"normal=\"0 0 2\"", "normal=\"0 0 2\" orientation=\"1 0 0 0\"",
+       R"(x.xml:17: <static> orientation="1 0 0 0": a plane has a normal instead)"},
+      {"size=\"1 2 3\"", "size=\"1 2 0\"", R"(x.xml:17: <static> size="1 2 0": expected 3 numbers > 0)"},
+      {" radius=\"4\"", "", R"(x.xml:17: <static> shape="sphere": expected the attribute "radius" with this shape)"},
+      {"radius=\"4\"", "radius=\"-4\"", R"(x.xml:17: <static> radius="-4": expected 1 number > 0)"},
+      {"mesh=\"/abs/wall.obj\" ", "",
+       R"(x.xml:17: <static> shape="mesh": expected the attribute "mesh" with this shape)"},
+      {"contact=\"true\"", "contact=\"yes\"",
+       R"(x.xml:17: <static> contact="yes": unknown value; known: "false", "true")"},
+      {"friction=\"0.4\"", "friction=\"-1\"", R"(x.xml:17: <static> friction="-1": expected 1 number >= 0)"},
+      {" look=\"fat\"", "", R"(x.xml:17: <static> shape="box": without contact and without a look it has no effect)"},
       {"unit=\"mm\"", "unit=\"km\"", R"(x.xml:17: <static> unit="km": unknown value; known: "m", "cm", "mm", "inch")"},
       {"servo=\"1000\"", "servo=\"1001\"",
        R"(x.xml:4: <clock> servo="1001": expected the servo rate to be a multiple of the dynamics rate)"},

@@ -114,7 +114,8 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
   const Scene& scene = loaded.scene;
   std::vector<std::string> inputs{options.scene}, outputs = pictures;
   for (const SceneBody& body : scene.bodies) inputs.push_back(body.modelPath);
-  for (const SceneStatic& item : scene.statics) inputs.push_back(item.meshPath);
+  for (const SceneStatic& item : scene.statics)
+    if (!item.meshPath.empty()) inputs.push_back(item.meshPath);
   for (const SceneTool& tool : scene.tools) inputs.push_back(tool.trajectoryPath);
   outputs.push_back(options.logPath);
   for (const SurfaceRequest& request : options.surfaces) outputs.push_back(request.path);
@@ -125,6 +126,9 @@ void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& 
               const std::function<void()>& afterFrame, const std::function<void()>& finish) {
   SurfaceRecorder surfaces(loaded, options);
   LogRecorder log(loaded, options);
+  for (const BodyOverlap& o : simulation.world().startOverlaps())
+    fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n",
+               loaded.scene.bodies[o.body0].name, loaded.scene.bodies[o.body1].name, 1e3 * o.depth);
   while (!simulation.finished()) {
     checkInterrupt();
     simulation.advanceFrame();
@@ -139,6 +143,7 @@ void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& 
 
 std::vector<Result> runResults(const Simulation& simulation, double cpuSeconds, double wallSeconds) {
   const RunTotals& totals = simulation.totals();
+  const PenetrationReport penetration = simulation.world().penetration();
   return {{"simulated", fmt::format("{:.6g}", totals.simulated), "s"},
           {"cpu", fmt::format("{:.4g}", cpuSeconds), "s"},
           {"realtime", fmt::format("{:.4g}", totals.simulated / std::max(wallSeconds, 1e-9)), "x"},
@@ -148,6 +153,8 @@ std::vector<Result> runResults(const Simulation& simulation, double cpuSeconds, 
           {"volume_ratio_min", fmt::format("{:.5g}", totals.volumeRatioMin), ""},
           {"volume_ratio_max", fmt::format("{:.5g}", totals.volumeRatioMax), ""},
           {"impulse_mismatch", fmt::format("{:.4g}", totals.impulseMismatch()), "%"},
+          {"penetration_max", fmt::format("{:.3g}", penetration.bodies), "%"},
+          {"static_penetration_max", fmt::format("{:.3g}", penetration.statics), "%"},
           {"hash", fmt::format("{:016x}", simulation.world().stateHash()), ""}};
 }
 

@@ -1,7 +1,10 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <set>
+#include <sstream>
 
 #include "app/files/scene_rules.h"
 #include "app/files/xml_element.h"
@@ -32,13 +35,14 @@ void listTargets(XmlElement& element, const std::string& prefix, std::vector<Tar
   }
 }
 
-// So that light.intensity can be overridden where the scene leaves <light> to its defaults.
+// So that light.intensity can be overridden where the scene leaves <light> to its defaults. An element that cannot be
+// empty has none.
 void addOptionalSingles(XmlElement& element) {
   const XmlRule& rule = ruleOf(sceneRules(), element.name);
   for (const XmlRule::Child& child : rule.children) {
     const bool present = std::any_of(element.children.begin(), element.children.end(),
                                      [&](const XmlElement& e) { return e.name == child.name; });
-    if (present || child.least > 0 || child.most != 1) continue;
+    if (present || child.least > 0 || child.most != 1 || !ruleOf(sceneRules(), child.name).required.empty()) continue;
     XmlElement added;
     added.name = child.name;
     added.where = element.where;
@@ -147,6 +151,8 @@ void readDynamics(const XmlElement& dynamics, Scene& scene) {
   scene.gravity = readVector(dynamics, "gravity", scene.gravity);
   scene.ambientDrag = readNumber(dynamics, "ambient_drag", scene.ambientDrag, notNegative);
   scene.substeps = readInteger(dynamics, "substeps", scene.substeps, {0, 100000});
+  constexpr ContactMode modes[] = {ContactMode::none, ContactMode::balls, ContactMode::swept};
+  scene.contact = modes[readChoice(dynamics, "contact", {"none", "balls", "swept"}, 1)];
 }
 
 struct NamedTissue {
@@ -163,6 +169,7 @@ std::vector<NamedTissue> readTissues(const XmlElement& root) {
     t.poisson = readNumber(*e, "poisson", t.poisson, {0, 0.5, false, true});
     t.density = readNumber(*e, "density", t.density, positive);
     t.damping = readNumber(*e, "damping", t.damping, notNegative);
+    t.friction = readNumber(*e, "friction", t.friction, notNegative);
     out.push_back({readUniqueName(*e, taken), t});
   }
   return out;
@@ -221,6 +228,27 @@ LinkFactors readLinkFactors(const XmlElement& links) {
   return out;
 }
 
+// Names may stand before the body that bears them: read when all bodies are.
+void readNeighbours(const XmlElement& root, Scene& scene) {
+  std::vector<std::string> known;
+  for (const SceneBody& body : scene.bodies) known.push_back(body.name);
+  const std::vector<const XmlElement*> bodies = childrenOf(root, "body");
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    for (const XmlElement* e : childrenOf(*bodies[b], "neighbours")) {
+      std::vector<int>& out = scene.bodies[b].neighbours.emplace();
+      std::istringstream names(readText(*e, "names"));
+      for (std::string name; names >> name;) {
+        const auto found = std::find(known.begin(), known.end(), name);
+        if (found == known.end())
+          refuse(*e, "names",
+                 fmt::format("no <body> is named \"{}\"; did you mean \"{}\"?", name, nearestName(name, known)));
+        if (name == known[b]) refuse(*e, "names", "a body is no neighbour of itself");
+        out.push_back(static_cast<int>(found - known.begin()));
+      }
+    }
+  }
+}
+
 void readBodies(const XmlElement& root, Scene& scene) {
   const std::vector<NamedTissue> tissues = readTissues(root);
   std::set<std::string> taken;
@@ -239,18 +267,53 @@ void readBodies(const XmlElement& root, Scene& scene) {
     body.factors = readLinkFactors(onlyChild(*e, "links"));
     scene.bodies.push_back(std::move(body));
   }
+  readNeighbours(root, scene);
+}
+
+// An attribute that one shape alone has: refused on the others, asked for on its own if `needed`.
+void requireShape(const XmlElement& e, const std::string& attribute, bool fits, bool needed, const std::string& shape) {
+  const bool present = e.find(attribute) != nullptr;
+  if (present && !fits) refuse(e, attribute, fmt::format("only shape=\"{}\" has this attribute", shape));
+  if (!present && needed) refuse(e, "shape", fmt::format("expected the attribute \"{}\" with this shape", attribute));
+}
+
+void readShape(const XmlElement& e, StaticShape& shape) {
+  using Kind = StaticShape::Kind;
+  constexpr Kind kinds[] = {Kind::plane, Kind::box, Kind::sphere, Kind::mesh};
+  shape.kind = kinds[readChoice(e, "shape", {"plane", "box", "sphere", "mesh"}, 0)];
+  const bool plane = shape.kind == Kind::plane, box = shape.kind == Kind::box, sphere = shape.kind == Kind::sphere,
+             mesh = shape.kind == Kind::mesh;
+  requireShape(e, "normal", plane, plane, "plane");
+  requireShape(e, "size", box, box, "box");
+  requireShape(e, "radius", sphere, sphere, "sphere");
+  requireShape(e, "mesh", mesh, mesh, "mesh");
+  requireShape(e, "unit", mesh, false, "mesh");
+  if (plane && e.find("orientation")) refuse(e, "orientation", "a plane has a normal instead");
+  shape.worldFromShape = readPlacement(e);
+  if (plane) {
+    const Eigen::Vector3d normal = readVector(e, "normal", Eigen::Vector3d::UnitY());
+    if (!(normal.norm() > 0)) refuse(e, "normal", "expected a direction");
+    shape.worldFromShape.linear() =
+        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), normal).toRotationMatrix();
+  }
+  const std::vector<double> size = readNumbers(e, "size", 3, positive);
+  if (box) shape.size = {size[0], size[1], size[2]};
+  shape.radius = readNumber(e, "radius", shape.radius, positive);
+  shape.friction = readNumber(e, "friction", shape.friction, notNegative);
 }
 
 void readStatics(const XmlElement& root, Scene& scene) {
   for (const XmlElement* e : childrenOf(root, "static")) {
     SceneStatic out;
     out.line = e->line;
-    readChoice(*e, "shape", {"mesh"}, 0);
-    out.meshPath = readPath(*e, "mesh", scene.path);
+    readShape(*e, out.shape);
+    const bool mesh = out.shape.kind == StaticShape::Kind::mesh;
+    if (mesh) out.meshPath = readPath(*e, "mesh", scene.path);
+    out.contact = readChoice(*e, "contact", {"false", "true"}, mesh ? 0 : 1) == 1;
     out.look = readText(*e, "look");
+    if (out.look.empty() && !out.contact) refuse(*e, "shape", "without contact and without a look it has no effect");
     const std::vector<std::string> units = {"m", "cm", "mm", "inch"};
     out.unit = units[readChoice(*e, "unit", units, 0)];
-    out.worldFromMesh = readPlacement(*e);
     scene.statics.push_back(std::move(out));
   }
 }

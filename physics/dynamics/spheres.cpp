@@ -14,12 +14,6 @@ struct Turning {
   Lanes3 bodyMomentum;
 };
 
-Lanes3 timesInverseInertia(const SphereGroup& g, const Lanes3& l) {
-  const Lanes* i = g.inverseInertia;
-  return {fma(i[4], l.z, fma(i[3], l.y, i[0] * l.x)), fma(i[5], l.z, fma(i[1], l.y, i[3] * l.x)),
-          fma(i[2], l.z, fma(i[5], l.y, i[4] * l.x))};
-}
-
 Turning readTurning(const Spheres& s, std::size_t i) {
   Turning t;
   t.q = gather(s.orientation[i], s.orientation[i + 1], s.orientation[i + 2], s.orientation[i + 3], t.w);

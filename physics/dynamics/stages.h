@@ -3,7 +3,7 @@
 #include "physics/dynamics/world_data.h"
 
 // The stages of a substep, in their order, each one loop over arrays. Forces are evaluated at the state at the
-// substep's beginning; velocities follow, then loads from tools, then positions (semi-implicit Euler).
+// substep's beginning; velocities follow, then loads from tools and contact, then positions (semi-implicit Euler).
 namespace medulla {
 
 void evaluateLinks(WorldData&);        // link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
@@ -19,6 +19,8 @@ void driveSpheres(WorldData&, double time);
 // does not bound the step. `remaining` is the time (s) from the substep's end to the frame's. Adds N s to
 // `toolImpulse`.
 void applyLoads(WorldData&, const Loads& loads, double remaining, std::vector<Eigen::Vector3d>& toolImpulse);
+// contact_find.cpp: impulses between bodies, and on bodies from static shapes, against the velocities of this substep.
+void resolveContacts(WorldData&);
 void stepPositions(WorldData&);
 
 // All forces of the current state, left in Spheres::force, torque and Nodes::force.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "physics/dynamics/contact_stages.h"
 #include "physics/dynamics/layout.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/dynamics/stages.h"
@@ -48,6 +49,7 @@ void step(WorldData& d, const Loads& loads, double remaining, FrameReport& repor
   dragVelocities(d);
   driveSpheres(d, static_cast<double>(d.frame + 1) * d.settings.frameDuration - remaining);
   applyLoads(d, loads, remaining, report.toolImpulse);
+  resolveContacts(d);
   stepPositions(d);
 }
 
@@ -110,7 +112,8 @@ class Hash {  // FNV-1a
 
 }  // namespace
 
-World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies) {
+World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
+             const std::vector<StaticShape>& statics) {
   checkSettings(settings);
   std::vector<BodyMechanics> mechanics;
   double stable = std::numeric_limits<double>::infinity();
@@ -135,6 +138,7 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies)
   if (settings.substeps == 0)
     data_->substeps = std::max(1, static_cast<int>(std::ceil(settings.frameDuration / (kStepSafety * stable))));
   data_->substep = settings.frameDuration / data_->substeps;
+  layOutContact(*data_, statics);
 }
 
 World::~World() = default;
@@ -219,6 +223,13 @@ double World::volumeRatio(int body) const {
   return volume / r.restVolume;
 }
 
+PenetrationReport World::penetration() const {
+  return data_->contact.penetration;
+}
+const std::vector<BodyOverlap>& World::startOverlaps() const {
+  return data_->contact.startOverlaps;
+}
+
 std::uint64_t World::stateHash() const {
   const WorldData& d = *data_;
   Hash hash;
@@ -235,6 +246,10 @@ std::uint64_t World::stateHash() const {
       hash.add(d.nodes.position[i], 3);
       hash.add(d.nodes.velocity[i], 3);
     }
+  }
+  for (const CarriedImpulse& c : d.contact.carried) {
+    hash.add(std::bit_cast<double>(c.key));
+    hash.add(c.impulse, 3);
   }
   return hash.value();
 }

@@ -3,9 +3,11 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "physics/dynamics/contact.h"
 #include "physics/dynamics/frame.h"
 #include "physics/dynamics/loads.h"
 #include "physics/model/soft_body_model.h"
@@ -18,6 +20,7 @@ struct Tissue {
   double poisson = 0.45;  // 0 <= nu < 0.5
   double density = 1040;  // kg/m3, > 0
   double damping = 0.1;   // ratio to critical of the body's lowest bending mode, >= 0; 0 swings for ever
+  double friction = 0.2;  // Coulomb's, >= 0, sticking and sliding; a pair has the geometric mean of its two sides
 };
 
 // Dimensionless steering of the three ways a link deforms (paper 2.2); 1 keeps the material's value.
@@ -57,6 +60,7 @@ struct BodyDescription {
   Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
   std::vector<FixedSphere> fixed;
   std::vector<DrivenSphere> driven;
+  std::optional<std::vector<int>> neighbours;  // bodies that it may touch; absent: all that do not choose others
 };
 
 struct WorldSettings {
@@ -64,6 +68,7 @@ struct WorldSettings {
   double ambientDrag = 0;                // 1/s, >= 0: everything loses this share of its speed; 0 but under water
   double frameDuration = 0.02;           // s, one dynamics frame
   int substeps = 0;                      // per dynamics frame; 0: as many as the stability estimate asks for
+  ContactMode contact = ContactMode::none;
 };
 
 // Sums over one dynamics frame, for logs and tests.
@@ -81,7 +86,8 @@ class World {
  public:
   // Throws std::runtime_error naming the body where a description cannot be simulated (range of a tissue value, a fixed
   // sphere that does not exist, a body without spheres).
-  World(const WorldSettings& settings, std::vector<BodyDescription> bodies);
+  World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
+        const std::vector<StaticShape>& statics = {});
   ~World();
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
@@ -99,7 +105,10 @@ class World {
   void readFrame(DynamicsFrame& out) const;  // resized once and reused
   Energies energies() const;
   double volumeRatio(int body) const;  // enclosed by the nodes, over rest
-  std::uint64_t stateHash() const;     // FNV-1a over every state variable's bits
+  // What contact has let through so far; who overlapped before anything moved, each pair of bodies once, in order.
+  PenetrationReport penetration() const;
+  const std::vector<BodyOverlap>& startOverlaps() const;
+  std::uint64_t stateHash() const;  // FNV-1a over every state variable's bits
 
   WorldData& data() { return *data_; }  // for tests and benchmarks: states that no scene can reach
   const WorldData& data() const { return *data_; }

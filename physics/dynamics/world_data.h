@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "physics/dynamics/contact_data.h"
 #include "physics/dynamics/simd.h"
 #include "physics/dynamics/world.h"
 
@@ -17,6 +18,12 @@ struct SphereGroup {        // constants of four spheres
   Lanes freeToTurn;         // 1, or 0: rotation fixed
   Lanes inverseInertia[6];  // 1/(kg m2), sphere frame: xx, yy, zz, xy, xz, yz
 };
+
+inline Lanes3 timesInverseInertia(const SphereGroup& g, const Lanes3& l) {
+  const Lanes* i = g.inverseInertia;
+  return {fma(i[4], l.z, fma(i[3], l.y, i[0] * l.x)), fma(i[5], l.z, fma(i[1], l.y, i[3] * l.x)),
+          fma(i[2], l.z, fma(i[5], l.y, i[4] * l.x))};
+}
 
 struct Spheres {
   int count = 0;                         // without pads
@@ -135,6 +142,7 @@ struct WorldData {
   Nodes nodes;
   Springs springs;
   std::vector<SphereDrive> drives;
+  ContactData contact;
 
   // Force of each tool load in the current substep, tool springs first, then held nodes; sized once per frame.
   std::vector<Eigen::Vector3d> loadForces;

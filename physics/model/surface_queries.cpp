@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cstddef>
 #include <numeric>
 
 namespace medulla {
@@ -61,7 +62,7 @@ SurfaceTree makeSurfaceTree(const TriangleMesh& mesh) {
 
 // Closest point on a triangle by the Voronoi regions of its corners and edges (Ericson 2005, Real-Time Collision
 // Detection, 5.1.5).
-static Vector3d closestOnTriangle(const Vector3d& p, const std::array<Vector3d, 3>& t) {
+Vector3d closestOnTriangle(const Vector3d& p, const std::array<Vector3d, 3>& t) {
   const Vector3d ab = t[1] - t[0], ac = t[2] - t[0], ap = p - t[0];
   const double d1 = ab.dot(ap), d2 = ac.dot(ap);
   if (d1 <= 0 && d2 <= 0) return t[0];
@@ -110,6 +111,30 @@ SurfacePoint closestPoint(const SurfaceTree& tree, const Vector3d& p, double wit
     stack[size++] = leftFirst ? node.left : node.right;
   }
   return best;
+}
+
+void trianglesWithin(const SurfaceTree& tree, const Vector3d& p, double within, std::vector<TriangleDistance>& out) {
+  const std::size_t first = out.size();
+  std::array<int, stackSize> stack;
+  int size = 0;
+  stack[size++] = 0;
+  while (size > 0) {
+    const SurfaceTree::Node& node = tree.nodes[stack[--size]];
+    if (squaredDistance(node, p) >= within * within) continue;
+    if (node.left >= 0) {
+      stack[size++] = node.left;
+      stack[size++] = node.right;
+      continue;
+    }
+    for (int i = node.begin; i < node.end; ++i) {
+      const double distance = (p - closestOnTriangle(p, tree.corners[i])).norm();
+      if (distance < within) out.push_back({i, distance});
+    }
+  }
+  std::sort(out.begin() + static_cast<std::ptrdiff_t>(first), out.end(),
+            [](const TriangleDistance& a, const TriangleDistance& b) {
+              return a.distance != b.distance ? a.distance < b.distance : a.triangle < b.triangle;
+            });
 }
 
 static bool meetsBox(const SurfaceTree::Node& node, const Vector3d& origin, const Vector3d& inverse, double reach) {

@@ -33,6 +33,18 @@ struct SurfacePoint {
 SurfacePoint closestPoint(const SurfaceTree& tree, const Eigen::Vector3d& p,
                           double within = std::numeric_limits<double>::infinity());
 
+// The point of the triangle nearest to p.
+Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& corners);
+
+struct TriangleDistance {
+  int triangle = 0;     // in leaf order
+  double distance = 0;  // m
+};
+
+// Appends every triangle nearer than `within` (m) to p, the nearest first.
+void trianglesWithin(const SurfaceTree& tree, const Eigen::Vector3d& p, double within,
+                     std::vector<TriangleDistance>& out);
+
 // Parity of crossings, the majority of three skew rays: one ray may graze an edge.
 bool isInside(const SurfaceTree& tree, const Eigen::Vector3d& p);
 

@@ -1,0 +1,119 @@
+#include "physics/dynamics/broad_phase.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+
+namespace medulla {
+
+namespace {
+
+using Cell = std::array<std::int32_t, 3>;
+
+constexpr double kFarthest = 1e4;  // m
+// A box much larger than the mean would fill very many cells: the largest fills at most about this many per axis.
+constexpr double kMostCells = 16;
+
+// Edge of a cell: the mean of the boxes' longest edges. Smaller cells hold each box more often, larger ones more pairs.
+// 0 where there is nothing to sort, or a box out of bounds.
+double cellSize(const std::vector<AxisBox>& boxes) {
+  double sum = 0, largest = 0;
+  for (const AxisBox& b : boxes) {
+    double longest = 0;
+    for (int a = 0; a < 3; ++a) {
+      if (!(b.low[a] > -kFarthest && b.high[a] < kFarthest)) return 0;
+      longest = std::max(longest, b.high[a] - b.low[a]);
+    }
+    sum += longest;
+    largest = std::max(largest, longest);
+  }
+  return boxes.empty() ? 0 : std::max({sum / static_cast<double>(boxes.size()), largest / kMostCells, 1e-5});
+}
+
+struct Grid {
+  double inverse;
+  std::uint32_t mask;
+
+  Cell cellOf(const std::array<double, 3>& p) const {
+    Cell c;
+    for (int a = 0; a < 3; ++a) c[a] = static_cast<std::int32_t>(std::floor(p[a] * inverse));
+    return c;
+  }
+  std::uint32_t bucketOf(const Cell& c) const {
+    // Teschner et al. (2003); the upper bits are folded in, because strides of a power of two repeat the lower ones.
+    const std::uint32_t h = (static_cast<std::uint32_t>(c[0]) * 73856093u) ^
+                            (static_cast<std::uint32_t>(c[1]) * 19349663u) ^
+                            (static_cast<std::uint32_t>(c[2]) * 83492791u);
+    return (h ^ (h >> 15)) & mask;
+  }
+  template <class Visit>
+  void forEachCell(const AxisBox& b, const Visit& visit) const {
+    const Cell low = cellOf(b.low), high = cellOf(b.high);
+    Cell c;
+    for (c[0] = low[0]; c[0] <= high[0]; ++c[0])
+      for (c[1] = low[1]; c[1] <= high[1]; ++c[1])
+        for (c[2] = low[2]; c[2] <= high[2]; ++c[2]) visit(c);
+  }
+};
+
+// Counting sort of (cell, box) by bucket; within a bucket boxes ascend.
+Grid fillGrid(const std::vector<AxisBox>& boxes, double size, BroadPhase& phase) {
+  Grid grid{1 / size, 0};
+  std::size_t count = 0;
+  for (const AxisBox& b : boxes) {
+    const Cell low = grid.cellOf(b.low), high = grid.cellOf(b.high);
+    std::size_t cells = 1;
+    for (int a = 0; a < 3; ++a) cells *= high[a] - low[a] + 1;
+    count += cells;
+  }
+  const std::size_t buckets = std::bit_ceil(2 * count);
+  grid.mask = static_cast<std::uint32_t>(buckets - 1);
+  phase.begin.assign(buckets + 1, 0);
+  phase.entries.resize(count);
+  for (const AxisBox& b : boxes) grid.forEachCell(b, [&](const Cell& c) { ++phase.begin[grid.bucketOf(c)]; });
+  std::uint32_t end = 0;
+  for (std::uint32_t& b : phase.begin) b = end += b;
+  for (std::size_t i = boxes.size(); i-- > 0;) {
+    grid.forEachCell(boxes[i], [&](const Cell& c) {
+      phase.entries[--phase.begin[grid.bucketOf(c)]] = {static_cast<std::uint32_t>(i), c};
+    });
+  }
+  return grid;
+}
+
+// The lower corner of what two boxes share, or false where they share nothing. A pair that meets in several cells is
+// taken where this corner lies.
+bool sharedCorner(const AxisBox& a, const AxisBox& b, std::array<double, 3>& corner) {
+  for (int k = 0; k < 3; ++k) {
+    corner[k] = std::max(a.low[k], b.low[k]);
+    if (corner[k] > std::min(a.high[k], b.high[k])) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+void findOverlaps(const std::vector<AxisBox>& boxes, BroadPhase& phase) {
+  phase.pairs.clear();
+  const double size = cellSize(boxes);
+  if (size == 0) return;
+  const Grid grid = fillGrid(boxes, size, phase);
+  for (std::uint32_t i = 0; i < boxes.size(); ++i) {
+    const std::size_t first = phase.pairs.size();
+    grid.forEachCell(boxes[i], [&](const Cell& c) {
+      const std::uint32_t bucket = grid.bucketOf(c);
+      for (std::uint32_t k = phase.begin[bucket + 1]; k-- > phase.begin[bucket];) {
+        const BroadPhase::Entry& e = phase.entries[k];
+        if (e.box <= i) break;  // ascending: the rest is below i too
+        std::array<double, 3> corner;
+        if (e.cell == c && sharedCorner(boxes[i], boxes[e.box], corner) && grid.cellOf(corner) == c)
+          phase.pairs.push_back({i, e.box});
+      }
+    });
+    std::sort(phase.pairs.begin() + static_cast<std::ptrdiff_t>(first), phase.pairs.end(),
+              [](const BoxPair& a, const BoxPair& b) { return a.second < b.second; });
+  }
+}
+
+}  // namespace medulla

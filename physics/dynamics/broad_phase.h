@@ -1,0 +1,33 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+// Which boxes overlap, in time proportional to their number: a hashed uniform grid.
+namespace medulla {
+
+struct AxisBox {
+  std::array<double, 3> low, high;  // m
+};
+
+struct BoxPair {
+  std::uint32_t first, second;  // first < second
+};
+
+// Buffers, kept so that nothing is allocated once warm.
+struct BroadPhase {
+  struct Entry {
+    std::uint32_t box;
+    std::array<std::int32_t, 3> cell;
+  };
+  std::vector<Entry> entries;        // by bucket
+  std::vector<std::uint32_t> begin;  // of each bucket in `entries`, and the end of the last
+  std::vector<BoxPair> pairs;        // result: sorted by first, then second
+};
+
+// Leaves every pair of overlapping boxes in `phase.pairs`; none at all where a box reaches beyond 1e4 m or is not a
+// number: such a state is reported at the end of its frame.
+void findOverlaps(const std::vector<AxisBox>& boxes, BroadPhase& phase);
+
+}  // namespace medulla

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "physics/dynamics/broad_phase.h"
+#include "physics/dynamics/contact.h"
+#include "physics/dynamics/simd.h"
+#include "physics/model/surface_queries.h"
+
+// The arrays of contact. A collider is a round cone between the balls of two spheres, or a ball: a cone whose two ends
+// are the same. Lists of near pairs outlive many substeps (Verlet lists): they hold every pair nearer than a margin and
+// are made anew once a ball has moved half of it.
+namespace medulla {
+
+struct Collider {
+  std::uint32_t sphere0, sphere1;  // equal: a ball
+  int body;
+};
+
+struct PairGroup {  // four near pairs; the last group is filled up with pairs that are infinitely far apart
+  std::uint32_t collider0[4], collider1[4];
+  Lanes gapAtList;  // m
+};
+
+struct StaticContactShape {
+  StaticShape::Kind kind;
+  Eigen::Isometry3d worldFromShape;
+  Eigen::Vector3d halfSize;  // m, box
+  double radius = 0;         // m, sphere
+  double rootFriction = 0;   // the friction of a pair is the product of the two sides' roots
+  SurfaceTree tree;          // mesh, world frame
+};
+
+struct StaticNeighbour {
+  std::uint32_t shape, sphere;
+  double gapAtList;                // m
+  int firstTriangle, endTriangle;  // mesh: in ContactData::nearTriangles, the nearest first
+};
+
+// One point of contact: up to four spheres' velocities with weights that add up to its relative velocity, and the
+// impulse that goes back to them with the same weights. Fewer than two sides where the other is static.
+struct Contact {
+  std::uint64_t key;  // which pair: what ties it to the substep before
+  int ends = 0;
+  std::array<std::uint32_t, 4> sphere;
+  std::array<double, 4> weight;      // < 0 on the side that the normal points away from
+  Lanes lever[4];                    // m, from the sphere's frame to the point of contact, moved along with its side
+  Lanes normal, tangent0, tangent1;  // unit, into the second side; w = 0
+  double gap = 0;                    // m
+  double smallerRadius = 0;          // m, of the two in contact
+  double normalMobility = 0;         // 1/kg: velocity along the normal per impulse
+  double inverseTangent[3] = {0, 0, 0};  // kg: inverse of the mobility in the tangent plane: 00, 11, 01
+  double softness = 0;                   // 1/kg, gamma
+  double bias = 0;                       // m/s
+  double friction = 0;
+  double normalImpulse = 0, tangentImpulse0 = 0, tangentImpulse1 = 0;  // N s
+};
+
+struct CarriedImpulse {
+  std::uint64_t key;
+  Quad impulse;  // N s, world
+};
+
+// World-frame inverse inertia of a sphere, valid in a substep with contacts.
+struct WorldInertia {
+  Quad column[3];  // 1/(kg m2); zero where rotation is fixed
+};
+
+struct ContactData {
+  ContactMode mode = ContactMode::none;
+  // Constants.
+  std::vector<Quad> restBall;           // m, per sphere: the ball's centre in its sphere's frame, and its radius
+  std::vector<double> inverseCellMass;  // 1/kg, per sphere: with what its share of the surface weighs; 0: fixed
+  std::vector<Collider> colliders;
+  std::vector<std::vector<std::uint32_t>> excluded;  // per collider: later ones of its body that it never meets
+  std::vector<char> collides;                        // bodies x bodies
+  std::vector<double> rootFriction;                  // per body
+  std::vector<StaticContactShape> statics;
+  double margin = 0;  // m
+
+  // Lists, and the balls' places when they were made.
+  std::vector<Quad> ballAtList;
+  std::vector<PairGroup> pairs;
+  std::vector<StaticNeighbour> staticNeighbours;
+  std::vector<TriangleDistance> nearTriangles;  // at the time of the list
+  BroadPhase broadPhase;
+  std::vector<AxisBox> boxes;
+
+  // Of the current substep.
+  std::vector<Quad> ball;  // m, per sphere: centre in the world, and radius
+  std::vector<Contact> contacts;
+  std::vector<WorldInertia> inertia;
+
+  // State: the impulses that the last substep ended with, ascending in key; the next one starts from them.
+  std::vector<CarriedImpulse> carried;
+
+  PenetrationReport penetration;
+  std::vector<BodyOverlap> startOverlaps;
+};
+
+}  // namespace medulla

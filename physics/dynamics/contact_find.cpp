@@ -1,0 +1,88 @@
+#include <algorithm>
+#include <cmath>
+
+#include "physics/dynamics/contact_stages.h"
+
+namespace medulla {
+
+namespace {
+
+// Adds one side to a contact: the collider's ball at `along`, the point of contact `reach` from its centre along
+// `toPoint`. A cone's two spheres share by 1 - s and s; both carry the lever to their own ball's centre plus the same
+// way to the point, so that the weighted points of application are the point of contact itself and torques of both
+// sides cancel.
+void addSide(const WorldData& d, const Collider& of, double along, double sign, Lanes toPoint, double reach,
+             Contact& contact) {
+  const auto add = [&](std::uint32_t sphere, double weight) {
+    if (weight == 0) return;
+    const Lanes arm = load(d.contact.ball[sphere]) - load(d.spheres.position[sphere]);
+    const Lanes lever = fma(splat(reach), toPoint, arm);
+    contact.sphere[contact.ends] = sphere;
+    contact.weight[contact.ends] = sign * weight;
+    contact.lever[contact.ends] = _mm256_blend_pd(lever, splat(0), 8);
+    ++contact.ends;
+  };
+  add(of.sphere0, 1 - along);
+  add(of.sphere1, along);
+}
+
+struct BallAt {
+  Lanes centre;  // w is not defined
+  double radius;
+};
+
+BallAt ballAt(const ContactData& c, const Collider& of, double along) {
+  const Lanes b0 = load(c.ball[of.sphere0]), b1 = load(c.ball[of.sphere1]);
+  const Lanes b = fma(splat(along), b1 - b0, b0);
+  return {b, b[3]};
+}
+
+void addContact(WorldData& d, std::uint32_t i, std::uint32_t j, double s, double t) {
+  ContactData& c = d.contact;
+  const Collider &a = c.colliders[i], &b = c.colliders[j];
+  const BallAt p = ballAt(c, a, s), q = ballAt(c, b, t);
+  const Lanes way = _mm256_blend_pd(q.centre - p.centre, splat(0), 8);
+  const double distance = std::sqrt(dotProduct(way, way));
+  Contact& contact = c.contacts.emplace_back();
+  contact.key = std::uint64_t{i} << 32 | j;
+  contact.gap = distance - p.radius - q.radius;
+  contact.smallerRadius = std::min(p.radius, q.radius);
+  // Two centres in one point know no direction: any will part them.
+  contact.normal = distance > 1e-12 ? way / splat(distance) : Lanes{0, 1, 0, 0};
+  contact.friction = c.rootFriction[a.body] * c.rootFriction[b.body];
+  addSide(d, a, s, -1, contact.normal, p.radius + 0.5 * contact.gap, contact);
+  addSide(d, b, t, 1, contact.normal, -(q.radius + 0.5 * contact.gap), contact);
+}
+
+}  // namespace
+
+void findPairContacts(WorldData& d, double moved) {
+  ContactData& c = d.contact;
+  const double reach = kFastest * d.substep;
+  const Lanes farAtList = splat(reach + 2 * moved), near = splat(reach);
+  for (const PairGroup& g : c.pairs) {
+    const Lanes perhaps = isLess(g.gapAtList, farAtList);
+    if (!any(perhaps)) continue;
+    const ConeContact closest = closestOfPairs(c, g);
+    const int hits = _mm256_movemask_pd(_mm256_and_pd(perhaps, isLess(closest.gap, near)));
+    for (int k = 0; k < 4; ++k)
+      if (hits >> k & 1) addContact(d, g.collider0[k], g.collider1[k], closest.s[k], closest.t[k]);
+  }
+}
+
+void resolveContacts(WorldData& d) {
+  ContactData& c = d.contact;
+  if (c.mode == ContactMode::none) return;
+  placeBalls(d);
+  double moved = farthestMove(c);
+  if (!(2 * moved <= c.margin)) {
+    listNeighbours(d);
+    moved = 0;
+  }
+  c.contacts.clear();
+  findPairContacts(d, moved);
+  findStaticContacts(d, moved);
+  solveContacts(d);
+}
+
+}  // namespace medulla

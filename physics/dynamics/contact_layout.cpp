@@ -1,0 +1,178 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "physics/dynamics/contact_stages.h"
+
+namespace medulla {
+
+namespace {
+
+using Eigen::Vector3d;
+
+// Lists are made anew when a ball has moved half of this: a wider margin makes lists longer, a narrower one more often.
+constexpr double kMarginOverRadius = 0.3;  // of the mean radius
+
+// Balls and cones of one body that overlap at rest never meet; neither do those that all but touch, which the first
+// bending would bring together: this share of the smaller radius apart, or less.
+constexpr double kTouchingAtRest = 0.1;
+
+void addBalls(WorldData& d) {
+  ContactData& c = d.contact;
+  c.restBall.resize(d.spheres.position.size());
+  c.inverseCellMass.resize(d.spheres.position.size(), 0);
+  double sum = 0;
+  for (std::size_t b = 0; b < d.bodies.size(); ++b) {
+    const BodyDescription& body = d.bodies[b];
+    for (int i = 0; i < d.ranges[b].sphereCount; ++i) {
+      const FillingSphere& s = body.model->spheres[i];
+      const int k = d.ranges[b].firstSphere + i;
+      c.restBall[k] = quadOf(s.restBallCentre - s.restFrame);
+      c.restBall[k].v[3] = s.radius;
+      if (d.spheres.groups[k / 4].inverseMass[k % 4] > 0) c.inverseCellMass[k] = 1 / (body.tissue.density * s.volume);
+      sum += s.radius;
+    }
+  }
+  c.margin = kMarginOverRadius * sum / std::max(1, d.spheres.count);
+  c.ball = c.restBall;
+  c.inertia.resize(d.spheres.position.size());
+}
+
+void addColliders(WorldData& d) {
+  ContactData& c = d.contact;
+  for (std::size_t b = 0; b < d.bodies.size(); ++b) {
+    const SoftBodyModel& m = *d.bodies[b].model;
+    const auto first = static_cast<std::uint32_t>(d.ranges[b].firstSphere);
+    std::vector<bool> linked(m.spheres.size(), false);
+    if (c.mode == ContactMode::swept) {
+      for (const ElasticLink& l : m.links) {
+        c.colliders.push_back({first + l.sphere0, first + l.sphere1, static_cast<int>(b)});
+        linked[l.sphere0] = linked[l.sphere1] = true;
+      }
+    }
+    for (std::uint32_t i = 0; i < m.spheres.size(); ++i)
+      if (!linked[i]) c.colliders.push_back({first + i, first + i, static_cast<int>(b)});
+  }
+  c.excluded.resize(c.colliders.size());
+  c.boxes.resize(c.colliders.size());
+}
+
+// Two bodies meet if one of them names the other, or if neither names anybody.
+void decideWhoCollides(WorldData& d) {
+  const int count = static_cast<int>(d.bodies.size());
+  const auto names = [&](int a, int b) {
+    const std::vector<int>& n = *d.bodies[a].neighbours;
+    return std::find(n.begin(), n.end(), b) != n.end();
+  };
+  d.contact.collides.resize(static_cast<std::size_t>(count) * count);
+  for (int a = 0; a < count; ++a) {
+    const auto& own = d.bodies[a].neighbours;
+    for (const int n : own.value_or(std::vector<int>()))
+      if (n < 0 || n >= count)
+        throw std::runtime_error(
+            fmt::format("body '{}' has neighbour {}: expected 0 to {}", d.bodies[a].name, n, count - 1));
+    for (int b = 0; b < count; ++b) {
+      const auto& others = d.bodies[b].neighbours;
+      const bool named = (own && names(a, b)) || (others && names(b, a));
+      d.contact.collides[static_cast<std::size_t>(a) * count + b] = a == b || named || (!own && !others);
+    }
+    const double friction = d.bodies[a].tissue.friction;
+    if (!(friction >= 0 && std::isfinite(friction)))
+      throw std::runtime_error(
+          fmt::format("the friction of body '{}' is {}: expected 0 or more", d.bodies[a].name, friction));
+    d.contact.rootFriction.push_back(std::sqrt(friction));
+  }
+}
+
+void addStatics(ContactData& c, const std::vector<StaticShape>& statics) {
+  for (const StaticShape& s : statics) {
+    const bool sizes = s.kind != StaticShape::Kind::box || s.size.minCoeff() > 0;
+    if (!sizes || (s.kind == StaticShape::Kind::sphere && !(s.radius > 0)))
+      throw std::runtime_error("a static shape has no size: expected more than 0 m");
+    if (!(s.friction >= 0 && std::isfinite(s.friction)))
+      throw std::runtime_error(fmt::format("the friction of a static shape is {}: expected 0 or more", s.friction));
+    StaticContactShape& out = c.statics.emplace_back();
+    out.kind = s.kind;
+    out.worldFromShape = s.worldFromShape;
+    out.halfSize = 0.5 * s.size;
+    out.radius = s.radius;
+    out.rootFriction = std::sqrt(s.friction);
+    if (s.kind != StaticShape::Kind::mesh) continue;
+    if (s.mesh.triangles.empty()) throw std::runtime_error("a static mesh has no triangles");
+    TriangleMesh inWorld = s.mesh;
+    for (Vector3d& v : inWorld.vertices) v = s.worldFromShape * v;
+    out.tree = makeSurfaceTree(inWorld);
+  }
+}
+
+template <class Visit>
+void forEachPair(const ContactData& c, const Visit& visit) {
+  for (const PairGroup& g : c.pairs) {
+    const ConeContact closest = closestOfPairs(c, g);
+    for (int k = 0; k < 4; ++k) {
+      if (!std::isfinite(g.gapAtList[k])) continue;
+      const auto radius = [&](const Collider& of, double along) {
+        return (1 - along) * c.ball[of.sphere0].v[3] + along * c.ball[of.sphere1].v[3];
+      };
+      const double smaller = std::min(radius(c.colliders[g.collider0[k]], closest.s[k]),
+                                      radius(c.colliders[g.collider1[k]], closest.t[k]));
+      visit(g.collider0[k], g.collider1[k], closest.gap[k], smaller);
+    }
+  }
+}
+
+void excludeWhatOverlapsAtRest(WorldData& d) {
+  ContactData& c = d.contact;
+  if (c.mode == ContactMode::balls) {
+    for (std::size_t b = 0; b < d.bodies.size(); ++b) {
+      for (const ElasticLink& l : d.bodies[b].model->links)
+        c.excluded[d.ranges[b].firstSphere + std::min(l.sphere0, l.sphere1)].push_back(
+            static_cast<std::uint32_t>(d.ranges[b].firstSphere + std::max(l.sphere0, l.sphere1)));
+    }
+  }
+  forEachPair(c, [&](std::uint32_t i, std::uint32_t j, double gap, double smaller) {
+    if (c.colliders[i].body == c.colliders[j].body && gap < kTouchingAtRest * smaller) c.excluded[i].push_back(j);
+  });
+  for (std::vector<std::uint32_t>& e : c.excluded) {
+    std::sort(e.begin(), e.end());
+    e.erase(std::unique(e.begin(), e.end()), e.end());
+  }
+}
+
+void noteStartOverlaps(ContactData& c) {
+  forEachPair(c, [&](std::uint32_t i, std::uint32_t j, double gap, double) {
+    const int b0 = c.colliders[i].body, b1 = c.colliders[j].body;
+    if (!(gap < 0) || b0 == b1) return;
+    const auto same = [&](const BodyOverlap& o) { return o.body0 == b0 && o.body1 == b1; };
+    const auto found = std::find_if(c.startOverlaps.begin(), c.startOverlaps.end(), same);
+    if (found == c.startOverlaps.end()) {
+      c.startOverlaps.push_back({b0, b1, -gap});
+    } else {
+      found->depth = std::max(found->depth, -gap);
+    }
+  });
+  std::sort(c.startOverlaps.begin(), c.startOverlaps.end(), [](const BodyOverlap& a, const BodyOverlap& b) {
+    return a.body0 != b.body0 ? a.body0 < b.body0 : a.body1 < b.body1;
+  });
+}
+
+}  // namespace
+
+void layOutContact(WorldData& d, const std::vector<StaticShape>& statics) {
+  ContactData& c = d.contact;
+  c.mode = d.settings.contact;
+  if (c.mode == ContactMode::none) return;
+  decideWhoCollides(d);
+  addStatics(c, statics);
+  addBalls(d);
+  addColliders(d);
+  placeBalls(d);
+  listNeighbours(d);
+  excludeWhatOverlapsAtRest(d);
+  listNeighbours(d);
+  noteStartOverlaps(c);
+}
+
+}  // namespace medulla

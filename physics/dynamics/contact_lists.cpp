@@ -1,0 +1,128 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "physics/dynamics/contact_stages.h"
+
+namespace medulla {
+
+void placeBalls(WorldData& d) {
+  const Spheres& s = d.spheres;
+  ContactData& c = d.contact;
+  for (std::size_t i = 0; i < s.position.size(); i += 4) {
+    Lanes w, radius;
+    const Lanes3 q = gather(s.orientation[i], s.orientation[i + 1], s.orientation[i + 2], s.orientation[i + 3], w);
+    const Lanes3 rest = gather(c.restBall[i], c.restBall[i + 1], c.restBall[i + 2], c.restBall[i + 3], radius);
+    const Lanes3 frame = gather(s.position[i], s.position[i + 1], s.position[i + 2], s.position[i + 3]);
+    Lanes3 centre = frame + rotate(rotationOf(q, w), rest);
+    transpose(centre.x, centre.y, centre.z, radius);
+    store(c.ball[i], centre.x);
+    store(c.ball[i + 1], centre.y);
+    store(c.ball[i + 2], centre.z);
+    store(c.ball[i + 3], radius);
+  }
+}
+
+double farthestMove(const ContactData& c) {
+  Lanes largest = splat(0);
+  for (std::size_t i = 0; i < c.ball.size(); i += 4) {
+    Lanes move[4];
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Lanes change = load(c.ball[i + k]) - load(c.ballAtList[i + k]);
+      move[k] = change * change;
+    }
+    largest = larger(largest, dotOfFour(move[0], move[1], move[2], move[3]));
+  }
+  return std::sqrt(std::max(std::max(largest[0], largest[1]), std::max(largest[2], largest[3])));
+}
+
+static void placeBoxes(ContactData& c) {
+  for (std::size_t i = 0; i < c.colliders.size(); ++i) {
+    const Quad &b0 = c.ball[c.colliders[i].sphere0], &b1 = c.ball[c.colliders[i].sphere1];
+    for (int a = 0; a < 3; ++a) {
+      c.boxes[i].low[a] = std::min(b0.v[a] - b0.v[3], b1.v[a] - b1.v[3]) - 0.5 * c.margin;
+      c.boxes[i].high[a] = std::max(b0.v[a] + b0.v[3], b1.v[a] + b1.v[3]) + 0.5 * c.margin;
+    }
+  }
+}
+
+ConeContact closestOfPairs(const ContactData& c, const PairGroup& g) {
+  const auto ends = [&](const std::uint32_t* k, std::uint32_t Collider::*end) {
+    return gatherBalls(c.ball.data(), c.colliders[k[0]].*end, c.colliders[k[1]].*end, c.colliders[k[2]].*end,
+                       c.colliders[k[3]].*end);
+  };
+  if (c.mode == ContactMode::balls) {  // collider i is sphere i
+    const auto balls = [&](const std::uint32_t* k) { return gatherBalls(c.ball.data(), k[0], k[1], k[2], k[3]); };
+    return {splat(0), splat(0), gapOfBalls(balls(g.collider0), balls(g.collider1))};
+  }
+  return closestOnCones(ends(g.collider0, &Collider::sphere0), ends(g.collider0, &Collider::sphere1),
+                        ends(g.collider1, &Collider::sphere0), ends(g.collider1, &Collider::sphere1));
+}
+
+namespace {
+
+class PairList {  // fills groups of four
+ public:
+  explicit PairList(std::vector<PairGroup>& groups) : groups_(groups) { groups_.clear(); }
+  void add(std::uint32_t i, std::uint32_t j, double gap) {
+    if (count_ % 4 == 0)
+      groups_.push_back({{i, i, i, i}, {j, j, j, j}, splat(std::numeric_limits<double>::infinity())});
+    PairGroup& g = groups_.back();
+    g.collider0[count_ % 4] = i;
+    g.collider1[count_ % 4] = j;
+    g.gapAtList[count_ % 4] = gap;
+    ++count_;
+  }
+
+ private:
+  std::vector<PairGroup>& groups_;
+  int count_ = 0;
+};
+
+}  // namespace
+
+// Pairs of overlapping boxes that may meet, in place; both lists ascend, so that exclusion is one walk.
+static void dropPairsThatNeverMeet(ContactData& c, std::vector<BoxPair>& pairs) {
+  const std::size_t bodies = c.rootFriction.size();
+  std::size_t kept = 0, e = 0;
+  std::uint32_t current = 0;
+  for (const BoxPair& p : pairs) {
+    const Collider &a = c.colliders[p.first], &b = c.colliders[p.second];
+    if (p.first != current) e = 0;
+    current = p.first;
+    if (a.body == b.body) {
+      const std::vector<std::uint32_t>& excluded = c.excluded[p.first];
+      while (e < excluded.size() && excluded[e] < p.second) ++e;
+      if (e < excluded.size() && excluded[e] == p.second) continue;
+    } else if (!c.collides[a.body * bodies + b.body]) {
+      continue;
+    }
+    pairs[kept++] = p;
+  }
+  pairs.resize(kept);
+}
+
+void listNeighbours(WorldData& d) {
+  ContactData& c = d.contact;
+  c.ballAtList = c.ball;
+  placeBoxes(c);
+  findOverlaps(c.boxes, c.broadPhase);
+  std::vector<BoxPair>& pairs = c.broadPhase.pairs;
+  dropPairsThatNeverMeet(c, pairs);
+  PairList list(c.pairs);
+  for (std::size_t k = 0; k < pairs.size(); k += 4) {
+    PairGroup g{};
+    const std::size_t count = std::min<std::size_t>(4, pairs.size() - k);
+    for (std::size_t l = 0; l < 4; ++l) {
+      const BoxPair& p = pairs[k + std::min(l, count - 1)];
+      g.collider0[l] = p.first;
+      g.collider1[l] = p.second;
+    }
+    const Lanes gap = closestOfPairs(c, g).gap;
+    for (std::size_t l = 0; l < count; ++l)
+      if (gap[l] <= c.margin) list.add(g.collider0[l], g.collider1[l], gap[l]);
+  }
+  listStaticNeighbours(c);
+}
+
+}  // namespace medulla

@@ -1,0 +1,235 @@
+#include <algorithm>
+#include <cmath>
+
+#include "physics/dynamics/contact_stages.h"
+
+// The impulses of contact: damped elastic springs taken implicitly, one after another in a fixed order (sequential
+// impulses; Catto, "Soft constraints", GDC 2011), so that their stiffness does not bound the step. With mass m, omega
+// and zeta, a spring k = m omega^2, c = 2 zeta omega m on the gap g obeys at the substep's end
+//   lambda / h = -k (g + h v) - c v   <=>   v + beta g + gamma lambda = 0,
+//   beta = omega / (2 zeta + h omega),  gamma = 1 / (h m omega (2 zeta + h omega)),
+// and lambda >= 0, because contact never pulls.
+namespace medulla {
+
+namespace {
+
+// As stiff as the substep resolves: a quarter of a period is one substep. What rests on a contact sinks in by
+// acceleration / omega^2, micrometres.
+constexpr double kOmegaTimesStep = 1.5707963267948966;
+// Critical. Restitution comes out as 0.05: tissue does not bounce off tissue.
+constexpr double kDampingRatio = 1;
+// m/s: bodies that overlap at the start part no faster than this.
+constexpr double kPushOutSpeed = 0.2;
+
+constexpr double kBetaTimesStep = kOmegaTimesStep / (2 * kDampingRatio + kOmegaTimesStep);
+constexpr double kGammaTimesMass = 1 / (kOmegaTimesStep * (2 * kDampingRatio + kOmegaTimesStep));
+
+// Impulses start from those of the substep before and are passed over until the last pass changed them by little; what
+// is left is taken up in the next substep.
+constexpr int kPasses = 4;
+constexpr double kSettled = 1e-3;  // of the largest impulse
+
+// Inverse inertia in the world and angular velocity of all spheres, at the momenta of this substep.
+void prepareSpheres(WorldData& d) {
+  Spheres& s = d.spheres;
+  const Lanes zero = splat(0);
+  for (std::size_t g = 0; g < s.groups.size(); ++g) {
+    const SphereGroup& group = s.groups[g];
+    const std::size_t i = 4 * g;
+    Lanes w;
+    const Lanes3 q = gather(s.orientation[i], s.orientation[i + 1], s.orientation[i + 2], s.orientation[i + 3], w);
+    const Rotation r = rotationOf(q, w);
+    const Lanes3 unit[3] = {{r.x.x, r.y.x, r.z.x}, {r.x.y, r.y.y, r.z.y}, {r.x.z, r.y.z, r.z.z}};
+    const Lanes3 momentum =
+        gather(s.angularMomentum[i], s.angularMomentum[i + 1], s.angularMomentum[i + 2], s.angularMomentum[i + 3]);
+    Lanes3 omega = rotate(r, timesInverseInertia(group, rotateBack(r, momentum)));
+    Lanes fourth = zero;
+    transpose(omega.x, omega.y, omega.z, fourth);
+    store(s.angularVelocity[i], omega.x);
+    store(s.angularVelocity[i + 1], omega.y);
+    store(s.angularVelocity[i + 2], omega.z);
+    store(s.angularVelocity[i + 3], fourth);
+    for (int k = 0; k < 3; ++k) {
+      Lanes3 column = group.freeToTurn * rotate(r, timesInverseInertia(group, unit[k]));
+      fourth = zero;
+      transpose(column.x, column.y, column.z, fourth);
+      store(d.contact.inertia[i].column[k], column.x);
+      store(d.contact.inertia[i + 1].column[k], column.y);
+      store(d.contact.inertia[i + 2].column[k], column.z);
+      store(d.contact.inertia[i + 3].column[k], fourth);
+    }
+  }
+}
+
+MEDULLA_INLINE Lanes timesInertia(const WorldInertia& inertia, Lanes a) {
+  return fma(load(inertia.column[2]), splatLane<2>(a),
+             fma(load(inertia.column[1]), splatLane<1>(a), load(inertia.column[0]) * splatLane<0>(a)));
+}
+
+MEDULLA_INLINE Lanes relativeVelocity(const WorldData& d, const Contact& c) {
+  Lanes v = splat(0);
+  for (int e = 0; e < c.ends; ++e) {
+    const std::uint32_t i = c.sphere[e];
+    const Lanes ofEnd = load(d.spheres.velocity[i]) + crossProduct(load(d.spheres.angularVelocity[i]), c.lever[e]);
+    v = fma(splat(c.weight[e]), ofEnd, v);
+  }
+  return v;
+}
+
+MEDULLA_INLINE void apply(WorldData& d, const Contact& c, Lanes impulse) {
+  for (int e = 0; e < c.ends; ++e) {
+    const std::uint32_t i = c.sphere[e];
+    const SphereGroup& g = d.spheres.groups[i / 4];
+    const Lanes share = splat(c.weight[e]) * impulse, twist = crossProduct(c.lever[e], share);
+    Quad &v = d.spheres.velocity[i], &l = d.spheres.angularMomentum[i], &omega = d.spheres.angularVelocity[i];
+    store(v, fma(splat(g.inverseMass[i % 4]), share, load(v)));
+    store(l, fma(splat(g.freeToTurn[i % 4]), twist, load(l)));
+    store(omega, load(omega) + timesInertia(d.contact.inertia[i], twist));
+  }
+}
+
+// Velocity along `b` per impulse along `a`.
+double mobility(const WorldData& d, const Contact& c, Lanes a, Lanes b) {
+  double sum = 0;
+  for (int e = 0; e < c.ends; ++e) {
+    const std::uint32_t i = c.sphere[e];
+    const double turning =
+        dotProduct(crossProduct(c.lever[e], b), timesInertia(d.contact.inertia[i], crossProduct(c.lever[e], a)));
+    sum += c.weight[e] * c.weight[e] * (d.spheres.groups[i / 4].inverseMass[i % 4] * dotProduct(a, b) + turning);
+  }
+  return sum;
+}
+
+// Two directions across the normal: the coordinate axis least along it, and what completes the frame.
+void chooseTangents(Contact& c) {
+  const Lanes size = magnitude(c.normal);
+  const int axis = size[0] <= size[1] && size[0] <= size[2] ? 0 : size[1] <= size[2] ? 1 : 2;
+  Lanes unit = splat(0);
+  unit[axis] = 1;
+  const Lanes across = crossProduct(c.normal, unit);
+  c.tangent0 = across / splat(std::sqrt(dotProduct(across, across)));
+  c.tangent1 = crossProduct(c.normal, c.tangent0);
+}
+
+// False where nothing can move, or where the two part or are too slow to meet within the substep.
+bool prepare(const WorldData& d, Contact& c) {
+  c.normalMobility = mobility(d, c, c.normal, c.normal);
+  if (!(c.normalMobility > 0)) return false;
+  const double h = d.substep;
+  if (c.gap > 0) {  // until they touch: they may come as close as the gap allows
+    if (c.gap + h * dotProduct(relativeVelocity(d, c), c.normal) > 0) return false;
+    c.bias = c.gap / h;
+  } else {
+    // The spring's mass is that of whole cells. On a full surface most of it sits in nodes that hang elastically on the
+    // spheres: the spheres' own would make contacts ten times softer, and what lies on them is the whole.
+    double inverseCells = 0;
+    for (int e = 0; e < c.ends; ++e) inverseCells += c.weight[e] * c.weight[e] * d.contact.inverseCellMass[c.sphere[e]];
+    c.softness = kGammaTimesMass * inverseCells;
+    c.bias = std::max(kBetaTimesStep / h * c.gap, -kPushOutSpeed);
+  }
+  chooseTangents(c);
+  if (c.friction == 0) return true;
+  const double k00 = mobility(d, c, c.tangent0, c.tangent0), k11 = mobility(d, c, c.tangent1, c.tangent1),
+               k01 = mobility(d, c, c.tangent0, c.tangent1), determinant = k00 * k11 - k01 * k01;
+  if (!(determinant > 0)) {
+    c.friction = 0;
+    return true;
+  }
+  c.inverseTangent[0] = k11 / determinant;
+  c.inverseTangent[1] = k00 / determinant;
+  c.inverseTangent[2] = -k01 / determinant;
+  return true;
+}
+
+void limitFriction(Contact& c) {
+  const double most = c.friction * c.normalImpulse;
+  const double squared = c.tangentImpulse0 * c.tangentImpulse0 + c.tangentImpulse1 * c.tangentImpulse1;
+  if (squared <= most * most) return;
+  const double scale = most / std::sqrt(squared);
+  c.tangentImpulse0 *= scale;
+  c.tangentImpulse1 *= scale;
+}
+
+Lanes impulseOf(const Contact& c) {
+  return fma(splat(c.normalImpulse), c.normal,
+             fma(splat(c.tangentImpulse0), c.tangent0, splat(c.tangentImpulse1) * c.tangent1));
+}
+
+// The impulse of the substep before, along the directions of now. Both lists ascend in key.
+void startFrom(WorldData& d, const std::vector<CarriedImpulse>& carried) {
+  std::size_t k = 0;
+  for (Contact& c : d.contact.contacts) {
+    while (k < carried.size() && carried[k].key < c.key) ++k;
+    if (k == carried.size() || carried[k].key != c.key) continue;
+    const Lanes impulse = load(carried[k].impulse);
+    c.normalImpulse = std::max(0.0, dotProduct(impulse, c.normal));
+    if (c.friction > 0) {
+      c.tangentImpulse0 = dotProduct(impulse, c.tangent0);
+      c.tangentImpulse1 = dotProduct(impulse, c.tangent1);
+      limitFriction(c);
+    }
+    apply(d, c, impulseOf(c));
+  }
+}
+
+// Returns the size of the change, N s.
+double settleNormal(WorldData& d, Contact& c) {
+  const double v = dotProduct(relativeVelocity(d, c), c.normal);
+  const double wanted = c.normalImpulse - (v + c.bias + c.softness * c.normalImpulse) / (c.normalMobility + c.softness);
+  const double next = std::max(0.0, wanted), change = next - c.normalImpulse;
+  c.normalImpulse = next;
+  if (change != 0) apply(d, c, splat(change) * c.normal);
+  return std::abs(change);
+}
+
+// Coulomb: what it takes to stop the sliding, as long as that is no more than friction times the normal impulse.
+double settleFriction(WorldData& d, Contact& c) {
+  const Lanes v = relativeVelocity(d, c);
+  const double v0 = dotProduct(v, c.tangent0), v1 = dotProduct(v, c.tangent1);
+  const double before0 = c.tangentImpulse0, before1 = c.tangentImpulse1;
+  c.tangentImpulse0 -= c.inverseTangent[0] * v0 + c.inverseTangent[2] * v1;
+  c.tangentImpulse1 -= c.inverseTangent[2] * v0 + c.inverseTangent[1] * v1;
+  limitFriction(c);
+  const double change0 = c.tangentImpulse0 - before0, change1 = c.tangentImpulse1 - before1;
+  if (change0 != 0 || change1 != 0) apply(d, c, fma(splat(change0), c.tangent0, splat(change1) * c.tangent1));
+  return std::abs(change0) + std::abs(change1);
+}
+
+void report(ContactData& c) {
+  for (const Contact& contact : c.contacts) {
+    double& largest = contact.key >> 63 ? c.penetration.statics : c.penetration.bodies;
+    largest = std::max(largest, -100 * contact.gap / contact.smallerRadius);
+  }
+}
+
+}  // namespace
+
+void solveContacts(WorldData& d) {
+  ContactData& c = d.contact;
+  if (c.contacts.empty()) {
+    c.carried.clear();
+    return;
+  }
+  prepareSpheres(d);
+  std::erase_if(c.contacts, [&](Contact& contact) { return !prepare(d, contact); });
+  report(c);
+  startFrom(d, c.carried);
+  for (int pass = 0; pass < kPasses; ++pass) {
+    double change = 0, largest = 0;
+    for (Contact& contact : c.contacts) {
+      change = std::max(change, settleNormal(d, contact));
+      if (contact.friction > 0) change = std::max(change, settleFriction(d, contact));
+      largest = std::max(largest, contact.normalImpulse);
+    }
+    if (!(change > kSettled * largest)) break;
+  }
+  c.carried.clear();
+  for (const Contact& contact : c.contacts) {
+    if (!(contact.normalImpulse > 0)) continue;
+    CarriedImpulse& kept = c.carried.emplace_back();
+    kept.key = contact.key;
+    store(kept.impulse, impulseOf(contact));
+  }
+}
+
+}  // namespace medulla

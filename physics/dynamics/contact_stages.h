@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "physics/dynamics/contact_geometry.h"
+#include "physics/dynamics/world_data.h"
+
+// The parts of contact, in the order in which a substep runs them; stages.h calls them through resolveContacts().
+namespace medulla {
+
+// contact_layout.cpp: colliders, exclusions and static shapes from d.bodies, d.settings.contact and `statics`, and who
+// overlaps at the start. Throws std::runtime_error where a shape or a neighbour is out of range.
+void layOutContact(WorldData& d, const std::vector<StaticShape>& statics);
+
+// contact_lists.cpp
+void placeBalls(WorldData& d);              // ContactData::ball at the current state
+double farthestMove(const ContactData& c);  // m, of any ball since the lists were made
+void listNeighbours(WorldData& d);          // both lists anew, at ContactData::ball
+void listStaticNeighbours(ContactData& c);  // contact_static.cpp: the part of it that concerns static shapes
+
+// Appends a contact for every pair that overlaps or might before the substep's end; ascending in key. `moved` is
+// farthestMove() or more.
+void findPairContacts(WorldData& d, double moved);    // contact_find.cpp
+void findStaticContacts(WorldData& d, double moved);  // contact_static.cpp
+
+void solveContacts(WorldData& d);  // contact_solve.cpp: impulses on spheres
+
+// Gaps of a group's four pairs, at ContactData::ball; s and t are 0 on balls.
+ConeContact closestOfPairs(const ContactData& c, const PairGroup& g);
+
+// How far apart two things may be to be looked at: what closes within one substep at this speed (m/s).
+constexpr double kFastest = 2;
+
+}  // namespace medulla

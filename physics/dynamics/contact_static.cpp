@@ -1,0 +1,180 @@
+#include <algorithm>
+#include <cmath>
+
+#include "physics/dynamics/contact_stages.h"
+
+// Balls against shapes that do not move.
+namespace medulla {
+
+namespace {
+
+using Eigen::Vector3d;
+
+struct Nearest {
+  double distance;  // m, of the ball's centre from the surface; < 0 behind it
+  Vector3d normal;  // unit, world, away from the shape
+};
+
+Nearest nearestOnPlane(const StaticContactShape& s, const Vector3d& p) {
+  const Vector3d normal = s.worldFromShape.linear().col(1);
+  return {normal.dot(p - s.worldFromShape.translation()), normal};
+}
+
+Nearest nearestOnSphere(const StaticContactShape& s, const Vector3d& p) {
+  const Vector3d way = p - s.worldFromShape.translation();
+  const double length = way.norm();
+  return {length - s.radius, length > 1e-12 ? Vector3d(way / length) : Vector3d::UnitY()};
+}
+
+Nearest nearestOnBox(const StaticContactShape& s, const Vector3d& p) {
+  const Vector3d local = s.worldFromShape.linear().transpose() * (p - s.worldFromShape.translation());
+  const Vector3d beyond = local.cwiseAbs() - s.halfSize, outside = beyond.cwiseMax(0);
+  const Vector3d sign = local.unaryExpr([](double x) { return x < 0 ? -1.0 : 1.0; });
+  const double distance = outside.norm();
+  if (distance > 0) return {distance, s.worldFromShape.linear() * (outside.cwiseProduct(sign) / distance)};
+  int axis = 0;
+  const double depth = beyond.maxCoeff(&axis);
+  return {depth, s.worldFromShape.linear().col(axis) * sign[axis]};
+}
+
+Nearest nearestOn(const StaticContactShape& s, const Vector3d& p) {
+  if (s.kind == StaticShape::Kind::plane) return nearestOnPlane(s, p);
+  return s.kind == StaticShape::Kind::sphere ? nearestOnSphere(s, p) : nearestOnBox(s, p);
+}
+
+// What a ball touches of a mesh: the nearest point, and faces that it rests on beside it. Without those a ball in a
+// groove would be handed from one side to the other and sink a little each time.
+struct Touches {
+  static constexpr int kMost = 4;
+  // Faces that lie nearly the same way are one: the next nearest takes over smoothly.
+  static constexpr double kSameDirection = 0.9;
+  int count = 0;
+  Nearest at[kMost];
+
+  void add(const Nearest& n) {
+    for (int k = 0; k < count; ++k)
+      if (at[k].normal.dot(n.normal) > kSameDirection) return;
+    if (count < kMost) at[count++] = n;
+  }
+};
+
+struct Foot {
+  double distance = std::numeric_limits<double>::infinity();
+  double height = 0;  // over the triangle's plane
+  Vector3d point, faceNormal;
+};
+
+Foot footOn(const SurfaceTree& tree, int triangle, const Vector3d& p) {
+  const std::array<Vector3d, 3>& t = tree.corners[triangle];
+  Foot f;
+  f.point = closestOnTriangle(p, t);
+  f.distance = (p - f.point).norm();
+  const Vector3d across = (t[1] - t[0]).cross(t[2] - t[0]);
+  const double area = across.norm();
+  f.faceNormal = area > 0 ? Vector3d(across / area) : Vector3d::Zero();
+  f.height = f.faceNormal.dot(p - f.point);
+  return f;
+}
+
+// The nearest point's side of the surface is that of the triangle which sees it most squarely: of several triangles
+// that share an edge or corner nearest to p, the others may have p behind their plane.
+bool isNearer(const Foot& a, const Foot& b) {
+  constexpr double kSame = 1e-9;
+  if (a.distance < b.distance * (1 - kSame)) return true;
+  return a.distance <= b.distance * (1 + kSame) && std::abs(a.height) > std::abs(b.height);
+}
+
+Nearest contactAt(const Foot& f, const Vector3d& p) {
+  const double side = f.height < 0 ? -1 : 1;
+  if (f.distance < 1e-12) return {0, f.faceNormal};
+  return {side * f.distance, side / f.distance * (p - f.point)};
+}
+
+// Triangles come with their distance of some time ago; meanwhile the ball has moved by at most `moved`.
+Touches touchesOf(const SurfaceTree& tree, const TriangleDistance* begin, const TriangleDistance* end,
+                  const Vector3d& p, double within, double moved) {
+  Foot nearest;
+  for (const TriangleDistance* t = begin; t != end; ++t) {
+    if (t->distance - moved > std::min(within, nearest.distance)) break;
+    const Foot f = footOn(tree, t->triangle, p);
+    if (isNearer(f, nearest)) nearest = f;
+  }
+  Touches touches;
+  if (!(nearest.distance < within)) return touches;
+  touches.add(contactAt(nearest, p));
+  for (const TriangleDistance* t = begin; t != end && t->distance - moved < within; ++t) {
+    const Foot f = footOn(tree, t->triangle, p);
+    if (f.distance < within && f.height > (1 - 1e-9) * f.distance) touches.add(contactAt(f, p));
+  }
+  return touches;
+}
+
+void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int ordinal) {
+  ContactData& c = d.contact;
+  const Quad& ball = c.ball[n.sphere];
+  const int body = static_cast<int>(std::upper_bound(d.ranges.begin(), d.ranges.end(), static_cast<int>(n.sphere),
+                                                     [](int i, const BodyRange& r) { return i < r.firstSphere; }) -
+                                    d.ranges.begin()) -
+                   1;
+  Contact& contact = c.contacts.emplace_back();
+  contact.key = std::uint64_t{1} << 63 | std::uint64_t{n.shape} << 34 | std::uint64_t{n.sphere} << 2 |
+                static_cast<std::uint64_t>(ordinal);
+  contact.gap = at.distance - ball.v[3];
+  contact.smallerRadius = ball.v[3];
+  contact.normal = Lanes{at.normal.x(), at.normal.y(), at.normal.z(), 0};
+  contact.friction = c.rootFriction[body] * c.statics[n.shape].rootFriction;
+  contact.ends = 1;
+  contact.sphere[0] = n.sphere;
+  contact.weight[0] = 1;
+  const Lanes lever =
+      fma(splat(-(ball.v[3] + 0.5 * contact.gap)), contact.normal, load(ball) - load(d.spheres.position[n.sphere]));
+  contact.lever[0] = _mm256_blend_pd(lever, splat(0), 8);
+}
+
+}  // namespace
+
+void listStaticNeighbours(ContactData& c) {
+  c.staticNeighbours.clear();
+  c.nearTriangles.clear();
+  for (std::uint32_t k = 0; k < c.statics.size(); ++k) {
+    const StaticContactShape& shape = c.statics[k];
+    for (std::uint32_t i = 0; i < c.ball.size(); ++i) {
+      if (c.inverseCellMass[i] == 0) continue;  // fixed, or a pad
+      const Vector3d p = vectorOf(c.ball[i]);
+      const double radius = c.ball[i].v[3];
+      const int first = static_cast<int>(c.nearTriangles.size());
+      double gap = 0;
+      if (shape.kind == StaticShape::Kind::mesh) {
+        trianglesWithin(shape.tree, p, radius + c.margin, c.nearTriangles);
+        const int end = static_cast<int>(c.nearTriangles.size());
+        if (first == end) continue;
+        gap = c.nearTriangles[first].distance - radius;
+      } else {
+        gap = nearestOn(shape, p).distance - radius;
+        if (!(gap <= c.margin)) continue;
+      }
+      c.staticNeighbours.push_back({k, i, gap, first, static_cast<int>(c.nearTriangles.size())});
+    }
+  }
+}
+
+void findStaticContacts(WorldData& d, double moved) {
+  ContactData& c = d.contact;
+  const double reach = kFastest * d.substep;
+  for (const StaticNeighbour& n : c.staticNeighbours) {
+    if (!(n.gapAtList - moved < reach)) continue;
+    const StaticContactShape& shape = c.statics[n.shape];
+    const Vector3d p = vectorOf(c.ball[n.sphere]);
+    const double within = c.ball[n.sphere].v[3] + reach;
+    if (shape.kind != StaticShape::Kind::mesh) {
+      const Nearest at = nearestOn(shape, p);
+      if (at.distance < within) addContact(d, n, at, 0);
+      continue;
+    }
+    const TriangleDistance* near = c.nearTriangles.data();
+    const Touches touches = touchesOf(shape.tree, near + n.firstTriangle, near + n.endTriangle, p, within, moved);
+    for (int k = 0; k < touches.count; ++k) addContact(d, n, touches.at[k], k);
+  }
+}
+
+}  // namespace medulla

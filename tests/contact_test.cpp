@@ -1,0 +1,311 @@
+#include "physics/dynamics/contact.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/contact_bodies.h"
+#include "tests/dynamics_states.h"
+
+namespace medulla {
+
+using namespace states;
+using synthetic::ball;
+using synthetic::ballBody;
+using synthetic::ballModel;
+
+namespace {
+
+constexpr double kRadius = 0.01, kGravity = 9.81;
+constexpr double kOmegaTimesStep = std::numbers::pi / 2;  // contact_solve.cpp
+
+WorldSettings settings(ContactMode mode, double step, Vector3d gravity = Vector3d::Zero()) {
+  WorldSettings s;
+  s.contact = mode;
+  s.gravity = gravity;
+  s.frameDuration = step;
+  s.substeps = 1;
+  return s;
+}
+
+void advance(World& world, int steps) {
+  for (int i = 0; i < steps; ++i) world.advance({});
+}
+
+Vector3d positionOf(const World& w, int sphere) {
+  return vectorOf(w.data().spheres.position[sphere]);
+}
+Vector3d velocityOf(const World& w, int sphere) {
+  return vectorOf(w.data().spheres.velocity[sphere]);
+}
+void throwBody(World& w, int body, const Vector3d& velocity) {
+  WorldData& d = w.data();
+  const BodyRange& r = d.ranges[body];
+  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) d.spheres.velocity[i] = quadOf(velocity);
+  for (const int n : r.node)
+    if (n < d.nodes.dynamicEnd) d.nodes.velocity[n] = quadOf(velocity);
+}
+
+StaticShape plane(const Vector3d& normal = Vector3d::UnitY(), double friction = 0) {
+  StaticShape s;
+  s.worldFromShape.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitY(), normal).toRotationMatrix();
+  s.friction = friction;
+  return s;
+}
+
+}  // namespace
+
+// k = m omega^2 carries m g: the depth is g / omega^2, whatever the mass.
+TEST(Contact, ABallAtRestSinksInByItsWeightOverTheStiffness) {
+  for (const double step : {0.001, 0.0005}) {
+    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {ball("a", kRadius, {0, 1.2 * kRadius, 0})},
+                {plane()});
+    advance(world, static_cast<int>(0.5 / step));
+    const double omega = kOmegaTimesStep / step, depth = kGravity / (omega * omega);
+    EXPECT_NEAR(kRadius - positionOf(world, 0).y(), depth, 1e-6 * depth);
+    EXPECT_LT(velocityOf(world, 0).norm(), 1e-12);
+    EXPECT_EQ(world.penetration().bodies, 0);
+  }
+}
+
+// On a full surface the spheres carry a small part of the mass: what counts is what they weigh together.
+TEST(Contact, LightSpheresUnderAHeavySurfaceSinkInNoDeeper) {
+  for (const double surfaceShare : {0.05, 0.9}) {
+    BodyDescription tube =
+        synthetic::body(synthetic::chainModel(synthetic::straightTube(3, 0.06, 0.012, 8, 10), surfaceShare), 5e3);
+    tube.worldFromModel.translation() = Vector3d(0, 0.0121, 0);
+    tube.tissue.damping = 0.5;
+    WorldSettings s = settings(ContactMode::balls, 0.001, {0, -kGravity, 0});
+    s.substeps = 4;
+    World world(s, {tube}, {plane(Vector3d::UnitY(), 0.2)});
+    advance(world, 2000);
+    EXPECT_LT(world.penetration().statics, 0.5) << surfaceShare;
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(positionOf(world, i).y(), 0.012, 2e-5);
+  }
+}
+
+TEST(Contact, ABallRollsOrSlidesDownAnIncline) {
+  const double angle = 0.5, step = 0.0005, duration = 0.4;
+  const Vector3d normal(std::sin(angle), std::cos(angle), 0), down(std::cos(angle), -std::sin(angle), 0);
+  const double rollingFriction = 2.0 / 7 * std::tan(angle);  // the least that rolls without sliding
+  for (const double friction : {0.5 * rollingFriction, 1.5 * rollingFriction}) {
+    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {ball("a", kRadius, kRadius * normal, friction)},
+                {plane(normal, friction)});
+    advance(world, static_cast<int>(duration / step));
+    const bool rolls = friction > rollingFriction;
+    const double acceleration =
+        rolls ? 5.0 / 7 * kGravity * std::sin(angle) : kGravity * (std::sin(angle) - friction * std::cos(angle));
+    const double spin =
+        rolls ? acceleration * duration / kRadius : 2.5 * friction * kGravity * std::cos(angle) * duration / kRadius;
+    EXPECT_NEAR(velocityOf(world, 0).dot(down), acceleration * duration, 2e-3 * acceleration * duration);
+    EXPECT_NEAR(-vectorOf(world.data().spheres.angularVelocity[0]).z(), spin, 4e-3 * spin);
+  }
+}
+
+// A body on three balls cannot roll.
+TEST(Contact, ATripodSticksBelowTheFrictionAngleAndSlidesAbove) {
+  const double friction = 0.4, step = 0.0005, duration = 0.5;
+  const auto tripod =
+      ballModel({{{0.02, 0, 0}, kRadius}, {{-0.01, 0, 0.0175}, kRadius}, {{-0.01, 0, -0.0175}, kRadius}},
+                {{0, 1}, {1, 2}, {2, 0}});
+  for (const double angle : {0.8 * std::atan(friction), 1.3 * std::atan(friction)}) {
+    const Vector3d normal(std::sin(angle), std::cos(angle), 0), down(std::cos(angle), -std::sin(angle), 0);
+    BodyDescription body = ballBody("a", tripod, kRadius * normal, friction);
+    body.worldFromModel.linear() = plane(normal).worldFromShape.linear();
+    body.tissue.damping = 1;
+    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {body}, {plane(normal, friction)});
+    ASSERT_LT(step, world.stableSubstep());
+    advance(world, static_cast<int>(duration / step));
+    const double acceleration = kGravity * (std::sin(angle) - friction * std::cos(angle));
+    const Vector3d velocity = (velocityOf(world, 0) + velocityOf(world, 1) + velocityOf(world, 2)) / 3;
+    if (acceleration < 0) {
+      EXPECT_LT(velocity.norm(), 1e-5);
+    } else {
+      EXPECT_NEAR(velocity.dot(down), acceleration * duration, 0.01 * acceleration * duration);
+    }
+  }
+}
+
+// Two balls meet head on. Their relative velocity follows the step's own recursion: not past touching in the substep
+// where they meet, then the implicit spring until it would pull.
+TEST(Contact, TwoBallsCollideAsTheRecursionSays) {
+  const double step = 0.001;
+  World world(settings(ContactMode::balls, step),
+              {ball("a", kRadius, {-0.0153, 0, 0}), ball("b", 0.5 * kRadius, {0.01, 0, 0})});
+  const double m0 = sphereMass(world.data(), 0), m1 = sphereMass(world.data(), 1);
+  throwBody(world, 0, {0.6, 0, 0});
+  throwBody(world, 1, {-0.4, 0, 0});
+  const double common = (0.6 * m0 - 0.4 * m1) / (m0 + m1);
+  double v = -1, gap = 0.0253 - 1.5 * kRadius, deepest = 0;
+  const double w2 = kOmegaTimesStep * kOmegaTimesStep / (step * step), c = 2 * kOmegaTimesStep / step;
+  for (int i = 0; i < 40; ++i) {
+    world.advance({});
+    if (gap > 0) {
+      v = std::max(v, -gap / step);
+    } else {
+      v = std::max(v, (v - step * w2 * gap) / (1 + step * c + step * step * w2));
+    }
+    gap += step * v;
+    deepest = std::max(deepest, -gap);
+    const double velocity0 = velocityOf(world, 0).x(), velocity1 = velocityOf(world, 1).x();
+    EXPECT_NEAR(velocity1 - velocity0, v, 1e-9);
+    EXPECT_NEAR(m0 * velocity0 + m1 * velocity1, common * (m0 + m1), 1e-15);
+  }
+  EXPECT_GT(v, 0);
+  EXPECT_LT(v, 0.1);  // restitution
+  EXPECT_LT(deepest, 0.001);
+}
+
+// Many bodies thrown together, spinning: neither momentum changes, friction included, in either mode.
+TEST(Contact, MomentaStayWhileBodiesCollide) {
+  const auto stick = ballModel({{{0, 0, 0}, 0.012}, {{0.03, 0, 0}, 0.008}, {{0.06, 0.01, 0}, 0.01}}, {{0, 1}, {1, 2}});
+  auto offCentre = std::make_shared<SoftBodyModel>(*stick);
+  for (FillingSphere& s : offCentre->spheres) s.restBallCentre += Vector3d(0.002, -0.003, 0.001);
+  for (const ContactMode mode : {ContactMode::balls, ContactMode::swept}) {
+    std::vector<BodyDescription> bodies;
+    for (int i = 0; i < 12; ++i)
+      bodies.push_back(ballBody("b", i % 2 ? stick : offCentre, 0.04 * Vector3d(i % 3, i / 3 % 2, i / 6), 0.5));
+    WorldSettings s = settings(mode, 0.001);
+    s.substeps = 2;
+    World world(s, bodies);
+    Random random(7);
+    for (int b = 0; b < 12; ++b)
+      throwBody(world, b,
+                0.5 * random.vector() - 8 * (bodies[b].worldFromModel.translation() - Vector3d(0.04, 0.02, 0.02)));
+    const Momentum before = momentum(world.data());
+    std::size_t touching = 0;
+    for (int i = 0; i < 300; ++i) {
+      world.advance({});
+      touching += world.data().contact.carried.size();
+    }
+    const Momentum after = momentum(world.data());
+    EXPECT_GT(touching, 300u);
+    EXPECT_LT((after.linear - before.linear).norm(), 1e-12 * before.linearScale);
+    EXPECT_LT((after.angular - before.angular).norm(), 1e-12 * before.angularScale);
+    EXPECT_LT(world.energies().kinetic, 1);
+  }
+}
+
+TEST(Contact, OverlapAtTheStartIsReportedAndPushedOutSlowly) {
+  World world(settings(ContactMode::balls, 0.001),
+              {ball("a", kRadius, {0, 0, 0}), ball("b", kRadius, {0.013, 0, 0}), ball("c", kRadius, {0, 0.05, 0})});
+  ASSERT_EQ(world.startOverlaps().size(), 1u);
+  EXPECT_EQ(world.startOverlaps()[0].body0, 0);
+  EXPECT_EQ(world.startOverlaps()[0].body1, 1);
+  EXPECT_NEAR(world.startOverlaps()[0].depth, 0.007, 1e-15);
+  double fastest = 0;
+  for (int i = 0; i < 300; ++i) {
+    world.advance({});
+    fastest = std::max(fastest, (velocityOf(world, 0) - velocityOf(world, 1)).norm());
+  }
+  EXPECT_LT(fastest, 0.2 + 1e-9);
+  EXPECT_GT((positionOf(world, 1) - positionOf(world, 0)).norm(), 2 * kRadius - 1e-6);
+  EXPECT_NEAR(world.penetration().bodies, 70, 1e-9);
+}
+
+// A row of ten spheres meets a stack: those linked or overlapping at rest leave each other alone.
+TEST(Contact, WhatOverlapsAtRestNeverMeets) {
+  for (const ContactMode mode : {ContactMode::balls, ContactMode::swept}) {
+    World world(settings(mode, 0.0005),
+                {synthetic::body(synthetic::chainModel(synthetic::straightTube(7, 0.06, 0.012, 8, 10)), 2e3)});
+    advance(world, 50);
+    EXPECT_EQ(world.penetration().bodies, 0);
+    EXPECT_TRUE(world.data().contact.carried.empty());
+    EXPECT_NEAR(positionOf(world, 6).x(), 0.06, 1e-12);
+  }
+}
+
+// Two far ends of one body, thrown at each other.
+TEST(Contact, ABodyMeetsItself) {
+  const auto arch = ballModel(
+      {{{-0.03, 0, 0}, kRadius}, {{-0.03, 0.03, 0}, kRadius}, {{0.03, 0.03, 0}, kRadius}, {{0.03, 0, 0}, kRadius}},
+      {{0, 1}, {1, 2}, {2, 3}});
+  for (const ContactMode mode : {ContactMode::none, ContactMode::balls, ContactMode::swept}) {
+    BodyDescription body = ballBody("a", arch, Vector3d::Zero());
+    body.tissue.young = 200;
+    World world(settings(mode, 0.001), {body});
+    world.data().spheres.velocity[0] = quadOf({0.5, 0, 0});
+    world.data().spheres.velocity[3] = quadOf({-0.5, 0, 0});
+    double least = 1;
+    for (int i = 0; i < 100; ++i) {
+      world.advance({});
+      least = std::min(least, (positionOf(world, 0) - positionOf(world, 3)).norm());
+    }
+    if (mode == ContactMode::none) {
+      EXPECT_LT(least, 1.5 * kRadius);
+    } else {
+      EXPECT_GT(least, 1.95 * kRadius);
+    }
+  }
+}
+
+TEST(Contact, NeighboursLimitWhoMeets) {
+  const auto meet = [](std::optional<std::vector<int>> of0, std::optional<std::vector<int>> of1) {
+    std::vector<BodyDescription> bodies{ball("a", kRadius, {0, 0, 0}), ball("b", kRadius, {0.03, 0, 0}),
+                                        ball("c", kRadius, {0, 1, 0})};
+    bodies[0].neighbours = std::move(of0);
+    bodies[1].neighbours = std::move(of1);
+    World world(settings(ContactMode::balls, 0.001), bodies);
+    throwBody(world, 1, {-0.5, 0, 0});
+    advance(world, 40);
+    return velocityOf(world, 0).norm() > 0;
+  };
+  using List = std::vector<int>;
+  EXPECT_TRUE(meet({}, {}));
+  EXPECT_TRUE(meet(List{1}, {}));
+  EXPECT_TRUE(meet({}, List{0}));
+  EXPECT_FALSE(meet(List{2}, {}));
+  EXPECT_TRUE(meet(List{2}, List{0}));
+  EXPECT_FALSE(meet(List{2}, List{2}));
+}
+
+// As the paper's dolphin (3): the gap between two linked spheres lets a small body through unless links are swept.
+TEST(Contact, AGapBetweenSpheresIsClosedBySweptLinks) {
+  const auto pair = ballModel({{{-0.02, 0, 0}, 0.01}, {{0.02, 0, 0}, 0.01}}, {{0, 1}});
+  for (const ContactMode mode : {ContactMode::balls, ContactMode::swept}) {
+    BodyDescription target = ballBody("pair", pair, Vector3d::Zero());
+    target.fixed = {{0}, {1}};
+    World world(settings(mode, 0.001), {target, ball("small", 0.005, {0.001, 0.05, 0})});
+    throwBody(world, 1, {0, -1, 0});
+    advance(world, 100);
+    const double y = positionOf(world, 2).y();
+    if (mode == ContactMode::balls) {
+      EXPECT_NEAR(y, -0.05, 1e-9);
+    } else {
+      EXPECT_GT(y, 0.014);
+      EXPECT_LT(world.penetration().bodies, 5);
+    }
+  }
+}
+
+// At 1 m/s nothing passes, and nothing sinks in by more than a tenth of its radius.
+TEST(Contact, NothingPassesAtAMetrePerSecond) {
+  const auto stick = ballModel({{{-0.02, 0, 0}, 0.008}, {{0.02, 0, 0}, 0.006}}, {{0, 1}});
+  for (const Vector3d& place : {Vector3d(0, 0, 0), Vector3d(0.01, 0, 0.003), Vector3d(-0.02, 0, 0.002)}) {
+    BodyDescription target = ballBody("target", stick, Vector3d::Zero());
+    target.fixed = {{0}, {1}};
+    BodyDescription thrown = ballBody("thrown", stick, place + Vector3d(0, 0.05, 0));
+    thrown.worldFromModel.linear() = Eigen::AngleAxisd(1.2, Vector3d::UnitY()).toRotationMatrix();
+    World world(settings(ContactMode::swept, 0.001), {target, thrown});
+    throwBody(world, 1, {0, -1, 0});
+    advance(world, 60);
+    EXPECT_LT(world.penetration().bodies, 10);
+    EXPECT_GT(0.5 * (positionOf(world, 2) + positionOf(world, 3)).y(), 0);
+  }
+}
+
+TEST(Contact, TheSameRunTwiceHasTheSameHashAndImpulsesAreInIt) {
+  std::uint64_t hash[2];
+  for (std::uint64_t& h : hash) {
+    World world(settings(ContactMode::swept, 0.001, {0, -kGravity, 0}),
+                {ball("a", kRadius, {0, 0.011, 0}, 0.3), ball("b", kRadius, {0.004, 0.032, 0.001}, 0.3)}, {plane()});
+    advance(world, 400);
+    h = world.stateHash();
+    ASSERT_FALSE(world.data().contact.carried.empty());
+    world.data().contact.carried[0].impulse.v[1] += 1e-9;
+    EXPECT_NE(world.stateHash(), h);
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+}
+
+}  // namespace medulla
