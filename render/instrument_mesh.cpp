@@ -1,5 +1,6 @@
 #include "render/instrument_mesh.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace medulla {
@@ -10,6 +11,9 @@ using glm::vec3;
 // Tool frame, m: the tip of the closed jaws at the origin, shaft along +z, jaws open about x at the hinge.
 constexpr float kHinge = 0.0200f, kShaftRadius = 0.0026f, kShaftStart = 0.0275f, kShaftEnd = 0.42f;
 constexpr float kJawHalfWidth = 0.0021f, kJawHeight = 0.0021f;
+// Height above the bite's plane: of ridges and valleys, and of the rim that the outer side ends at. The rim lies above
+// the valleys, or the flank between them folds over and leaves holes.
+constexpr float kRidge = 0.00008f, kValley = 0.00055f, kJawRim = 0.0006f;
 constexpr int kAround = 18, kTeeth = 13;
 constexpr float kTau = 6.2831853f;
 constexpr vec3 kSteel(0.50f, 0.50f, 0.52f), kSheath(0.020f, 0.020f, 0.022f);
@@ -124,8 +128,9 @@ void addJaw(Builder& b, float side, float angle) {
     for (int a = 0; a <= kArc; ++a) {  // outer side: a flattened half ellipse from +x over the back to -x
       const float phi = 0.5f * kTau * float(a) / kArc, x = std::cos(phi), y = std::pow(std::sin(phi) + 1e-6f, 0.8f);
       const float lean = t > 0.85f ? -0.9f * (t - 0.85f) / 0.15f : -0.05f;
-      const std::uint32_t i = b.vertex(place(j.halfWidth * x, 0.0003f + j.height * y, j.z),
-                                       turned({x / j.halfWidth, std::sin(phi) / j.height, lean / j.height}), kSteel);
+      const std::uint32_t i =
+          b.vertex(place(j.halfWidth * x, kJawRim + std::max(j.height - kJawRim / 2, 0.0001f) * y, j.z),
+                   turned({x / j.halfWidth, std::sin(phi) / j.height, lean / j.height}), kSteel);
       if (a == 0) first = i;
     }
     for (std::uint32_t a = 0; k > 0 && a < kArc; ++a) {
@@ -139,7 +144,7 @@ void addJaw(Builder& b, float side, float angle) {
   // Bite: transverse ridges, flat faces; smooth near the hinge and at the very tip.
   for (int k = 0; k < 2 * kTeeth; ++k) {
     const float t0 = float(k) / (2 * kTeeth), t1 = float(k + 1) / (2 * kTeeth);
-    const auto depth = [](float t, bool valley) { return valley && t > 0.2f && t < 0.97f ? 0.00055f : 0.00008f; };
+    const auto depth = [](float t, bool valley) { return valley && t > 0.2f && t < 0.97f ? kValley : kRidge; };
     const JawSection j0 = jawSection(t0), j1 = jawSection(t1);
     const float y0 = depth(t0, k % 2 == 0), y1 = depth(t1, k % 2 == 1);
     const vec3 p0 = place(-j0.halfWidth, y0, j0.z), p1 = place(j0.halfWidth, y0, j0.z),
@@ -150,7 +155,7 @@ void addJaw(Builder& b, float side, float angle) {
       b.face(p0, p1, q1, q0, 0.65f * kSteel, 0.7f);
     // Flank between the outer side's rim and the ridge.
     for (const float x : {-1.f, 1.f}) {
-      const vec3 a = place(x * j0.halfWidth, 0.0003f, j0.z), d = place(x * j1.halfWidth, 0.0003f, j1.z);
+      const vec3 a = place(x * j0.halfWidth, kJawRim, j0.z), d = place(x * j1.halfWidth, kJawRim, j1.z);
       const vec3 e = x < 0 ? p0 : p1, f = x < 0 ? q0 : q1;
       if ((side > 0) == (x > 0))
         b.face(a, e, f, d, 0.8f * kSteel, 0.85f);

@@ -103,6 +103,7 @@ void Renderer::Data::bake() {
 void Renderer::Data::placeSurfaces(const Picture& picture) {
   removeInstruments(mesh);
   std::fill(mesh.blanch.begin(), mesh.blanch.end(), 0.f);
+  std::copy(rest.openness.begin(), rest.openness.end(), mesh.openness.begin());
   for (std::size_t p = 0; p < mesh.parts.size(); ++p) {
     MeshPart& part = mesh.parts[p];
     const auto first = std::ptrdiff_t(part.firstVertex), last = first + std::ptrdiff_t(part.vertexCount);
@@ -125,6 +126,7 @@ void Renderer::Data::placeSurfaces(const Picture& picture) {
 void Renderer::Data::placeInstruments(const Picture& picture) {
   for (const Instrument& i : picture.instruments)
     if (i.touching) applyTouch(i, mesh);
+  for (const Instrument& i : picture.instruments) shadeAround(i, mesh);
   for (const Instrument& i : picture.instruments) appendInstrument(i, mesh);
 }
 

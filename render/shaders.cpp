@@ -56,7 +56,7 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 directGloss;
 layout(location = 2) in vec4 ambientRadius;
 layout(location = 3) in vec4 halfwayBias;
-layout(location = 4) in vec3 uvVessels;
+layout(location = 4) in vec3 uvDetail;
 uniform mat4 clipFromWorld, shadowFromWorld;
 uniform vec4 lobes, tint;
 noperspective out vec4 vDirect;
@@ -71,7 +71,7 @@ void main() {
   vDirect = directGloss;
   vAmbient = ambientRadius;
   vHalfway = halfwayBias.xyz;
-  vUv = uvVessels;
+  vUv = uvDetail;
 #ifdef DULL
   float x = halfwayBias.z * halfwayBias.z, d1 = x * lobes.x + 1., d2 = x * lobes.z + 1.;
   vDirect.w *= lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), tint.w);
@@ -111,7 +111,7 @@ float softShadow(vec3 q, float radius) {
 
 void main() {
   vec4 t = texture(detail, vUv.xy);
-  vec3 detailColour = mix(vec3(1. + surface.x * (t.x - .5)), tint.rgb, t.y * surface.y * vUv.z);
+  vec3 detailColour = mix(vec3(1. + surface.x * (t.x - .5) * vUv.z), tint.rgb, t.y * surface.y * vUv.z);
 #if SHADE == 2
   vec3 colour = detailColour * vAmbient.rgb;
 #else

@@ -86,7 +86,7 @@ TissuePass::TissuePass() {
   attribute(1, 4, offsetof(LitVertex, direct));   // and gloss
   attribute(2, 4, offsetof(LitVertex, ambient));  // and shadowRadius
   attribute(3, 4, offsetof(LitVertex, halfway));  // and shadowBias
-  attribute(4, 3, offsetof(LitVertex, uv));       // and vessels
+  attribute(4, 3, offsetof(LitVertex, uv));       // and detail
 
   glGenVertexArrays(1, &maskArray_);
   glGenBuffers(1, &maskBuffer_);

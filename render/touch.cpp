@@ -1,5 +1,6 @@
 #include "render/touch.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace medulla {
@@ -23,6 +24,25 @@ void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
       n = glm::normalize(n - gradient * glm::dot(push, n));
       mesh.position[i] += push * w;
       mesh.blanch[i] = std::max(mesh.blanch[i], std::exp(-q / (kBlanchWidth * kBlanchWidth)));
+    }
+  }
+}
+
+void shadeAround(const Instrument& instrument, SceneMesh& mesh) {
+  constexpr float kLength = 0.42f, kRadius = 0.0026f, kFarthest = 0.05f;  // m
+  const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, 1), start = instrument.tip + kRadius * axis;
+  for (const MeshPart& part : mesh.parts) {
+    if (part.instrument) continue;
+    for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+      const glm::vec3 d = mesh.position[i] - start;
+      const float along = glm::clamp(glm::dot(d, axis), 0.f, kLength);
+      const glm::vec3 away = d - along * axis;
+      const float q = glm::dot(away, away);
+      if (q > kFarthest * kFarthest) continue;
+      const float distance = std::max(std::sqrt(q), kRadius);
+      const float facing = std::max(-glm::dot(mesh.normal[i], away) / distance, 0.f);
+      const float fade = 1 - q / (kFarthest * kFarthest);
+      mesh.openness[i] *= 1 - fade * facing * kRadius / distance;
     }
   }
 }

@@ -170,7 +170,7 @@ void lightVertices(const SceneMesh& mesh, const Viewpoint& view, const Light& li
       LitVertex& o = out.vertices[i];
       o.position = mesh.position[i];
       o.uv = mesh.uv[i];
-      o.vessels = 1 - mesh.blanch[i];
+      o.detail = 1 - mesh.blanch[i];
       out.picture[i] = pictureFromWorld(view, mesh.position[i]);
       const Shading v = shadingOf(mesh, i, out.picture[i], s);
       if (look.metal)

@@ -19,7 +19,7 @@ struct LitVertex {
   glm::vec3 halfway;   // between light and eye: along tangent, bitangent, normal
   float shadowBias;    // depth
   glm::vec2 uv;
-  float vessels;  // 0..1: share of the vessels' colour; none where the blood is pressed out
+  float detail;  // 0..1: share of the texture's colour; none where the blood is pressed out
 };
 
 // Highlight of a look: two lobes c / (1 + (a - 1) cos^2)^2 (GGX, Walter et al. 2007), the tissue's and the wet film's.
