@@ -51,7 +51,8 @@ struct Contact {
   Lanes normal, tangent0, tangent1;  // unit, into the second side; w = 0
   double gap = 0;                    // m
   double smallerRadius = 0;          // m, of the two in contact
-  double normalMobility = 0;         // 1/kg: velocity along the normal per impulse
+  Lanes mobility[3];                 // 1/kg: relative velocity per impulse along normal, tangent0, tangent1
+  double normalMobility = 0;         // 1/kg: mobility[0] along the normal
   double inverseTangent[3] = {0, 0, 0};  // kg: inverse of the mobility in the tangent plane: 00, 11, 01
   double softness = 0;                   // 1/kg, gamma
   double bias = 0;                       // m/s

@@ -88,14 +88,14 @@ MEDULLA_INLINE void apply(WorldData& d, const Contact& c, Lanes impulse) {
   }
 }
 
-// Velocity along `b` per impulse along `a`.
-double mobility(const WorldData& d, const Contact& c, Lanes a, Lanes b) {
-  double sum = 0;
+// Relative velocity per impulse along `a`, m/s per N s.
+Lanes mobilityAlong(const WorldData& d, const Contact& c, Lanes a) {
+  Lanes sum = splat(0);
   for (int e = 0; e < c.ends; ++e) {
     const std::uint32_t i = c.sphere[e];
-    const double turning =
-        dotProduct(crossProduct(c.lever[e], b), timesInertia(d.contact.inertia[i], crossProduct(c.lever[e], a)));
-    sum += c.weight[e] * c.weight[e] * (d.spheres.groups[i / 4].inverseMass[i % 4] * dotProduct(a, b) + turning);
+    const Lanes spin = timesInertia(d.contact.inertia[i], crossProduct(c.lever[e], a));
+    const Lanes ofEnd = fma(splat(d.spheres.groups[i / 4].inverseMass[i % 4]), a, crossProduct(spin, c.lever[e]));
+    sum = fma(splat(c.weight[e] * c.weight[e]), ofEnd, sum);
   }
   return sum;
 }
@@ -113,7 +113,8 @@ void chooseTangents(Contact& c) {
 
 // False where nothing can move, or where the two part or are too slow to meet within the substep.
 bool prepare(const WorldData& d, Contact& c) {
-  c.normalMobility = mobility(d, c, c.normal, c.normal);
+  c.mobility[0] = mobilityAlong(d, c, c.normal);
+  c.normalMobility = dotProduct(c.mobility[0], c.normal);
   if (!(c.normalMobility > 0)) return false;
   const double h = d.substep;
   if (c.gap > 0) {  // until they touch: they may come as close as the gap allows
@@ -129,8 +130,10 @@ bool prepare(const WorldData& d, Contact& c) {
   }
   chooseTangents(c);
   if (c.friction == 0) return true;
-  const double k00 = mobility(d, c, c.tangent0, c.tangent0), k11 = mobility(d, c, c.tangent1, c.tangent1),
-               k01 = mobility(d, c, c.tangent0, c.tangent1), determinant = k00 * k11 - k01 * k01;
+  c.mobility[1] = mobilityAlong(d, c, c.tangent0);
+  c.mobility[2] = mobilityAlong(d, c, c.tangent1);
+  const double k00 = dotProduct(c.mobility[1], c.tangent0), k11 = dotProduct(c.mobility[2], c.tangent1),
+               k01 = dotProduct(c.mobility[1], c.tangent1), determinant = k00 * k11 - k01 * k01;
   if (!(determinant > 0)) {
     c.friction = 0;
     return true;
@@ -172,27 +175,29 @@ void startFrom(WorldData& d, const std::vector<CarriedImpulse>& carried) {
   }
 }
 
-// Returns the size of the change, N s.
-double settleNormal(WorldData& d, Contact& c) {
-  const double v = dotProduct(relativeVelocity(d, c), c.normal);
-  const double wanted = c.normalImpulse - (v + c.bias + c.softness * c.normalImpulse) / (c.normalMobility + c.softness);
+// One contact's turn: first the normal impulse, then Coulomb's friction, which is what it takes to stop the sliding as
+// long as that is no more than friction times the normal impulse. Returns the size of the change, N s.
+double settle(WorldData& d, Contact& c) {
+  Lanes v = relativeVelocity(d, c);
+  const double wanted = c.normalImpulse - (dotProduct(v, c.normal) + c.bias + c.softness * c.normalImpulse) /
+                                              (c.normalMobility + c.softness);
   const double next = std::max(0.0, wanted), change = next - c.normalImpulse;
   c.normalImpulse = next;
-  if (change != 0) apply(d, c, splat(change) * c.normal);
-  return std::abs(change);
-}
-
-// Coulomb: what it takes to stop the sliding, as long as that is no more than friction times the normal impulse.
-double settleFriction(WorldData& d, Contact& c) {
-  const Lanes v = relativeVelocity(d, c);
-  const double v0 = dotProduct(v, c.tangent0), v1 = dotProduct(v, c.tangent1);
-  const double before0 = c.tangentImpulse0, before1 = c.tangentImpulse1;
-  c.tangentImpulse0 -= c.inverseTangent[0] * v0 + c.inverseTangent[2] * v1;
-  c.tangentImpulse1 -= c.inverseTangent[2] * v0 + c.inverseTangent[1] * v1;
-  limitFriction(c);
-  const double change0 = c.tangentImpulse0 - before0, change1 = c.tangentImpulse1 - before1;
-  if (change0 != 0 || change1 != 0) apply(d, c, fma(splat(change0), c.tangent0, splat(change1) * c.tangent1));
-  return std::abs(change0) + std::abs(change1);
+  Lanes impulse = splat(change) * c.normal;
+  double size = std::abs(change);
+  if (c.friction > 0) {
+    v = fma(splat(change), c.mobility[0], v);
+    const double v0 = dotProduct(v, c.tangent0), v1 = dotProduct(v, c.tangent1);
+    const double before0 = c.tangentImpulse0, before1 = c.tangentImpulse1;
+    c.tangentImpulse0 -= c.inverseTangent[0] * v0 + c.inverseTangent[2] * v1;
+    c.tangentImpulse1 -= c.inverseTangent[2] * v0 + c.inverseTangent[1] * v1;
+    limitFriction(c);
+    const double change0 = c.tangentImpulse0 - before0, change1 = c.tangentImpulse1 - before1;
+    impulse = fma(splat(change0), c.tangent0, fma(splat(change1), c.tangent1, impulse));
+    size = std::max(size, std::abs(change0) + std::abs(change1));
+  }
+  if (size > 0) apply(d, c, impulse);
+  return size;
 }
 
 void report(ContactData& c) {
@@ -217,8 +222,7 @@ void solveContacts(WorldData& d) {
   for (int pass = 0; pass < kPasses; ++pass) {
     double change = 0, largest = 0;
     for (Contact& contact : c.contacts) {
-      change = std::max(change, settleNormal(d, contact));
-      if (contact.friction > 0) change = std::max(change, settleFriction(d, contact));
+      change = std::max(change, settle(d, contact));
       largest = std::max(largest, contact.normalImpulse);
     }
     if (!(change > kSettled * largest)) break;

@@ -52,6 +52,7 @@ void count(benchmark::State& state, const World& world) {
   state.counters["spheres"] = world.data().spheres.count;
   state.counters["pairs"] = 4.0 * static_cast<double>(c.pairs.size());
   state.counters["contacts"] = static_cast<double>(c.contacts.size());
+  state.counters["penetration"] = c.penetration.bodies;
 }
 
 }  // namespace
