@@ -27,9 +27,20 @@ static std::size_t pointIndex(const Grid& grid, int x, int y, int z) {
 static Grid sampleGrid(const SignedDistance& sdf, const Box& box, double spacing) {
   Grid grid{box.low, spacing, {}, {}};
   for (int a = 0; a < 3; ++a) grid.size[a] = static_cast<int>(std::ceil((box.high[a] - box.low[a]) / spacing)) + 1;
-  for (int z = 0; z < grid.size[2]; ++z)
-    for (int y = 0; y < grid.size[1]; ++y)
-      for (int x = 0; x < grid.size[0]; ++x) grid.values.push_back(sdf(box.low + spacing * Vector3d(x, y, z)));
+  const auto at = [&](double x, double y, double z) { return sdf(box.low + spacing * Vector3d(x, y, z)); };
+  grid.values.resize(static_cast<std::size_t>(grid.size[0]) * grid.size[1] * grid.size[2]);
+  // In blocks of 3 x 3 x 3 points: one whose middle is farther from the surface than three times its own reach takes
+  // the middle's value. The net reads values only where the sign changes.
+  for (int z = 0; z < grid.size[2]; z += 3)
+    for (int y = 0; y < grid.size[1]; y += 3)
+      for (int x = 0; x < grid.size[0]; x += 3) {
+        const double middle = at(x + 1, y + 1, z + 1);
+        const bool far = std::abs(middle) > 5.2 * spacing;
+        for (int k = z; k < std::min(z + 3, grid.size[2]); ++k)
+          for (int j = y; j < std::min(y + 3, grid.size[1]); ++j)
+            for (int i = x; i < std::min(x + 3, grid.size[0]); ++i)
+              grid.values[pointIndex(grid, i, j, k)] = far ? middle : at(i, j, k);
+      }
   return grid;
 }
 

@@ -91,8 +91,12 @@ static NearestSegment nearestInChunk(const Tube& tube, const Tube::Chunk& chunk,
 
 static NearestSegment nearestSegment(const Tube& tube, const Vector3d& p) {
   const auto bound = [&](const Tube::Chunk& chunk) { return (p - chunk.centre).norm() - chunk.radius; };
-  const auto likeliest = std::min_element(tube.chunks.begin(), tube.chunks.end(),
-                                          [&](const auto& a, const auto& b) { return bound(a) < bound(b); });
+  auto likeliest = tube.chunks.begin();
+  double lowest = bound(*likeliest);
+  for (auto chunk = tube.chunks.begin() + 1; chunk != tube.chunks.end(); ++chunk) {
+    const double candidate = bound(*chunk);
+    if (candidate < lowest) lowest = candidate, likeliest = chunk;
+  }
   NearestSegment best = nearestInChunk(tube, *likeliest, p);
   for (auto chunk = tube.chunks.begin(); chunk != tube.chunks.end(); ++chunk) {
     if (chunk == likeliest || bound(*chunk) >= best.distance) continue;
