@@ -53,6 +53,29 @@ StaticShape plane(const Vector3d& normal = Vector3d::UnitY(), double friction = 
   return s;
 }
 
+// A little more than half a sphere about the origin, open at the top, its normals inward.
+TriangleMesh bowlMesh(double radius) {
+  constexpr int kRings = 16, kSegments = 40;
+  TriangleMesh m;
+  m.vertices.emplace_back(0, -radius, 0);
+  for (int r = 1; r <= kRings; ++r) {
+    for (int s = 0; s < kSegments; ++s) {
+      const double polar = 1.9 * r / kRings, around = 2 * std::numbers::pi * s / kSegments;
+      m.vertices.push_back(
+          radius * Vector3d(std::sin(polar) * std::cos(around), -std::cos(polar), std::sin(polar) * std::sin(around)));
+    }
+  }
+  const auto id = [](int ring, int s) { return 1 + (ring - 1) * kSegments + s % kSegments; };
+  for (int s = 0; s < kSegments; ++s) {
+    m.triangles.push_back({0, id(1, s + 1), id(1, s)});
+    for (int r = 1; r < kRings; ++r) {
+      m.triangles.push_back({id(r, s), id(r, s + 1), id(r + 1, s)});
+      m.triangles.push_back({id(r, s + 1), id(r + 1, s + 1), id(r + 1, s)});
+    }
+  }
+  return m;
+}
+
 }  // namespace
 
 // k = m omega^2 carries m g: the depth is g / omega^2, whatever the mass.
@@ -203,7 +226,7 @@ TEST(Contact, OverlapAtTheStartIsReportedAndPushedOutSlowly) {
   EXPECT_NEAR(world.penetration().bodies, 70, 1e-9);
 }
 
-// A row of ten spheres meets a stack: those linked or overlapping at rest leave each other alone.
+// Those linked or overlapping at rest leave each other alone.
 TEST(Contact, WhatOverlapsAtRestNeverMeets) {
   for (const ContactMode mode : {ContactMode::balls, ContactMode::swept}) {
     World world(settings(mode, 0.0005),
@@ -291,6 +314,38 @@ TEST(Contact, NothingPassesAtAMetrePerSecond) {
     advance(world, 60);
     EXPECT_LT(world.penetration().bodies, 10);
     EXPECT_GT(0.5 * (positionOf(world, 2) + positionOf(world, 3)).y(), 0);
+  }
+}
+
+// Rods and lumps fall into a bowl. Nothing drives them there: each contact takes energy, and so does every link.
+TEST(Contact, AHeapInABowlComesToRest) {
+  StaticShape bowl;
+  bowl.kind = StaticShape::Kind::mesh;
+  bowl.mesh = bowlMesh(0.12);
+  const auto rod = synthetic::chainModel(synthetic::straightTube(4, 0.06, 0.012, 8, 10)),
+             lump = synthetic::chainModel(synthetic::straightTube(2, 0.014, 0.014, 8, 10));
+  for (const ContactMode mode : {ContactMode::balls, ContactMode::swept}) {
+    std::vector<BodyDescription> bodies;
+    Random random(5);
+    for (int k = 0; k < 4; ++k) {
+      BodyDescription& b = bodies.emplace_back(synthetic::body(k % 3 == 2 ? lump : rod, 5e3));
+      b.tissue.damping = 0.3;
+      b.surface = SurfaceMode::skin;
+      b.worldFromModel.translation() = Vector3d(-0.03, -0.05 + 0.06 * k, 0.02 * random.uniform());
+      b.worldFromModel.linear() = Eigen::AngleAxisd(0.5 * random.uniform(), Vector3d::UnitY()).toRotationMatrix();
+    }
+    WorldSettings s = settings(mode, 0.02, {0, -kGravity, 0});
+    s.substeps = 20;
+    World world(s, bodies, {bowl});
+    ASSERT_TRUE(world.startOverlaps().empty());
+    double peak = 0;
+    for (int k = 0; k < 150; ++k) {
+      world.advance({});
+      peak = std::max(peak, world.energies().kinetic);
+    }
+    EXPECT_LT(world.energies().kinetic, 1e-6 * peak);
+    EXPECT_LT(world.penetration().bodies, 10);
+    EXPECT_LT(world.penetration().statics, 10);
   }
 }
 

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -40,6 +41,24 @@ TEST(Program, ReplayPrintsItsResultsAndTheSameHashTwice) {
     EXPECT_NE(valueOf(a.out, name), "") << name << " is missing in\n" << a.out;
   EXPECT_EQ(valueOf(a.out, "hash").size(), 16u);
   EXPECT_EQ(valueOf(a.out, "hash"), valueOf(b.out, "hash"));
+}
+
+TEST(Program, BodiesThatOverlapAtTheStartAreNamedOnceAndComeApart) {
+  const TemporaryFolder folder;
+  const std::string body =
+      fmt::format("model='{}/assets/gallbladder/gallbladder.model.xml' tissue='t' look='fat'", MEDULLA_SOURCE_DIR);
+  folder.write("two.xml", fmt::format("<scene name='two'><clock duration='0.5'/><dynamics gravity='0 0 0'/>"
+                                      "<tissue name='t'/><body name='left' {0}/>"
+                                      "<body name='right' {0} position='0.004 0.022 0'/>"
+                                      "<camera position='0 0 1' target='0 0 0'/></scene>",
+                                      body));
+  const ProgramResult run = runProgram({"replay", folder / "two.xml"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  const std::string warning = "warning: bodies 'left' and 'right' overlap by ";
+  const std::size_t first = run.err.find(warning);
+  ASSERT_NE(first, std::string::npos) << run.err;
+  EXPECT_EQ(run.err.find(warning, first + 1), std::string::npos) << run.err;
+  EXPECT_NE(valueOf(run.out, "penetration_max"), "0");
 }
 
 TEST(Program, DrawingOptionsLeaveTheHashAlone) {
