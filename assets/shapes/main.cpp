@@ -42,7 +42,7 @@ static std::vector<MeshRecipe> recipes() {
           {"stomach", "stomach_fine", stomach, stomachBox, 1.6, {16000, 30, 0.5}},
           {"gut", "colon", colon, colonBox, 2.2, {3200, 20, 0.4}},
           {"gut", "colon_fine", colon, colonBox, 1.6, {24000, 15, 0.4}},
-          {"gut", "small_intestine", smallIntestine, intestineBox, 1.8, {2800, 12, 0.5}},
+          {"gut", "small_intestine", smallIntestine, intestineBox, 1.6, {2800, 12, 0.5}},
           {"gut", "small_intestine_fine", smallIntestine, intestineBox, 1.5, {20000, 12, 0.5}},
           {"dolphin", "dolphin", thickFins, dolphinBox, 12, {1120, 250, 0.3, true}},
           {"dolphin", "dolphin_fine", thinFins, dolphinBox, 8, {16000, 150, 0.3, true}},
