@@ -80,7 +80,8 @@ struct ContactData {
   std::vector<char> collides;                        // bodies x bodies
   std::vector<double> rootFriction;                  // per body
   std::vector<StaticContactShape> statics;
-  double margin = 0;  // m
+  double margin = 0;    // m: pairs nearer than this are listed
+  double freeMove = 0;  // m: what a ball may move before the lists are made anew
 
   // Lists, and the balls' places when they were made.
   std::vector<Quad> ballAtList;

@@ -75,7 +75,7 @@ void resolveContacts(WorldData& d) {
   if (c.mode == ContactMode::none) return;
   placeBalls(d);
   double moved = farthestMove(c);
-  if (!(2 * moved <= c.margin)) {
+  if (!(moved <= c.freeMove)) {
     listNeighbours(d);
     moved = 0;
   }

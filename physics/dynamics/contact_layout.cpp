@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3d;
 
 // Lists are made anew when a ball has moved half of this: a wider margin makes lists longer, a narrower one more often.
-constexpr double kMarginOverRadius = 0.3;  // of the mean radius
+constexpr double kMarginOverRadius = 0.3;  // of the mean radius, beyond what one substep can close
 
 // Balls and cones of one body that overlap at rest never meet; neither do those that all but touch, which the first
 // bending would bring together: this share of the smaller radius apart, or less.
@@ -35,7 +35,8 @@ void addBalls(WorldData& d) {
       sum += s.radius;
     }
   }
-  c.margin = kMarginOverRadius * sum / std::max(1, d.spheres.count);
+  c.freeMove = 0.5 * kMarginOverRadius * sum / std::max(1, d.spheres.count);
+  c.margin = 2 * c.freeMove + kFastest * d.substep;
   c.ball = c.restBall;
   c.inertia.resize(d.spheres.position.size());
 }

@@ -27,7 +27,7 @@ constexpr double kGammaTimesMass = 1 / (kOmegaTimesStep * (2 * kDampingRatio + k
 // Impulses start from those of the substep before and are passed over until the last pass changed them by little; what
 // is left is taken up in the next substep.
 constexpr int kPasses = 4;
-constexpr double kSettled = 1e-3;  // of the largest impulse
+constexpr double kSettled = 1e-2;  // of the largest impulse
 
 // Inverse inertia in the world and angular velocity of all spheres, at the momenta of this substep.
 void prepareSpheres(WorldData& d) {
@@ -113,9 +113,6 @@ void chooseTangents(Contact& c) {
 
 // False where nothing can move, or where the two part or are too slow to meet within the substep.
 bool prepare(const WorldData& d, Contact& c) {
-  c.mobility[0] = mobilityAlong(d, c, c.normal);
-  c.normalMobility = dotProduct(c.mobility[0], c.normal);
-  if (!(c.normalMobility > 0)) return false;
   const double h = d.substep;
   if (c.gap > 0) {  // until they touch: they may come as close as the gap allows
     if (c.gap + h * dotProduct(relativeVelocity(d, c), c.normal) > 0) return false;
@@ -128,6 +125,9 @@ bool prepare(const WorldData& d, Contact& c) {
     c.softness = kGammaTimesMass * inverseCells;
     c.bias = std::max(kBetaTimesStep / h * c.gap, -kPushOutSpeed);
   }
+  c.mobility[0] = mobilityAlong(d, c, c.normal);
+  c.normalMobility = dotProduct(c.mobility[0], c.normal);
+  if (!(c.normalMobility > 0)) return false;
   chooseTangents(c);
   if (c.friction == 0) return true;
   c.mobility[1] = mobilityAlong(d, c, c.tangent0);
