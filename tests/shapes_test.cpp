@@ -221,6 +221,19 @@ TEST(Shapes, OrgansLieCloseAndDoNotCross) {
   }
 }
 
+TEST(Shapes, AbdominalWallEnclosesEveryOrgan) {
+  const TriangleMesh wall = readObj(asset("scenery/wall.obj"));
+  const SurfaceTree tree = makeSurfaceTree(wall);
+  for (const std::string& name : organs("")) {
+    double gap = 1;
+    for (const Vector3d& p : readObj(asset(name)).vertices) {
+      gap = std::min(gap, closestPoint(tree, p, 1).distance);
+      EXPECT_TRUE(isInside(tree, p)) << name << " at " << p.transpose();
+    }
+    EXPECT_GE(gap, 15e-3) << name;
+  }
+}
+
 TEST(Shapes, ProgramRepeatsTheCommittedMeshesToTheByte) {
   const std::filesystem::path directory = std::filesystem::path(testing::TempDir()) / "medulla_shapes_test";
   std::string command = "\"" MEDULLA_SHAPES "\" -o \"";
