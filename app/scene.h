@@ -61,6 +61,11 @@ struct Scene {
   double lightIntensity = 1;                     // >= 0
   double lightReferenceDistance = 0.15;          // m, > 0; where intensity 1 exposes a surface fully
   Eigen::Vector3d lightOffset{0.012, 0.012, 0};  // m, in the camera's frame
+  std::optional<Eigen::Vector3d> lightPosition;  // m, world: instead of beside the lens
+  std::optional<Eigen::Vector3d> haze;           // linear RGB, >= 0
+  double hazeDistance = 10;                      // m, > 0
+  double caustics = 0;                           // 0 to 1, with a position
+  bool endoscope = true;                         // the picture is round
   int width = 1280, height = 720;                // 16 to 8192, even
   double fps = 30;                               // 1 to 240
   std::vector<double> goldenTimes;               // s, strictly increasing, within 0 to duration

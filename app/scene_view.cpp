@@ -115,6 +115,17 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   picture.segments.push_back({toGlm(state.device), toGlm(state.proxy), 0.0004f, kDeviceColour});
 }
 
+Light lightOf(const Scene& scene) {
+  Light light;
+  light.offset = toGlm(scene.lightOffset);
+  if (scene.lightPosition) light.position = toGlm(*scene.lightPosition);
+  light.intensity = float(scene.lightIntensity);
+  light.referenceDistance = float(scene.lightReferenceDistance);
+  if (scene.haze) light.haze = Haze{toGlm(*scene.haze), float(scene.hazeDistance)};
+  light.caustics = float(scene.caustics);
+  return light;
+}
+
 }  // namespace
 
 void evaluateRenderSurface(const RenderSurface& surface, const std::vector<Eigen::Vector3d>& nodes,
@@ -176,7 +187,9 @@ void SceneView::compose(const PictureState& state, const ViewOptions& options, P
   const Scene& scene = loaded_->scene;
   picture.view = options.view;
   picture.camera = cameraAt(scene.camera, state.time);
-  picture.light = {toGlm(scene.lightOffset), float(scene.lightIntensity), float(scene.lightReferenceDistance)};
+  picture.light = lightOf(scene);
+  picture.endoscopeMask = scene.endoscope;
+  picture.time = float(state.time);
   picture.instruments.clear();
   picture.balls.clear();
   picture.segments.clear();

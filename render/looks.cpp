@@ -154,7 +154,7 @@ Look dolphin() {
   l.albedoHigh = {0.130f, 0.150f, 0.175f};
   l.mottleFrequency = 2;
   l.patches[0] = {{0.30f, 0.325f, 0.34f}, 4, 7, 0.12f, {0, -1, 0}, -0.46f, -0.30f, 0.9f};  // grey flanks
-  l.patches[1] = {{0.72f, 0.70f, 0.68f}, 3, 5, 0.10f, {0, -1, 0}, -0.26f, -0.16f, 0.95f};  // pale belly
+  l.patches[1] = {{0.56f, 0.55f, 0.54f}, 3, 5, 0.10f, {0, -1, 0}, -0.26f, -0.16f, 0.9f};   // pale belly
   l.wrap = {0.10f, 0.12f, 0.14f};
   l.roughness = 0.50f;
   l.wetRoughness = 0.30f;

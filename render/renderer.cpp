@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "render/gl_context.h"
+#include "render/haze.h"
 #include "render/instrument_mesh.h"
 #include "render/model_view.h"
 #include "render/post_process.h"
@@ -57,12 +58,14 @@ struct Renderer::Data {
   std::unique_ptr<GlContext> context;
   Framebuffer framebuffer;
   TissuePass tissue;
+  HazePass background;
   ModelView model;
   PostProcess post;
 
   SceneMesh mesh;  // surfaces at their place in this picture, then instruments
   SceneMesh rest;  // surfaces at rest, baked
   bool baked = true;
+  std::optional<HazeField> haze;
   LightView lightView;
   ShadowMap shadow;
   VertexLight lit;
@@ -131,9 +134,12 @@ void Renderer::Data::placeInstruments(const Picture& picture) {
 }
 
 void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view) {
-  lightView = makeLightView(picture.light, view, picture.camera);
+  // The model view has a backdrop of its own.
+  haze.reset();
+  if (picture.light.haze && picture.view != ViewKind::model) haze.emplace(picture.light, picture.camera, picture.time);
+  lightView = makeLightView(picture.light, view, picture.camera, mesh);
   if (settings.shadows) renderShadowMap(mesh, lightView, shadow);
-  lightVertices(mesh, view, picture.light, lightView, shadowIfOn(), lit);
+  lightVertices(mesh, view, picture.light, lightView, haze ? &*haze : nullptr, picture.time, shadowIfOn(), lit);
   sortVisibleTriangles(mesh, lit, shadowIfOn(), view, lists);
 }
 
@@ -145,6 +151,9 @@ void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
   glClearColor(0.02f, 0.01f, 0.01f, 1);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   if (picture.view == ViewKind::model) model.drawBackdrop();
+  const auto scaled = [&view](int side) { return int(float(side) * view.overscan); };
+  const int w = scaled(settings.width), h = scaled(settings.height);
+  glViewport((settings.width - w) / 2, (settings.height - h) / 2, w, h);
   if (view.round) tissue.drawMask(view);
   tissue.upload(lit, lists, shadowIfOn());
 
@@ -156,6 +165,7 @@ void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
     seenThrough[p] = skin;
   }
   tissue.draw(mesh, lists, opaque, view, lightView, 1);
+  if (haze) background.draw(view, *haze);
   if (picture.view == ViewKind::tissue) return;
   model.draw(view, picture.balls, picture.segments);
   tissue.draw(mesh, lists, seenThrough, view, lightView, kSeenThroughOpacity);

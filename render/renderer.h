@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,13 @@ struct Camera {
   float fovDegrees = 60;  // vertical
 };
 
+// Light scattered by air or water: it fills the background, reaches what the lamp does not, and veils what is far away:
+// a surface at distance d keeps exp(-d / distance) of its own light.
+struct Haze {
+  glm::vec3 colour{0};  // linear RGB towards the horizon; brighter above it, darker below (+y is up)
+  float distance = 10;  // m
+};
+
 // The endoscope's light sits beside the lens; offset in the camera's frame (right, up, back), m. A matt surface of
 // albedo a that faces it at distance d has the radiance 1.3 a intensity 1.14 r^2 / (d^2 + 0.14 r^2), r =
 // referenceDistance, shown through the ACES tone curve and the sRGB transfer. Setting referenceDistance to the distance
@@ -37,8 +45,11 @@ struct Camera {
 // in it too.
 struct Light {
   glm::vec3 offset{0.012f, 0.012f, 0};
-  float intensity = 1;  // 1 exposes a surface at `referenceDistance` fully
+  std::optional<glm::vec3> position;  // m, world: the lamp hangs here instead, and shines to all sides
+  float intensity = 1;                // 1 exposes a surface at `referenceDistance` fully
   float referenceDistance = 0.15f;
+  std::optional<Haze> haze;  // none: the dim red of a body's cavity
+  float caustics = 0;        // 0..1, with a position: contrast of ripples, as under a moving water surface
 };
 
 struct Instrument {
@@ -65,6 +76,7 @@ struct Segment {
 enum class ViewKind { tissue, model, both };
 
 struct Picture {
+  float time = 0;  // s: moves what moves by itself, the ripples of light
   ViewKind view = ViewKind::tissue;
   Camera camera;
   Light light;

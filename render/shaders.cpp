@@ -189,6 +189,25 @@ void main() {
 }
 )";
 
+const char* const kHazeVertexShader = R"(
+layout(location = 0) in vec2 place;
+layout(location = 1) in vec3 colour;
+noperspective out vec3 vColour;
+void main() {
+  vColour = colour;
+  gl_Position = vec4(place, 1, 1);
+}
+)";
+// Interleaved gradient noise (Jimenez 2014).
+const char* const kHazeFragmentShader = R"(
+noperspective in vec3 vColour;
+out vec4 pixel;
+void main() {
+  float tremble = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(.06711056, .00583715)))) - .5;
+  pixel = vec4(toneCurve(vColour) + tremble / 255., 1);
+}
+)";
+
 const char* const kBackdropVertexShader = R"(
 out vec2 place;
 void main() {

@@ -19,6 +19,8 @@ extern const char *const kTissueVertexShader, *const kTissueFragmentShader;
 extern const char *const kMaskVertexShader, *const kMaskFragmentShader;
 // Balls and segments of the model view, instanced.
 extern const char *const kModelVertexShader, *const kModelFragmentShader;
+// Background of haze: colours at the corners of a grid, with a tremble below one grey level that hides the steps.
+extern const char *const kHazeVertexShader, *const kHazeFragmentShader;
 // Background of the model view: one triangle.
 extern const char *const kBackdropVertexShader, *const kBackdropFragmentShader;
 

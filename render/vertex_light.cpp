@@ -10,7 +10,8 @@ namespace {
 
 using glm::vec3;
 
-// Light scattered by the cavity itself, linear RGB: from below and from above, and the veil of moist air.
+// Light scattered by the cavity itself, where no haze is given; linear RGB: from below and from above, at grazing
+// surfaces, and the veil of moist air.
 constexpr vec3 kAmbientBelow(0.070f, 0.022f, 0.018f), kAmbientAbove(0.130f, 0.075f, 0.065f);
 constexpr vec3 kRimLight(0.10f, 0.045f, 0.035f), kVeil(0.085f, 0.022f, 0.016f);
 constexpr vec3 kBlanched(0.56f, 0.44f, 0.33f);
@@ -23,21 +24,27 @@ struct Surroundings {
   const Viewpoint& view;
   const Light& light;
   const LightView& lightView;
+  const HazeField* haze;
+  float time;
   float coneInner, coneOuter;  // cosines: the endoscope's cone is a little wider than the picture
+  vec3 below = kAmbientBelow, above = kAmbientAbove, rim = kRimLight;
+  vec3 lamp{1};  // colour of its light
 };
 
 // One vertex while it is lit.
 struct Shading {
   vec3 normal, toEye, toLight;
   float eyeDistance, lightDistance;
-  float exposure;  // light per albedo without distance: falls off towards the rim, and in the veil
-  float veil;      // 0..1
-  float falloff;   // light's distance and cone
+  float exposure;   // light per albedo without distance: falls off towards the rim, and in the veil
+  float veil;       // 0..1
+  float veilLight;  // of the veil, as exposure is of albedo
+  vec3 veilColour;
+  float falloff;  // light's distance and cone
   vec3 albedo;
   float openness;
 };
 
-Shading shadingOf(const SceneMesh& mesh, std::size_t i, vec3 picture, const Surroundings& s) {
+Shading shadingOf(const SceneMesh& mesh, const Look& look, std::size_t i, vec3 picture, const Surroundings& s) {
   Shading v;
   v.normal = mesh.normal[i];
   v.toEye = s.view.position - mesh.position[i];
@@ -46,13 +53,19 @@ Shading shadingOf(const SceneMesh& mesh, std::size_t i, vec3 picture, const Surr
   v.toLight = s.lightView.position - mesh.position[i];
   v.lightDistance = std::max(glm::length(v.toLight), 1e-6f);
   v.toLight /= v.lightDistance;
-  v.falloff = lightFalloff(s.light, v.lightDistance) *
-              smoothStep(s.coneOuter, s.coneInner, -glm::dot(v.toLight, s.lightView.direction));
-  const float r = std::sqrt(picture.x * picture.x + picture.y * picture.y);
-  const float vignette = s.view.round ? 1 - 0.55f * smoothStep(0.25f, 0.85f, r) : 1.f;
+  v.falloff = lightFalloff(s.light, v.lightDistance);
+  if (!s.light.position)
+    v.falloff *= smoothStep(s.coneOuter, s.coneInner, -glm::dot(v.toLight, s.lightView.direction));
+  else if (s.light.caustics > 0 && !look.encloses)  // backdrops are too coarse for ripples
+    v.falloff *= causticAt(mesh.position[i], v.toLight, s.light.caustics, s.time);
+  const float vignette = vignetteAt(s.view, glm::vec2(picture));
   v.exposure = kExposure * vignette;
   const float reference = s.light.referenceDistance;
-  v.veil = s.view.round ? 1 - std::exp(-0.65f * std::max(v.eyeDistance / reference - 0.76f, 0.f)) : 0.f;
+  v.veil = s.haze         ? s.haze->veil(v.eyeDistance)
+           : s.view.round ? 1 - std::exp(-0.65f * std::max(v.eyeDistance / reference - 0.76f, 0.f))
+                          : 0.f;
+  v.veilLight = s.haze ? vignette : v.exposure;
+  v.veilColour = s.haze ? s.haze->toward(-v.toEye) : kVeil;
   const float blanch = mesh.blanch[i];
   v.albedo = glm::mix(mesh.albedo[i], kBlanched, 0.75f * blanch);
   v.openness = mesh.openness[i] * (1 - 0.3f * blanch);
@@ -64,14 +77,14 @@ float fresnelEdge(const Shading& v) {
   return grazing * grazing * grazing * grazing;
 }
 
-void lightTissue(const Shading& v, const Look& look, LitVertex& out) {
+void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitVertex& out) {
   const float cosine = glm::dot(v.normal, v.toLight), visible = v.exposure * (1 - v.veil);
   const vec3 reach = 1.f + look.wrap;
   const vec3 diffuse = glm::max((cosine + look.wrap) / (reach * reach), 0.f);
   const float crease = look.ambient > 0 ? 0.55f + 0.45f * v.openness : 1.f;
-  out.direct = v.albedo * diffuse * (v.falloff * visible * crease);
-  const vec3 sky = glm::mix(kAmbientBelow, kAmbientAbove, v.normal.y * 0.5f + 0.5f) * v.openness;
-  const vec3 rim = kRimLight * (fresnelEdge(v) * v.openness * 0.8f * std::min(v.falloff, 1.5f));
+  out.direct = v.albedo * diffuse * s.lamp * (v.falloff * visible * crease);
+  const vec3 sky = glm::mix(s.below, s.above, v.normal.y * 0.5f + 0.5f) * v.openness;
+  const vec3 rim = s.rim * (fresnelEdge(v) * v.openness * 0.8f * std::min(v.falloff, 1.5f));
   out.ambient = (v.albedo * sky * 1.2f + rim) * (visible * look.ambient);
 }
 
@@ -154,7 +167,7 @@ GlossLobes glossLobes(const Look& look) {
 }
 
 void lightVertices(const SceneMesh& mesh, const Viewpoint& view, const Light& light, const LightView& lightView,
-                   const ShadowMap* shadow, VertexLight& out) {
+                   const HazeField* haze, float time, const ShadowMap* shadow, VertexLight& out) {
   const std::size_t n = mesh.position.size();
   out.vertices.resize(n);
   out.picture.resize(n);
@@ -162,7 +175,15 @@ void lightVertices(const SceneMesh& mesh, const Viewpoint& view, const Light& li
   out.glinting.assign(n, 1);
   const float corner = view.round ? 2 * kRimOuter : 1.6f * std::sqrt(1 + view.aspect * view.aspect);
   const float cone = std::atan(corner * view.tangent);
-  const Surroundings s{view, light, lightView, std::cos(0.40f * cone), std::cos(std::min(1.07f * cone, 1.5f))};
+  Surroundings s{view, light, lightView, haze, time, std::cos(0.40f * cone), std::cos(std::min(1.07f * cone, 1.5f))};
+  if (haze) {
+    s.below = haze->below();
+    s.above = haze->above();
+    s.rim = 0.3f * light.haze->colour;
+    // The medium filters the lamp's light on its way, too.
+    const vec3 c = light.haze->colour;
+    s.lamp = glm::mix(vec3(1), c / std::max({c.x, c.y, c.z, 1e-6f}), 0.35f);
+  }
   for (const MeshPart& part : mesh.parts) {
     const Look& look = *part.look;
     const GlossLobes lobes = glossLobes(look);
@@ -172,12 +193,13 @@ void lightVertices(const SceneMesh& mesh, const Viewpoint& view, const Light& li
       o.uv = mesh.uv[i];
       o.detail = 1 - mesh.blanch[i];
       out.picture[i] = pictureFromWorld(view, mesh.position[i]);
-      const Shading v = shadingOf(mesh, i, out.picture[i], s);
+      const Shading v = shadingOf(mesh, look, i, out.picture[i], s);
       if (look.metal)
         lightMetal(v, o);
       else
-        lightTissue(v, look, o);
-      o.ambient += kVeil * (v.veil * v.exposure * look.ambient);
+        lightTissue(v, look, s, o);
+      o.ambient += v.veilColour * (v.veil * v.veilLight * look.ambient);
+      if (haze) o.detail *= 1 - v.veil;
 
       const vec3 halfway = glm::normalize(v.toLight + v.toEye);
       const float lh = glm::dot(v.toLight, halfway);

@@ -3,6 +3,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "render/haze.h"
 #include "render/shadow_map.h"
 #include "render/viewpoint.h"
 
@@ -42,7 +43,8 @@ struct VertexLight {
 constexpr float kExposure = 1.3f, kSoftening = 0.14f;
 float lightFalloff(const Light& light, float distance);
 
+// haze: of light.haze, or nullptr. time: Picture::time.
 void lightVertices(const SceneMesh& mesh, const Viewpoint& viewpoint, const Light& light, const LightView& lightView,
-                   const ShadowMap* shadow, VertexLight& out);
+                   const HazeField* haze, float time, const ShadowMap* shadow, VertexLight& out);
 
 }  // namespace medulla

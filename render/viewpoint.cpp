@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "render/noise.h"
+
 namespace medulla {
 namespace {
 
@@ -19,7 +21,46 @@ glm::vec3 direction(glm::vec3 from, glm::vec3 to) {
   return length > 0 ? d / length : glm::vec3(0, 0, -1);
 }
 
+void lookFromLamp(LightView& l, glm::vec3 up) {
+  l.clipFromWorld = glm::perspective(2 * std::atan(l.tangent), 1.f, l.nearDistance, l.farDistance) *
+                    glm::lookAt(l.position, l.position + l.direction, up);
+}
+
+// Everything that casts a shadow lies inside, everything that receives one no farther than the far plane.
+LightView makeLampView(glm::vec3 position, const SceneMesh& mesh) {
+  constexpr float kMargin = 1.05f, kWidest = 3;
+  glm::vec3 low(1e30f), high(-1e30f);
+  for (const MeshPart& part : mesh.parts)
+    for (std::uint32_t i = 0; part.look->castsShadow && i < part.vertexCount; ++i) {
+      low = glm::min(low, mesh.position[part.firstVertex + i]);
+      high = glm::max(high, mesh.position[part.firstVertex + i]);
+    }
+  LightView l;
+  l.position = position;
+  l.direction = low.x <= high.x ? direction(position, 0.5f * (low + high)) : glm::vec3(0, -1, 0);
+  float nearest = 1e30f, farthest = 0, tangent = 0;
+  for (const MeshPart& part : mesh.parts)
+    for (std::uint32_t i = 0; i < part.vertexCount; ++i) {
+      const glm::vec3 d = mesh.position[part.firstVertex + i] - position;
+      const float along = glm::dot(d, l.direction);
+      farthest = std::max(farthest, along);
+      if (!part.look->castsShadow || along <= 0) continue;
+      nearest = std::min(nearest, along);
+      tangent = std::max(tangent, glm::length(d - along * l.direction) / along);
+    }
+  l.tangent = std::clamp(kMargin * tangent, 1e-3f, kWidest);
+  l.farDistance = std::max(kMargin * farthest, 1e-3f);
+  // Not all of the depth for thin scenes: the biases of the shadow map are shares of it.
+  l.nearDistance = std::clamp(nearest / kMargin, 1e-3f * l.farDistance, 0.5f * l.farDistance);
+  lookFromLamp(l, anyPerpendicular(l.direction));
+  return l;
+}
+
 }  // namespace
+
+float vignetteAt(const Viewpoint& v, glm::vec2 p) {
+  return v.round ? 1 - 0.55f * smoothStep(0.25f, 0.85f, std::sqrt(p.x * p.x + p.y * p.y)) : 1.f;
+}
 
 Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round) {
   Viewpoint v;
@@ -33,11 +74,15 @@ Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round) {
   v.round = round;
   glm::mat4 clip = glm::perspective(glm::radians(camera.fovDegrees), aspect, kNearPlane, kFarPlane);
   clip[1][1] = -clip[1][1];
+  v.overscan = round ? 1.f : 2.f;
+  clip[0][0] /= v.overscan;
+  clip[1][1] /= v.overscan;
   v.clipFromWorld = clip * glm::lookAt(v.position, v.position - v.back, v.up);
   return v;
 }
 
-LightView makeLightView(const Light& light, const Viewpoint& v, const Camera& camera) {
+LightView makeLightView(const Light& light, const Viewpoint& v, const Camera& camera, const SceneMesh& mesh) {
+  if (light.position) return makeLampView(*light.position, mesh);
   LightView l;
   l.position = v.position + v.right * light.offset.x + v.up * light.offset.y + v.back * light.offset.z;
   l.direction = direction(l.position, camera.target);
@@ -46,9 +91,7 @@ LightView makeLightView(const Light& light, const Viewpoint& v, const Camera& ca
   l.tangent = std::min(1.15f * corner * v.tangent, 3.f);
   l.nearDistance = 0.2f * light.referenceDistance;
   l.farDistance = 20 * light.referenceDistance;
-  const glm::vec3 up = std::abs(glm::dot(l.direction, v.up)) < 0.95f ? v.up : v.right;
-  l.clipFromWorld = glm::perspective(2 * std::atan(l.tangent), 1.f, l.nearDistance, l.farDistance) *
-                    glm::lookAt(l.position, l.position + l.direction, up);
+  lookFromLamp(l, std::abs(glm::dot(l.direction, v.up)) < 0.95f ? v.up : v.right);
   return l;
 }
 

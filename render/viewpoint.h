@@ -16,6 +16,9 @@ struct Viewpoint {
   float tangent = 1;                                                  // of half the vertical field of view
   float aspect = 1;                                                   // width / height
   bool round = true;                                                  // the picture is cut to a circle
+  // Clip space reaches this many picture widths and heights. Mesa 22 spoils noperspective values where it clips a
+  // triangle against two sides at once: beyond the picture nobody sees it, nor behind the round picture's mask.
+  float overscan = 1;
   glm::mat4 clipFromWorld{1};  // y points down, so that the first row read back is the top one
 };
 
@@ -30,7 +33,11 @@ inline glm::vec3 pictureFromWorld(const Viewpoint& v, glm::vec3 p) {
   return {glm::dot(v.right, d) * scale, glm::dot(v.up, d) * scale, depth};
 }
 
+// The endoscope's picture fades towards its rim: factor on light, p in picture heights from the centre.
+float vignetteAt(const Viewpoint& v, glm::vec2 p);
+
 Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round);
-LightView makeLightView(const Light& light, const Viewpoint& viewpoint, const Camera& camera);
+// A lamp beside the lens sees what the camera sees, one in the world the casters of `mesh`.
+LightView makeLightView(const Light& light, const Viewpoint& viewpoint, const Camera& camera, const SceneMesh& mesh);
 
 }  // namespace medulla

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "render/haze.h"
+
 namespace medulla {
 namespace {
 
@@ -159,6 +161,72 @@ TEST(Renderer, ShadowFallsWhereTheRayIsBlocked) {
   EXPECT_GT(red(lit, pixel, 64), 100);
   EXPECT_LT(red(shaded, pixel, 64), 60);
   EXPECT_EQ(red(shaded, 110, 64), red(lit, 110, 64));
+}
+
+// A lamp in the world lights by its own distance and angle, wherever the camera stands.
+TEST(Renderer, LampInTheWorldStaysWhereItHangs) {
+  Renderer renderer(settingsOf(64, 64));
+  renderer.addSurface(plane("matte", 0.12f, 100));
+  Image image;
+  for (const float x : {0.f, 0.2f})
+    for (const float distance : {0.1f, 0.3f}) {
+      Picture p = viewFromFront(distance);
+      p.light.position = vec3(x, 0, 0.4f);
+      renderer.render(p, image);
+      const double away = std::hypot(x, 0.4);
+      EXPECT_NEAR(red(image, 32, 32), displayed(matteLight(p.light, away, 0.4 / away)), 2) << x << " " << distance;
+    }
+}
+
+TEST(Renderer, LampInTheWorldThrowsShadows) {
+  Renderer renderer(settingsOf(128, 128));
+  renderer.addSurface(plane("matte", 0.2f, 80));
+  renderer.addSurface(sphere("matte", {-0.02f, 0, 0.05f}, 0.012f));
+  Picture p = viewFromFront(0.3f);
+  p.light.position = vec3(-0.1f, 0, 0.2f);
+  p.light.referenceDistance = 0.2f;
+  Image image;
+  renderer.render(p, image);
+  // From the lamp through the ball's centre to z = 0.
+  const double x = -0.1 + 0.2 / (0.2 - 0.05) * (-0.02 + 0.1), scale = 64 / 0.3 / std::tan(glm::radians(20.0));
+  EXPECT_LT(red(image, 64 + int(x * scale), 64), 40);
+  EXPECT_GT(red(image, 64 + int((x + 0.05) * scale), 64), 80);
+  EXPECT_GT(red(image, 64 + int(x * scale), 64 + int(0.05 * scale)), 80);
+}
+
+TEST(Renderer, HazeFillsTheBackgroundAndTakesWhatIsFar) {
+  Renderer renderer(settingsOf(64, 64));
+  renderer.addSurface(sphere("bowl", {0, 0, 0}, 0.5f));
+  Picture p = viewFromFront(5);
+  p.light.haze = Haze{vec3(0.30f, 0.20f, 0.10f), 0.5f};
+  Image image;
+  renderer.render(p, image);
+  // Level with the eye; the ball, ten of the haze's distances away, cannot be told from what is behind it.
+  EXPECT_NEAR(red(image, 32, 32), displayed(0.30), 2);
+  EXPECT_NEAR(red(image, 60, 32), displayed(0.30), 2);
+  EXPECT_GT(red(image, 60, 2), red(image, 60, 32) + 10);
+  EXPECT_LT(red(image, 60, 62), red(image, 60, 32) - 10);
+  p.light.haze->distance = 500;
+  renderer.render(p, image);
+  EXPECT_GT(std::abs(red(image, 32, 32) - displayed(0.30)), 10);
+}
+
+TEST(Haze, CausticsKeepTheMeanOfTheLight) {
+  const int n = 200;
+  for (const float time : {0.f, 0.4f}) {
+    double sum = 0;
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < n; ++i) {
+        const float c = causticAt(0.1f * vec3(i, 0, j), {0, 1, 0}, 1, time);
+        ASSERT_GE(c, 0);
+        sum += c;
+        EXPECT_EQ(causticAt(0.1f * vec3(i, 0, j), {0, 1, 0}, 0, time), 1);
+      }
+    EXPECT_NEAR(sum / (n * n), 1, 0.1);
+  }
+  // The ripples are carried along the light: the same above and below.
+  const vec3 toLight = glm::normalize(vec3(0.3f, 1, -0.2f)), p(0.4f, 1, 2.2f);
+  EXPECT_NEAR(causticAt(p, toLight, 1, 2), causticAt(p - 1.5f * toLight, toLight, 1, 2), 1e-3);
 }
 
 TEST(Renderer, SamePictureTwiceIsTheSameToTheByte) {

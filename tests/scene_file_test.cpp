@@ -36,11 +36,11 @@ const char* completeScene = R"(<?xml version="1.0"?>
   <static shape="mesh" mesh="/abs/wall.obj" look="wall" position="1 0 0" orientation="0 1 0 0" unit="mm" contact="true" friction="0.4"/><static shape="plane" normal="0 0 2" position="0 0 3"/><static shape="box" size="1 2 3" look="fat" contact="false"/><static shape="sphere" radius="4"/>
   <tool name="grasper" trajectory="gallbladder.csv" radius="0.004" stiffness="300" damping="2" friction="0.4 0.1"
         force_max="5" grip_radius="0.007"/>
-  <camera position="0 0 0.2" target="0 0.01 0" fov="50">
+  <camera position="0 0 0.2" target="0 0.01 0" fov="50" endoscope="false">
     <key t="4" position="0 0.1 0.2"/>
     <key t="6" target="0.1 0 0" fov="40"/>
   </camera>
-  <light offset="0.01 0 0.01" intensity="1.5" reference_distance="0.2"/>
+  <light position="0.01 0 0.01" intensity="1.5" reference_distance="0.2" haze="0.1 0.2 0.3" haze_distance="4" caustics="0.5"/>
   <output size="640 480" fps="25" golden="0.5 3 7"/>
 </scene>
 )";
@@ -160,7 +160,11 @@ TEST_F(SceneFile, EveryValueOfScenerysToolsAndPictureArrives) {
   EXPECT_EQ(s.camera[2].position, Eigen::Vector3d(0, 0, 0.2));
   EXPECT_EQ(s.camera[2].target, Eigen::Vector3d(0.1, 0, 0));
   EXPECT_EQ(s.camera[2].fovDegrees, 40);
-  EXPECT_EQ(s.lightOffset, Eigen::Vector3d(0.01, 0, 0.01));
+  EXPECT_FALSE(s.endoscope);
+  EXPECT_EQ(s.lightPosition, Eigen::Vector3d(0.01, 0, 0.01));
+  EXPECT_EQ(s.haze, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(s.hazeDistance, 4);
+  EXPECT_EQ(s.caustics, 0.5);
   EXPECT_EQ(s.lightIntensity, 1.5);
   EXPECT_EQ(s.lightReferenceDistance, 0.2);
   EXPECT_EQ(s.width, 640);
@@ -183,8 +187,15 @@ TEST_F(SceneFile, DefaultsStandWhereNothingIsSaid) {
   EXPECT_TRUE(s.bodies[0].worldFromModel.isApprox(Eigen::Isometry3d::Identity(), 0));
   ASSERT_EQ(s.camera.size(), 1u);
   EXPECT_EQ(s.camera[0].fovDegrees, 60);
+  EXPECT_TRUE(s.endoscope && !s.haze);
   EXPECT_EQ(s.width, 1280);
   EXPECT_TRUE(s.goldenTimes.empty());
+}
+
+TEST_F(SceneFile, ALampBesideTheLens) {
+  const Scene s = read(edited("position=\"0.01 0 0.01\"", "offset=\"0.01 0 0.01\""), {{"light.caustics", "0"}});
+  EXPECT_FALSE(s.lightPosition);
+  EXPECT_EQ(s.lightOffset, Eigen::Vector3d(0.01, 0, 0.01));
 }
 
 TEST_F(SceneFile, AKeyAtZeroReplacesTheCamerasOwnPose) {
@@ -291,6 +302,16 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {"<key t=\"6\"", "<key t=\"4\"", R"(x.xml:22: <key> t="4": expected a later time than the key before it)"},
       {"target=\"0 0.01 0\"", "target=\"0 0 0.2\"",
        R"(x.xml:20: <camera> position="0 0 0.2": position and target are the same point)"},
+      {"endoscope=\"false\"", "endoscope=\"no\"",
+       R"(x.xml:20: <camera> endoscope="no": unknown value; known: "true", "false")"},
+      {"intensity=\"1.5\"", "offset=\"1 0 0\"",
+       R"(x.xml:24: <light> offset="1 0 0": the light has a position in the world, expected one of the two)"},
+      {"position=\"0.01 0 0.01\"", "", R"(x.xml:24: <light> caustics="0.5": expected a light with a position)"},
+      {"haze=\"0.1 0.2 0.3\"", "", R"(x.xml:24: <light> haze_distance="4": expected a haze beside it)"},
+      {"haze=\"0.1 0.2 0.3\"", "haze=\"0.1 0.2 -1\"",
+       R"(x.xml:24: <light> haze="0.1 0.2 -1": expected 3 numbers >= 0)"},
+      {"haze_distance=\"4\"", "haze_distance=\"0\"", R"(x.xml:24: <light> haze_distance="0": expected 1 number > 0)"},
+      {"caustics=\"0.5\"", "caustics=\"2\"", R"(x.xml:24: <light> caustics="2": expected 1 number >= 0 and <= 1)"},
       {"640 480", "641 480", R"(x.xml:25: <output> size="641 480": expected even width and height (video needs them))"},
       {"640 480", "640 8", R"(x.xml:25: <output> size="640 8": expected 2 integers >= 16 and <= 8192)"},
       {"0.5 3 7", "0.5 13", R"(x.xml:25: <output> golden="0.5 13": a time beyond the scene's duration)"},
@@ -344,7 +365,9 @@ TEST_F(SceneFile, OverridesReplaceSingleAttributes) {
 }
 
 TEST_F(SceneFile, OverridesReachElementsLeftToTheirDefaults) {
-  const std::string text = edited("<light offset=\"0.01 0 0.01\" intensity=\"1.5\" reference_distance=\"0.2\"/>", "");
+  const std::string text = edited(
+      R"(<light position="0.01 0 0.01" intensity="1.5" reference_distance="0.2" haze="0.1 0.2 0.3" haze_distance="4" caustics="0.5"/>)",
+      "");
   EXPECT_EQ(read(text, {{"light.intensity", "3"}}).lightIntensity, 3);
 }
 

@@ -363,12 +363,22 @@ void readCamera(const XmlElement& camera, Scene& scene) {
     scene.camera.push_back(key);
   }
   if (scene.camera.empty()) scene.camera.push_back(own);
+  scene.endoscope = readChoice(camera, "endoscope", {"true", "false"}, 0) == 0;
 }
 
 void readLight(const XmlElement& light, Scene& scene) {
   scene.lightOffset = readVector(light, "offset", scene.lightOffset);
   scene.lightIntensity = readNumber(light, "intensity", scene.lightIntensity, notNegative);
   scene.lightReferenceDistance = readNumber(light, "reference_distance", scene.lightReferenceDistance, positive);
+  if (light.find("position")) scene.lightPosition = readVector(light, "position", Eigen::Vector3d::Zero());
+  if (scene.lightPosition && light.find("offset"))
+    refuse(light, "offset", "the light has a position in the world, expected one of the two");
+  const std::vector<double> haze = readNumbers(light, "haze", 3, notNegative);
+  if (!haze.empty()) scene.haze = Eigen::Vector3d(haze[0], haze[1], haze[2]);
+  scene.hazeDistance = readNumber(light, "haze_distance", scene.hazeDistance, positive);
+  if (!scene.haze && light.find("haze_distance")) refuse(light, "haze_distance", "expected a haze beside it");
+  scene.caustics = readNumber(light, "caustics", scene.caustics, {0, 1});
+  if (!scene.lightPosition && scene.caustics > 0) refuse(light, "caustics", "expected a light with a position");
 }
 
 void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene) {

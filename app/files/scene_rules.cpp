@@ -33,9 +33,9 @@ const XmlRules& sceneRules() {
        {"mesh", "look", "position", "orientation", "unit", "normal", "size", "radius", "contact", "friction"},
        {}},
       {"tool", {"name", "trajectory"}, {"radius", "stiffness", "damping", "friction", "force_max", "grip_radius"}, {}},
-      {"camera", {"position", "target"}, {"fov"}, {{"key", 0, many}}},
+      {"camera", {"position", "target"}, {"fov", "endoscope"}, {{"key", 0, many}}},
       {"key", {"t"}, {"position", "target", "fov"}, {}},
-      {"light", {}, {"offset", "intensity", "reference_distance"}, {}},
+      {"light", {}, {"offset", "position", "intensity", "reference_distance", "haze", "haze_distance", "caustics"}, {}},
       {"output", {}, {"size", "fps", "golden"}, {}},
   };
   return rules;
