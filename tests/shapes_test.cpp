@@ -155,7 +155,7 @@ static const std::vector<CommittedMesh> committedMeshes = {{"gallbladder/gallbla
                                                            {"gut/small_intestine_fine", 20000},
                                                            {"dolphin/dolphin", 1120},
                                                            {"dolphin/dolphin_fine", 16000},
-                                                           {"scenery/fat", 6000},
+                                                           {"scenery/fat", 18000},
                                                            {"scenery/wall", 4000}};
 
 TEST(Shapes, EveryMeshIsABallOfGoodTrianglesThatDoesNotCrossItself) {

@@ -22,12 +22,12 @@ static double bedHeight(double x, double z) {
 // Jittered grid rather than free random places: no bare spots.
 static std::vector<Lobule> makeLobules() {
   std::vector<Lobule> lobules;
-  const double spacing = 19;
-  for (int i = 0; i < 19; ++i) {
-    for (int j = 0; j < 12; ++j) {
+  const double spacing = 15;
+  for (int i = 0; i < 24; ++i) {
+    for (int j = 0; j < 15; ++j) {
       const auto random = [&](int salt) { return noise(Vector3d(i, j, salt), 1) + 0.5; };  // lattice values: 0..1
       const double x = -195 + spacing * (i + random(1)), z = -95 + spacing * (j + random(2));
-      lobules.push_back({{x, bedHeight(x, z) + 16 * random(3), z}, 11 + 9 * random(4)});
+      lobules.push_back({{x, bedHeight(x, z) + 12 * random(3), z}, 9 + 8 * random(4)});
     }
   }
   return lobules;
@@ -42,7 +42,8 @@ static double topHeight(double x, double z) {
     const double dx = x - lobule.top.x(), dz = z - lobule.top.z(), across = dx * dx + dz * dz;
     const double widest = 1.7 * lobule.radius;
     if (across > widest * widest) continue;  // below its neighbours
-    height = smoothMax(height, lobule.top.y() - across / (1.6 * lobule.radius), 5);
+    const double relative = across / (lobule.radius * lobule.radius);
+    height = smoothMax(height, lobule.top.y() - lobule.radius * relative * (0.25 + 0.28 * relative), 5);  // pillows
   }
   return height;
 }
@@ -51,8 +52,8 @@ double fat(const Vector3d& p) {
   const double dx = (p.x() + 15) / 170, dz = (p.z() - 15) / 105;
   const double outside = 105 * (std::sqrt(dx * dx + dz * dz) - 1);
   if (p.y() > 0 || p.y() < -200 || outside > 40) return std::max({p.y() - 10, -190 - p.y(), outside, 10.0});
-  const double top = 0.75 * (p.y() - topHeight(p.x(), p.z()));  // 0.75: the domes' flanks are steep
-  return smoothMax(smoothMax(top, outside, 40), -180 - p.y(), 20) + 2.5 * noise(p, 16) + 0.7 * noise(p, 8);
+  const double top = 0.6 * (p.y() - topHeight(p.x(), p.z()));  // 0.6: the domes' flanks are steep
+  return smoothMax(smoothMax(top, outside, 40), -180 - p.y(), 20) + 1.5 * noise(p, 14);
 }
 
 }  // namespace medulla

@@ -46,7 +46,7 @@ static std::vector<MeshRecipe> recipes() {
           {"gut", "small_intestine_fine", smallIntestine, intestineBox, 1.5, {20000, 12, 0.5}},
           {"dolphin", "dolphin", thickFins, dolphinBox, 12, {1120, 250, 0.3, true}},
           {"dolphin", "dolphin_fine", thinFins, dolphinBox, 8, {16000, 150, 0.3, true}},
-          {"scenery", "fat", fat, {{-220, -240, -125}, {190, -20, 150}}, 2.5, {6000, 15, 0.6}},
+          {"scenery", "fat", fat, {{-220, -240, -125}, {190, -20, 150}}, 2.2, {18000, 15, 0.6}},
           {"scenery", "wall", cavity, {{-270, -450, -220}, {265, 205, 300}}, 9, {4000, 60, 0.6}, true}};
 }
 
