@@ -43,8 +43,15 @@ static double withVisceralLandmarks(double d, const Vector3d& p) {
   return smoothMax(d, -ellipsoid(p, {-102, -86, -34}, {30, 36, 32}), 16);         // right flexure of the colon
 }
 
+// How much lower the quadrate lobe's border hangs beside the gallbladder's neck, mm: it hides the end of the cystic duct.
+static double borderDrop(const Vector3d& p) {
+  const double aside = (p.x() + 16) / 26, near = std::max(1 - aside * aside, 0.0);
+  return 7 * near * near * smoothStep(-20, 5, p.z()) * (1 - smoothStep(0, 40, p.y()));
+}
+
 double liver(const Vector3d& p) {
-  double d = smoothMax(hull(p), visceralRadius - (p - visceralCentre()).norm(), 5);
+  const Vector3d q = p + Vector3d(0, borderDrop(p), 0);
+  double d = smoothMax(hull(q), visceralRadius - (q - visceralCentre()).norm(), 5);
   d = withVisceralLandmarks(d, p);
 
   // Falciform ligament: a notch in the border that runs up over the dome as a shallow furrow.
