@@ -43,7 +43,7 @@ static double withVisceralLandmarks(double d, const Vector3d& p) {
   return smoothMax(d, -ellipsoid(p, {-102, -86, -34}, {30, 36, 32}), 16);         // right flexure of the colon
 }
 
-// How much lower the quadrate lobe's border hangs beside the gallbladder's neck, mm: it hides the end of the cystic duct.
+// How much lower the border hangs beside the gallbladder's neck, mm: it hides the end of the cystic duct.
 static double borderDrop(const Vector3d& p) {
   const double aside = (p.x() + 16) / 26, near = std::max(1 - aside * aside, 0.0);
   return 7 * near * near * smoothStep(-20, 5, p.z()) * (1 - smoothStep(0, 40, p.y()));
