@@ -1,5 +1,7 @@
 #include "app/command_line.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
@@ -158,19 +160,34 @@ struct BuildArguments {
 };
 
 void addBuild(CLI::App& app, BuildArguments& a) {
-  CLI::App* c = app.add_subcommand("build", "make a model of filling spheres from a closed triangle mesh");
-  c->add_option("MESH", a.options.mesh, "closed surface: OBJ, OFF, STL, PLY, ...")->required();
-  c->add_option("-o,--output", a.options.output, "model file to write")->type_name("MODEL.xml")->required();
-  c->add_option("--spheres", a.options.settings.spheres, "number of filling spheres")
-      ->check(CLI::Range(1, spheresMax))
-      ->capture_default_str();
+  CLI::App* c = app.add_subcommand("build", "make a model of filling spheres from each closed triangle mesh");
+  c->add_option("MESH", a.options.meshes, "closed surface: OBJ, OFF, STL, PLY, ...; one body each")->required();
+  c->add_option("-o,--output", a.options.output,
+                "model file to write; for several meshes a folder, where each becomes MESH.model.xml")
+      ->type_name("MODEL.xml|DIR")
+      ->required();
+  CLI::Option* spheres =
+      c->add_option("--spheres", a.options.settings.spheres,
+                    "number of filling spheres; of several meshes together: each next sphere goes to the body whose "
+                    "largest gap, in metres, is largest")
+          ->check(CLI::Range(1, spheresMax))
+          ->capture_default_str();
+  c->add_option(
+       "--gap", a.options.settings.gap,
+       "instead of a number: the fewest spheres, of each mesh, that leave no wider gap between the surface and "
+       "the nearest sphere, in % of the bounding box's diagonal")
+      ->check(CLI::Range(0.01, 99.0))
+      ->type_name("PERCENT")
+      ->excludes(spheres);
   c->add_option("--method", a.method, "cover: inscribed balls chosen to fill the body; skeleton: the raw edge collapse")
       ->check(CLI::IsMember({"cover", "skeleton"}))
       ->capture_default_str();
   c->add_option("--unit", a.options.unit, "unit of the mesh files")
       ->check(CLI::IsMember({"m", "cm", "mm", "inch"}))
       ->capture_default_str();
-  c->add_option("--fine", a.options.fine, "detailed shape that the drawn surface follows")->type_name("MESH");
+  c->add_option("--fine", a.options.fine, "detailed shape that the drawn surface follows; of several meshes one each")
+      ->type_name("MESH")
+      ->allow_extra_args(false);
   c->add_option("--surface-mass", a.options.settings.surfaceMassFraction,
                 "share of the mass that surface nodes carry; more allows larger substeps")
       ->check(CLI::Range(0.0, 0.4))
@@ -181,9 +198,20 @@ void addBuild(CLI::App& app, BuildArguments& a) {
   c->add_option("--report", a.options.reportPath, "write the quality report as CSV too")->type_name("FILE.csv");
 }
 
+BuildOptions buildOptions(const BuildArguments& a) {
+  BuildOptions options = a.options;
+  options.settings.method = a.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
+  if (options.settings.gap > 0 && options.settings.method != BuildMethod::cover)
+    usageError("--gap", fmt::format("{}", options.settings.gap), "together with --method cover");
+  if (!options.fine.empty() && options.fine.size() != options.meshes.size())
+    usageError("--fine", options.fine.back(),
+               fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
+  return options;
+}
+
 void addNew(CLI::App& app, NewOptions& o) {
   CLI::App* c = app.add_subcommand("new", "make a scene, a model and a trajectory around a mesh, ready to render");
-  c->add_option("MESH", o.build.mesh, "closed surface: OBJ, OFF, STL, PLY, ...")->required();
+  c->add_option("MESH", o.build.meshes, "closed surface: OBJ, OFF, STL, PLY, ...")->required()->expected(1);
   c->add_option("-o,--output", o.folder, "folder for NAME.xml, NAME.model.xml and NAME.csv; made where missing")
       ->type_name("DIR")
       ->required();
@@ -225,16 +253,22 @@ int dispatch(int argc, char** argv) {
   addRunOptions(*replayCommand, replay);
   CLI::App* checkCommand = app.add_subcommand("check", "say whether a scene and all that it names can run");
   addSceneOptions(*checkCommand, check);
+  std::string infoPath;
+  app.add_subcommand("info", "tell what is in a model or a scene")
+      ->add_option("FILE", infoPath, "model or scene file (XML)")
+      ->required();
   addBuild(app, build);
   addNew(app, starter);
   addGolden(app, golden);
   RenderOptions renderRun;
   RunOptions replayRun, checkRun;
+  BuildOptions buildRun;
   try {
     app.parse(argc, argv);
     if (app.got_subcommand("render")) renderRun = renderOptions(render);
     if (app.got_subcommand("replay")) replayRun = runOptions(replay);
     if (app.got_subcommand("check")) checkRun = runOptions(check);
+    if (app.got_subcommand("build")) buildRun = buildOptions(build);
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
@@ -247,10 +281,8 @@ int dispatch(int argc, char** argv) {
   if (app.got_subcommand("check")) return runCheck(checkRun);
   if (app.got_subcommand("new")) return runNew(starter);
   if (app.got_subcommand("golden")) return runGolden(golden);
-  if (app.got_subcommand("build")) {
-    build.options.settings.method = build.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
-    return runBuild(build.options);
-  }
+  if (app.got_subcommand("build")) return runBuild(buildRun);
+  if (app.got_subcommand("info")) return runInfo(infoPath);
   std::fputs(app.help().c_str(), stderr);
   return 2;
 }

@@ -18,6 +18,21 @@ static void requireFile(const Scene& scene, int line, const std::string& what, c
     throw inputError(scene.path, line, fmt::format("{} \"{}\" does not exist", what, path));
 }
 
+// What regions fix: every node inside, and the spheres that those hold.
+static void resolveRegions(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
+  for (const SceneFixRegion& fix : body.regions) {
+    const std::vector<int> nodes = nodesInRegion(model, fix.region);
+    if (nodes.empty())
+      throw inputError(scene.path, fix.line, fmt::format("no surface node of body \"{}\" lies in here", body.name));
+    for (const int sphere : spheresHeldBy(model, nodes)) {
+      const bool known =
+          std::any_of(body.fixed.begin(), body.fixed.end(), [&](const FixedSphere& f) { return f.sphere == sphere; });
+      if (!known) body.fixed.push_back({sphere, fix.freedom});
+    }
+    body.fixedNodes.insert(body.fixedNodes.end(), nodes.begin(), nodes.end());
+  }
+}
+
 static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene& scene) {
   std::vector<std::shared_ptr<const SoftBodyModel>> models;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
@@ -69,6 +84,7 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
   }
   for (const SceneBody& body : scene.bodies) requireLook(scene, body.line, body.look);
   loaded.models = loadModels(scene);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) resolveRegions(scene, *loaded.models[b], scene.bodies[b]);
   for (const SceneStatic& item : scene.statics) {
     if (!item.look.empty()) requireLook(scene, item.line, item.look);
     if (!item.meshPath.empty()) requireFile(scene, item.line, "mesh", item.meshPath);

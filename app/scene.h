@@ -6,11 +6,18 @@
 #include <vector>
 
 #include "haptics/tool_input.h"
+#include "physics/dynamics/fixation.h"
 #include "physics/dynamics/world.h"
 
 // A scene file as read: plain values with defaults, nothing loaded yet. Paths are already resolved against the scene
 // file's folder. `line` is where the element stands, for errors found later.
 namespace medulla {
+
+struct SceneFixRegion {
+  int line = 0;
+  FixRegion region;
+  FixedFreedom freedom = FixedFreedom::all;  // of the spheres that the fixed nodes hold
+};
 
 struct SceneBody {
   int line = 0;
@@ -18,7 +25,9 @@ struct SceneBody {
   std::string name, modelPath, look;
   Tissue tissue;
   LinkFactors factors;
-  std::vector<FixedSphere> fixed;
+  std::vector<FixedSphere> fixed;  // by number; loadScene() adds those that the regions hold
+  std::vector<SceneFixRegion> regions;
+  std::vector<int> fixedNodes;  // found by loadScene()
   std::vector<DrivenSphere> driven;
   std::optional<std::vector<int>> neighbours;  // indices of bodies
   Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();

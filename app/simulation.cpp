@@ -18,7 +18,7 @@ static World makeWorld(const LoadedScene& loaded) {
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const SceneBody& body = scene.bodies[b];
     bodies.push_back({body.name, loaded.models[b], body.tissue, body.factors, body.surface, body.worldFromModel,
-                      body.fixed, body.driven, body.neighbours});
+                      body.fixed, body.fixedNodes, body.driven, body.neighbours});
   }
   std::vector<StaticShape> statics;
   for (std::size_t k = 0; k < scene.statics.size(); ++k) {
@@ -63,7 +63,7 @@ void Simulation::advanceFrame() {
   const FrameReport report = world_.advance(loads_);
   std::swap(previous_, current_);
   world_.readFrame(current_);
-  servo_->commit(previous_, current_);
+  if (!inputs_.empty()) servo_->commit(previous_, current_);  // without tools nobody feels the surface
   ++frame_;
   accountImpulses(report);
   accountVolumes();
@@ -77,7 +77,7 @@ void Simulation::runTicks() {
   record_.tools[0] = record_.tools[ticksPerFrame_];
   for (int tick = 1; tick <= ticksPerFrame_; ++tick) {
     sampleInputs(record_.start + tick * tickDuration_, inputs_);
-    servo_->tick(static_cast<double>(tick) / ticksPerFrame_, inputs_);
+    if (!inputs_.empty()) servo_->tick(static_cast<double>(tick) / ticksPerFrame_, inputs_);
     record_.inputs[tick] = inputs_;
     record_.tools[tick] = servo_->tools();
     for (const ToolState& tool : servo_->tools()) totals_.forceMax = std::max(totals_.forceMax, tool.force.norm());

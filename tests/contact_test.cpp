@@ -138,13 +138,20 @@ TEST(Contact, ATripodSticksBelowTheFrictionAngleAndSlidesAbove) {
     body.tissue.damping = 1;
     World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {body}, {plane(normal, friction)});
     ASSERT_LT(step, world.stableSubstep());
-    advance(world, static_cast<int>(duration / step));
+    const auto meanVelocity = [&world]() -> Vector3d {
+      return (velocityOf(world, 0) + velocityOf(world, 1) + velocityOf(world, 2)) / 3;
+    };
+    // The balls first roll as far as the links between them let them; then they slide.
+    advance(world, static_cast<int>(0.5 * duration / step));
+    const Vector3d before = meanVelocity();
+    advance(world, static_cast<int>(0.5 * duration / step));
     const double acceleration = kGravity * (std::sin(angle) - friction * std::cos(angle));
-    const Vector3d velocity = (velocityOf(world, 0) + velocityOf(world, 1) + velocityOf(world, 2)) / 3;
+    const Vector3d velocity = meanVelocity();
     if (acceleration < 0) {
       EXPECT_LT(velocity.norm(), 1e-5);
     } else {
-      EXPECT_NEAR(velocity.dot(down), acceleration * duration, 0.01 * acceleration * duration);
+      const double expected = 0.5 * acceleration * duration;
+      EXPECT_NEAR((velocity - before).dot(down), expected, 0.01 * expected);
     }
   }
 }

@@ -7,6 +7,7 @@
 #include "physics/model/build.h"
 #include "physics/model/build_report.h"
 #include "physics/model/link_sections.h"
+#include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
 #include "physics/model/plane_section.h"
 #include "tests/test_shapes.h"
@@ -69,7 +70,7 @@ TEST(PlaneSection, EllipseAndItsHalves) {
   EXPECT_NEAR(whole.area / area, 1, 3e-3);
   EXPECT_NEAR(whole.secondMoment(0, 0) / (area * 4 / 4), 1, 5e-3);
   EXPECT_NEAR(whole.secondMoment(1, 1) / (area * 1 / 4), 1, 5e-3);
-  const PowerSites sites{{{0, -1, 0}, {0, 1, 0}, {5, 1, 0}}, {0, 0, 0}};
+  const PowerSites sites{{{0, -1, 0}, {0, 1, 0}, {5, 1, 0}}, {0, 0, 0}, {9, 9, 9}};
   EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 1}).area / area, 1, 3e-3);
   EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 2}).area / area, 0.5, 3e-3);
 }
@@ -129,7 +130,7 @@ static void expectSound(const SoftBodyModel& model, const BuildReport& report) {
     EXPECT_LT(link.sphere0, link.sphere1);
     EXPECT_GT(std::min({link.area, link.bendingMomentU, link.bendingMomentV, link.torsionConstant}), 0);
   }
-  for (const MassProperties& s : remainingSpheres(model.restNodes, model.spheres, model.links, model.attachments)) {
+  for (const MassProperties& s : remainingSpheres(model.restNodes, model.spheres, model.attachments)) {
     EXPECT_GT(s.volume, 0);
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(s.secondMoment).eigenvalues()[0], 0);
   }
@@ -165,6 +166,93 @@ TEST(ModelBuild, BallsAreInscribed) {
   const SurfaceTree tree = makeSurfaceTree(mesh);
   for (const FillingSphere& s : model.spheres) {
     EXPECT_LE(s.radius, inscribedRadius(tree, s.restBallCentre) * (1 + 1e-9));
+  }
+}
+
+// A ring in the plane of x and z.
+static TriangleMesh torusMesh(double ringRadius, double tubeRadius, int around, int across) {
+  constexpr double pi = 3.14159265358979;
+  TriangleMesh mesh;
+  for (int i = 0; i < around; ++i) {
+    for (int j = 0; j < across; ++j) {
+      const double a = 2 * pi * i / around, b = 2 * pi * j / across, r = ringRadius + tubeRadius * std::cos(b);
+      mesh.vertices.emplace_back(r * std::cos(a), tubeRadius * std::sin(b), -r * std::sin(a));
+      const int i1 = (i + 1) % around, j1 = (j + 1) % across;
+      const int p = i * across + j, q = i1 * across + j, u = i1 * across + j1, v = i * across + j1;
+      mesh.triangles.push_back({p, q, u});
+      mesh.triangles.push_back({p, u, v});
+    }
+  }
+  return mesh;
+}
+
+TEST(ModelBuild, RingStaysClosed) {
+  const TriangleMesh mesh = torusMesh(0.05, 0.01, 48, 16);
+  EXPECT_EQ(countHandles(mesh), 1);
+  BuildReport report;
+  BuildSettings settings;
+  settings.spheres = 12;
+  const SoftBodyModel model = build(mesh, settings, report);
+  expectSound(model, report);
+  EXPECT_EQ(report.links, 12);
+  EXPECT_EQ(report.degreeMax, 2);
+  EXPECT_EQ(report.attachmentsCrossing, 0);
+  settings.method = BuildMethod::skeleton;
+  const SoftBodyModel skeleton = build(mesh, settings, report);
+  EXPECT_EQ(report.components, 1);
+  EXPECT_GE(report.links, report.spheres);
+}
+
+TEST(ModelBuild, ThinPlatesWorkOrAreRefused) {
+  const auto plate = [](double thickness) {
+    TriangleMesh mesh = ellipsoidMesh(4, {1, 1, 1});
+    for (Vector3d& v : mesh.vertices) {  // the superellipsoid of a rounded square plate
+      const double n = std::pow(std::pow(v.x(), 6) + std::pow(v.z(), 6) + std::pow(v.y(), 6), 1 / 6.);
+      v = (v / n).cwiseProduct(Vector3d(0.05, thickness / 2, 0.05));
+    }
+    return mesh;
+  };
+  BuildReport report;
+  BuildSettings settings;
+  settings.spheres = 60;
+  const SoftBodyModel model = build(plate(0.004), settings, report);
+  expectSound(model, report);
+  EXPECT_EQ(report.centresOutside, 0);
+  try {
+    build(plate(0.0006), settings, report);
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("too thin"), std::string::npos) << error.what();
+  }
+}
+
+TEST(ModelBuild, FewestSpheresForAGap) {
+  const TriangleMesh mesh = assetMesh("gallbladder/gallbladder.obj");
+  BuildReport report;
+  BuildSettings settings;
+  settings.gap = 4.5;
+  const SoftBodyModel model = build(mesh, settings, report);
+  expectSound(model, report);
+  EXPECT_LE(report.gapMax, 4.5);
+  settings.gap = 0;
+  settings.spheres = report.spheres - 2;
+  build(mesh, settings, report);
+  EXPECT_GT(report.gapMax, 4.5);
+  settings.gap = 0.01;  // no ball reaches into corners
+  EXPECT_THROW(build(cylinderMesh(0.1, 0.01, 12, 10), settings, report), std::runtime_error);
+}
+
+// The promises on the project's own bodies, where limbs and sheets make them hard.
+TEST(ModelBuild, OwnBodiesKeepTheirPromises) {
+  for (const char* name : {"liver/liver.obj", "stomach/stomach.obj", "dolphin/dolphin.obj"}) {
+    BuildReport report;
+    BuildSettings settings;
+    settings.spheres = 25;
+    const SoftBodyModel model = build(assetMesh(name), settings, report);
+    SCOPED_TRACE(name);
+    expectSound(model, report);
+    EXPECT_EQ(report.centresOutside, 0);
+    EXPECT_LE(report.attachmentsCrossing, 1);  // in the notch behind the dorsal fin a node sees no sphere and no link
   }
 }
 

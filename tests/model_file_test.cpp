@@ -111,6 +111,7 @@ TEST_F(ModelFile, ReadingGivesTheSameBits) {
     EXPECT_TRUE(sameBits(a.attachments[k].restOffset, b.attachments[k].restOffset));
     EXPECT_TRUE(sameBits(a.attachments[k].area, b.attachments[k].area));
     EXPECT_TRUE(sameBits(a.attachments[k].volume, b.attachments[k].volume));
+    EXPECT_EQ(a.attachments[k].massSphere, b.attachments[k].massSphere);
   }
 }
 
@@ -140,8 +141,8 @@ TEST_F(ModelFile, MistakesNameTheLineAndWhatIsWrong) {
   const struct {
     std::string from, to, complaint;
   } mistakes[] = {
-      {"version=\"1\"", "version=\"2\"",
-       R"(m.xml:2: <model> version="2": expected 1; make the model anew with medulla build)"},
+      {"version=\"2\"", "version=\"1\"",
+       R"(m.xml:2: <model> version="1": expected 2; make the model anew with medulla build)"},
       {"fedcba9876543210", "fedc", R"(m.xml:2: <model> mesh_hash="fedc": expected 16 hexadecimal digits)"},
       {"<edges", "<egdes", "m.xml:23: broken XML: an element is not closed where it was opened"},
       {" name=\"a", " nam=\"a", R"(m.xml:2: <model> has no attribute "nam"; did you mean "name"?)"},

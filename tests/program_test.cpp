@@ -111,10 +111,85 @@ TEST(Program, BuildsAModelThatRenders) {
   EXPECT_EQ(runProgram(command({"replay", kScene, "--set", "body.gallbladder.model=" + folder / "m.xml"})).exitCode, 0);
 }
 
+TEST(Program, BuildsToAGap) {
+  const TemporaryFolder folder;
+  const std::string mesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj";
+  const ProgramResult r = runProgram({"build", mesh, "-o", folder / "m.xml", "--gap", "6", "--render-levels", "0"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_LE(std::stod(valueOf(r.out, "gap_max")), 6);
+  EXPECT_LT(std::stoi(valueOf(r.out, "spheres")), 7);  // seven leave less than 4 %
+  EXPECT_NE(readFile(folder / "m.xml").find("--gap 6 "), std::string::npos);
+  expectRefusal(runProgram({"build", mesh, "-o", folder / "n.xml", "--gap", "6", "--spheres", "7"}), 2,
+                {"--gap", "--spheres"});
+  expectRefusal(runProgram({"build", mesh, "-o", folder / "n.xml", "--gap", "6", "--method", "skeleton"}), 2,
+                {"--gap", "cover"});
+  EXPECT_EQ(folder.contents(), std::vector<std::string>{"m.xml"});
+}
+
+TEST(Program, BuildsSeveralBodiesAsEachAlone) {
+  const TemporaryFolder folder;
+  const std::string assets = std::string(MEDULLA_SOURCE_DIR) + "/assets/";
+  folder.write("large.obj", readFile(assets + "gallbladder/gallbladder.obj"));
+  folder.write("dolphin.obj", readFile(assets + "dolphin/dolphin.obj"));
+  const std::vector<std::string> few = {"--render-levels", "0"};
+  const ProgramResult both = runProgram(command({"build", folder / "large.obj", folder / "dolphin.obj", "-o",
+                                                 folder / "models", "--spheres", "12", "--report", folder / "r.csv"},
+                                                few));
+  ASSERT_EQ(both.exitCode, 0) << both.err;
+  const std::string large = valueOf(both.out, "large.spheres"), dolphin = valueOf(both.out, "dolphin.spheres");
+  EXPECT_EQ(std::stoi(large) + std::stoi(dolphin), 12);
+  EXPECT_EQ(valueOf(both.out, "total.spheres"), "12");
+  EXPECT_GT(std::stoi(dolphin), std::stoi(large));  // 2.5 m against 0.1 m
+  EXPECT_NE(readFile(folder / "r.csv").find("dolphin.gap_max,"), std::string::npos);
+  const ProgramResult alone =
+      runProgram(command({"build", folder / "dolphin.obj", "-o", folder / "d.xml", "--spheres", dolphin}, few));
+  ASSERT_EQ(alone.exitCode, 0) << alone.err;
+  EXPECT_EQ(readFile(folder / "d.xml"), readFile(folder / "models/dolphin.model.xml"));
+  expectRefusal(
+      runProgram({"build", folder / "large.obj", folder / "dolphin.obj", "-o", folder / "none", "--spheres", "1"}), 1,
+      {"1 spheres", "2 bodies"});
+  EXPECT_FALSE(std::filesystem::exists(folder / "none"));
+}
+
+TEST(Program, InfoTellsOfModelsAndScenes) {
+  const std::string model = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.model.xml";
+  const ProgramResult ofModel = runProgram({"info", model});
+  ASSERT_EQ(ofModel.exitCode, 0) << ofModel.err;
+  EXPECT_EQ(valueOf(ofModel.out, "kind"), "model");
+  EXPECT_EQ(valueOf(ofModel.out, "spheres"), "7");
+  EXPECT_EQ(valueOf(ofModel.out, "triangles"), "466");
+  EXPECT_EQ(valueOf(ofModel.out, "mesh_hash").size(), 16u);
+  for (const char* name : {"settings", "links", "nodes", "volume", "extents", "gap_max", "cover", "mass_at_1000_kg/m3"})
+    EXPECT_NE(valueOf(ofModel.out, name), "") << name;
+  const ProgramResult ofScene = runProgram({"info", kScene});
+  ASSERT_EQ(ofScene.exitCode, 0) << ofScene.err;
+  EXPECT_EQ(valueOf(ofScene.out, "kind"), "scene");
+  EXPECT_EQ(valueOf(ofScene.out, "body.gallbladder.spheres"), "7");
+  for (const char* name : {"duration", "servo", "dynamics", "substep", "bodies", "statics", "tools"})
+    EXPECT_NE(valueOf(ofScene.out, name), "") << name;
+  const TemporaryFolder folder;
+  folder.write("x.xml", "<other/>\n");
+  expectRefusal(runProgram({"info", folder / "x.xml"}), 1, {"x.xml:1", "scene"});
+  expectRefusal(runProgram({"info", folder / "none.xml"}), 1, {"none.xml"});
+}
+
+TEST(Program, RepairsAreToldInOneLine) {
+  const TemporaryFolder folder;
+  const std::string mesh = readFile(std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj");
+  const std::size_t lastFace = mesh.rfind("\nf ");
+  folder.write("holed.obj", mesh.substr(0, lastFace + 1) + "v 0 0 0\n");
+  const ProgramResult r =
+      runProgram({"build", folder / "holed.obj", "-o", folder / "m.xml", "--spheres", "2", "--render-levels", "0"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+  EXPECT_NE(r.err.find("holed.obj: mesh repair: dropped 1 unused vertex; filled a hole"), std::string::npos) << r.err;
+}
+
 TEST(Program, HelpAndVersion) {
   EXPECT_EQ(runProgram({"--help"}).exitCode, 0);
   EXPECT_NE(runProgram({"--help"}).out.find("render"), std::string::npos);
-  for (const char* verb : {"render", "replay", "build", "golden"}) EXPECT_EQ(runProgram({verb, "--help"}).exitCode, 0);
+  for (const char* verb : {"render", "replay", "build", "info", "golden"})
+    EXPECT_EQ(runProgram({verb, "--help"}).exitCode, 0);
   const ProgramResult version = runProgram({"--version"});
   for (const char* name : {"medulla", "compiler", "embree", "renderer"})
     EXPECT_NE(valueOf(version.out, name), "") << name;

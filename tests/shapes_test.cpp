@@ -156,6 +156,10 @@ static const std::vector<CommittedMesh> committedMeshes = {{"gallbladder/gallbla
                                                            {"gut/small_intestine_fine", 20000},
                                                            {"dolphin/dolphin", 1120},
                                                            {"dolphin/dolphin_fine", 16000},
+                                                           {"toys/bean", 200},
+                                                           {"toys/drop", 160},
+                                                           {"toys/star", 240},
+                                                           {"toys/bowl", 4000},
                                                            {"scenery/fat", 18000},
                                                            {"scenery/wall", 4000}};
 

@@ -44,7 +44,7 @@ TEST(Skeleton, TellsTubesFromBulkyBodies) {
   };
   EXPECT_TRUE(tubular(cylinderMesh(0.1, 0.01, 12, 30)));
   EXPECT_TRUE(tubular(assetMesh("gallbladder/gallbladder.obj")));
-  EXPECT_FALSE(tubular(assetMesh("scenery/liver.obj")));
+  EXPECT_FALSE(tubular(assetMesh("liver/liver.obj")));
 }
 
 TEST(Skeleton, SphereAndEqualLengthsGiveOneAnswer) {

@@ -119,6 +119,13 @@ inline void attachNodes(SoftBodyModel& m, double surfaceShare) {
       a.along = 0;
       a.restOffset = offset;
     }
+    double nearest = 1e30;
+    for (std::size_t k = 0; k < m.spheres.size(); ++k) {
+      const double distance = (m.restNodes[i] - m.spheres[k].restFrame).squaredNorm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      a.massSphere = static_cast<int>(k);
+    }
   }
 }
 

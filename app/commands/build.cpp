@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <filesystem>
 
 #include "app/commands/commands.h"
@@ -10,66 +9,158 @@
 #include "app/files/report_file.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
+#include "physics/model/ball_choice.h"
+#include "physics/model/mesh_topology.h"
 
 namespace medulla {
 
-// The command that repeats the build, file names without folders: the model is the same wherever it is built.
-static std::string repeatingCommand(const BuildOptions& options) {
-  namespace fs = std::filesystem;
-  std::string command = fmt::format("medulla build {} {}", fs::path(options.mesh).filename().string(),
-                                    describeSettings(options.settings));
-  if (options.unit != "m") command += " --unit " + options.unit;
-  if (!options.fine.empty()) command += " --fine " + fs::path(options.fine).filename().string();
+namespace fs = std::filesystem;
+
+namespace {
+
+struct BuildJob {
+  std::string meshPath, finePath, modelPath, name;
+  std::uint64_t inputHash = 0;
+  RepairedMesh mesh;
+  TriangleMesh fine;
+  BuildSettings settings;
+  SoftBodyModel model;
+  BuildReport report;
+};
+
+// The command that repeats the build, file names without folders: the model is the same wherever it is built, and the
+// same whether it is built alone or with others.
+std::string repeatingCommand(const BuildJob& job, const std::string& unit) {
+  std::string command =
+      fmt::format("medulla build {} {}", fs::path(job.meshPath).filename().string(), describeSettings(job.settings));
+  if (unit != "m") command += " --unit " + unit;
+  if (!job.finePath.empty()) command += " --fine " + fs::path(job.finePath).filename().string();
   return command;
 }
 
-static RepairedMesh repaired(const std::string& path, const TriangleMesh& mesh) {
+// What goes wrong with one mesh is said with its name.
+template <typename Work>
+auto naming(const std::string& path, const Work& work) {
   try {
-    return repairMesh(mesh);
+    return work();
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(fmt::format("{}: {}", path, error.what()));
   }
 }
 
 // An organ of 60 m is a mesh in millimetres read as metres.
-static void warnOfSize(const std::string& path, const TriangleMesh& mesh) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& v : mesh.vertices) box.extend(v);
-  const double size = box.diagonal().norm();
+void warnOfSize(const std::string& path, const TriangleMesh& mesh) {
+  const double size = boundsDiagonal(mesh);
   if (size > 5 || size < 0.005)
     fmt::print(stderr, "{}: note: the mesh is {:.3g} m across; is --unit right?\n", path, size);
 }
 
-int runBuild(const BuildOptions& options) {
-  requireDistinctFiles({options.output, options.reportPath}, {options.mesh, options.fine});
-  { const OutputFile writableAtAll(options.output); }
-  if (!options.reportPath.empty()) const OutputFile writableAtAll(options.reportPath);
-  const double scale = metresPerUnit(options.unit);
-  const TriangleMesh input = readMesh(options.mesh, scale);
-  warnOfSize(options.mesh, input);
-  const RepairedMesh mesh = repaired(options.mesh, input);
-  for (const std::string& note : mesh.notes) fmt::print(stderr, "{}: {}\n", options.mesh, note);
-  TriangleMesh fine;
-  if (!options.fine.empty()) fine = readMesh(options.fine, scale);
+// All that was repaired and found in one line.
+void tellRepairs(const std::string& path, const std::vector<std::string>& notes) {
+  if (notes.empty()) return;
+  std::string line;
+  for (const std::string& note : notes) line += (line.empty() ? "" : "; ") + note;
+  fmt::print(stderr, "{}: mesh repair: {}\n", path, line);
+}
 
-  BuildReport report;
-  Progress progress("build", 100, "%");
-  SoftBodyModel model;
-  try {
-    model = buildModel(mesh, options.fine.empty() ? nullptr : &fine, options.settings, report, [&](double share) {
-      checkInterrupt();
-      progress.update(100 * share);
-    });
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(fmt::format("{}: {}", options.mesh, error.what()));
+std::vector<BuildJob> jobsOf(const BuildOptions& options) {
+  std::vector<BuildJob> jobs;
+  for (std::size_t m = 0; m < options.meshes.size(); ++m) {
+    BuildJob& job = jobs.emplace_back();
+    job.meshPath = options.meshes[m];
+    if (!options.fine.empty()) job.finePath = options.fine[m];
+    job.name = fs::path(job.meshPath).stem().string();
+    job.modelPath =
+        options.meshes.size() == 1 ? options.output : (fs::path(options.output) / (job.name + ".model.xml")).string();
+    job.settings = options.settings;
   }
-  model.name = std::filesystem::path(options.mesh).stem().string();
-  model.meshHash = hashMesh(input);
-  model.settings = repeatingCommand(options);
-  const std::vector<Result> results = buildResults(report);
-  writeModel(options.output, model);
-  if (!options.reportPath.empty()) writeReport(options.reportPath, results);
-  printResults(results);
+  return jobs;
+}
+
+void requireDistinct(const BuildOptions& options, const std::vector<BuildJob>& jobs) {
+  std::vector<std::string> outputs{options.reportPath}, inputs = options.fine;
+  for (const BuildJob& job : jobs) {
+    outputs.push_back(job.modelPath);
+    inputs.push_back(job.meshPath);
+  }
+  requireDistinctFiles(outputs, inputs);
+  for (const std::string& path : outputs)
+    if (!path.empty()) const OutputFile writableAtAll(path);
+}
+
+void readMeshes(double scale, std::vector<BuildJob>& jobs) {
+  for (BuildJob& job : jobs) {
+    const TriangleMesh input = readMesh(job.meshPath, scale);
+    job.inputHash = hashMesh(input);
+    warnOfSize(job.meshPath, input);
+    job.mesh = naming(job.meshPath, [&] { return repairMesh(input); });
+    tellRepairs(job.meshPath, job.mesh.notes);
+    if (!job.finePath.empty()) job.fine = readMesh(job.finePath, scale);
+  }
+}
+
+// The spheres asked for are those of all bodies together.
+void divideSpheres(std::vector<BuildJob>& jobs) {
+  std::vector<BodyShape> shapes;
+  for (const BuildJob& job : jobs) shapes.push_back(naming(job.meshPath, [&] { return measureShape(job.mesh.mesh); }));
+  const std::vector<int> counts = shareSpheres(shapes, jobs[0].settings.spheres);
+  for (std::size_t j = 0; j < jobs.size(); ++j) jobs[j].settings.spheres = counts[j];
+}
+
+void buildAll(const std::string& unit, std::vector<BuildJob>& jobs) {
+  Progress progress("build", 100, "%");
+  for (std::size_t j = 0; j < jobs.size(); ++j) {
+    BuildJob& job = jobs[j];
+    const auto tick = [&](double share) {
+      checkInterrupt();
+      progress.update(100 * (static_cast<double>(j) + share) / static_cast<double>(jobs.size()));
+    };
+    job.model = naming(job.meshPath, [&] {
+      return buildModel(job.mesh, job.finePath.empty() ? nullptr : &job.fine, job.settings, job.report, tick);
+    });
+    job.model.name = job.name;
+    job.model.meshHash = job.inputHash;
+    job.model.settings = repeatingCommand(job, unit);
+  }
+}
+
+std::vector<Result> resultsOf(const std::vector<BuildJob>& jobs) {
+  if (jobs.size() == 1) return buildResults(jobs[0].report);
+  std::vector<Result> results;
+  std::vector<BuildReport> reports;
+  for (const BuildJob& job : jobs) {
+    for (Result& r : buildResults(job.report)) results.push_back({job.name + "." + r.name, r.value, r.unit});
+    reports.push_back(job.report);
+  }
+  for (Result& r : totalResults(reports)) results.push_back({"total." + r.name, r.value, r.unit});
+  return results;
+}
+
+}  // namespace
+
+int runBuild(const BuildOptions& options) {
+  const double scale = metresPerUnit(options.unit);
+  std::vector<BuildJob> jobs = jobsOf(options);
+  bool made = false;
+  std::error_code error;
+  if (jobs.size() > 1) {
+    made = fs::create_directory(options.output, error);
+    if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", options.output, error.message()));
+  }
+  try {
+    requireDistinct(options, jobs);
+    readMeshes(scale, jobs);
+    const bool shared = jobs.size() > 1 && options.settings.method == BuildMethod::cover && options.settings.gap == 0;
+    if (shared) divideSpheres(jobs);
+    buildAll(options.unit, jobs);
+    const std::vector<Result> results = resultsOf(jobs);
+    for (const BuildJob& job : jobs) writeModel(job.modelPath, job.model);
+    if (!options.reportPath.empty()) writeReport(options.reportPath, results);
+    printResults(results);
+  } catch (...) {
+    if (made) fs::remove(options.output, error);  // if it is empty again
+    throw;
+  }
   return 0;
 }
 

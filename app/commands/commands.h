@@ -12,8 +12,10 @@
 namespace medulla {
 
 struct BuildOptions {
-  std::string mesh, fine, unit = "m", output, reportPath;
-  BuildSettings settings;
+  std::vector<std::string> meshes;             // at least one
+  std::vector<std::string> fine;               // none, or one per mesh
+  std::string unit = "m", output, reportPath;  // output: the model, of several meshes a folder for NAME.model.xml each
+  BuildSettings settings;                      // spheres: of all meshes together
 };
 int runBuild(const BuildOptions& options);
 
@@ -24,6 +26,9 @@ struct NewOptions {
 int runNew(const NewOptions& options);
 
 int runCheck(const RunOptions& options);
+
+// What a model or scene file holds, told apart by its root element.
+int runInfo(const std::string& path);
 
 int runReplay(const RunOptions& options);
 

@@ -29,7 +29,7 @@ static void writeText(const std::string& path, const std::string& text) {
 }
 
 int runNew(const NewOptions& options) {
-  const std::string name = nameFrom(options.build.mesh);
+  const std::string name = nameFrom(options.build.meshes[0]);
   const fs::path folder = options.folder;
   const auto file = [&](const char* ending) { return (folder / (name + ending)).string(); };
   const std::string scenePath = file(".xml"), trajectoryPath = file(".csv"), modelPath = file(".model.xml");

@@ -18,7 +18,7 @@ namespace medulla {
 
 namespace {
 
-constexpr int formatVersion = 1;
+constexpr int formatVersion = 2;
 
 const XmlRules& modelRules() {
   static const XmlRules rules = [] {
@@ -107,7 +107,7 @@ void putVolumeModel(std::string& out, const SoftBodyModel& model) {
   });
   putRows(out, "attachments", model.attachments.size(), [&](std::size_t k) {
     const Attachment& a = model.attachments[k];
-    put(out, a.onLink ? 1 : 0, a.host, a.along, a.restOffset, a.area, a.volume);
+    put(out, a.onLink ? 1 : 0, a.host, a.along, a.restOffset, a.area, a.volume, a.massSphere);
   });
   putRows(out, "buckets", model.buckets.size(),
           [&](std::size_t k) { put(out, static_cast<int>(model.buckets[k].size()), model.buckets[k]); });
@@ -284,6 +284,7 @@ void readAttachments(const std::string& path, const XmlElement& root, SoftBodyMo
     a.onLink = rows.index(2) == 1;
     a.host = rows.index(a.onLink ? model.links.size() : model.spheres.size());
     rows.get(a.along, a.restOffset, a.area, a.volume);
+    a.massSphere = rows.index(model.spheres.size());
     rows.require(a.along >= 0 && a.along <= (a.onLink ? 1 : 0), "a position along its host outside 0 to 1 (sphere: 0)");
     rows.require(a.area >= 0 && a.volume >= 0, "a negative area or volume");
   });

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <type_traits>
 
 #include "app/files/output_file.h"
@@ -23,6 +24,8 @@ std::vector<Result> buildResults(const BuildReport& r) {
   return {{"triangles", numberText(r.triangles), ""},
           {"skeleton_nodes", numberText(r.skeletonNodes), ""},
           {"skeleton_links", numberText(r.skeletonLinks), ""},
+          {"volume", numberText(r.volume), "m3"},
+          {"diagonal", numberText(r.diagonal), "m"},
           {"spheres", numberText(r.spheres), ""},
           {"links", numberText(r.links), ""},
           {"gap_max", numberText(r.gapMax), "%"},
@@ -39,6 +42,24 @@ std::vector<Result> buildResults(const BuildReport& r) {
           {"attachment_max", numberText(r.attachmentMax), "%"},
           {"degree_max", numberText(r.degreeMax), ""},
           {"seconds", numberText(r.seconds), "s"}};
+}
+
+std::vector<Result> totalResults(const std::vector<BuildReport>& reports) {
+  BuildReport total;
+  double covered = 0, widest = 0;
+  for (const BuildReport& r : reports) {
+    total.triangles += r.triangles;
+    total.spheres += r.spheres;
+    total.links += r.links;
+    total.volume += r.volume;
+    total.seconds += r.seconds;
+    covered += r.cover * r.volume;
+    widest = std::max(widest, r.gapMax / 100 * r.diagonal);
+  }
+  return {{"triangles", numberText(total.triangles), ""}, {"volume", numberText(total.volume), "m3"},
+          {"spheres", numberText(total.spheres), ""},     {"links", numberText(total.links), ""},
+          {"gap_max", numberText(widest), "m"},           {"cover", numberText(covered / total.volume), "%"},
+          {"seconds", numberText(total.seconds), "s"}};
 }
 
 void writeReport(const std::string& path, const std::vector<Result>& results) {

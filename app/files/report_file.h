@@ -15,6 +15,9 @@ struct Result {
 // The quality report of a model build, in the order in which it is shown.
 std::vector<Result> buildResults(const BuildReport& report);
 
+// Sums over the bodies of one build; the cover is that of all volumes together, the gap the largest in metres.
+std::vector<Result> totalResults(const std::vector<BuildReport>& reports);
+
 // CSV with the header name,value,unit. Errors are those of OutputFile.
 void writeReport(const std::string& path, const std::vector<Result>& results);
 

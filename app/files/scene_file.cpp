@@ -185,19 +185,40 @@ Tissue findTissue(const XmlElement& body, const std::vector<NamedTissue>& tissue
   refuse(body, "tissue", "no <tissue> of this name; did you mean \"" + nearestName(name, known) + "\"?");
 }
 
-std::vector<FixedSphere> readFixedSpheres(const XmlElement& body) {
-  std::vector<FixedSphere> out;
+FixRegion readFixRegion(const XmlElement& fix) {
+  FixRegion region;
+  const std::vector<double> box = readNumbers(fix, "box", 6), ball = readNumbers(fix, "sphere", 4);
+  if (!box.empty()) {
+    region.box = {Eigen::Vector3d(box[0], box[1], box[2]), Eigen::Vector3d(box[3], box[4], box[5])};
+    if (region.box.isEmpty()) refuse(fix, "box", "expected the lower corner first: x0 y0 z0 x1 y1 z1");
+    return region;
+  }
+  region.shape = FixRegion::Shape::ball;
+  region.centre = {ball[0], ball[1], ball[2]};
+  region.radius = ball[3];
+  if (!(region.radius > 0)) refuse(fix, "sphere", "expected x y z and a radius > 0");
+  return region;
+}
+
+void readFixations(const XmlElement& body, SceneBody& out) {
   std::set<int> taken;
   for (const XmlElement* fix : childrenOf(body, "fix")) {
     const bool all = readChoice(*fix, "dof", {"all", "translation"}, 0) == 0;
+    const FixedFreedom freedom = all ? FixedFreedom::all : FixedFreedom::translation;
+    const int ways = (fix->find("spheres") ? 1 : 0) + (fix->find("box") ? 1 : 0) + (fix->find("sphere") ? 1 : 0);
+    if (ways != 1)
+      throw std::runtime_error(fix->where + ": <fix> says what it fixes by one of spheres, box and sphere");
+    if (!fix->find("spheres")) {
+      out.regions.push_back({fix->line, readFixRegion(*fix), freedom});
+      continue;
+    }
     for (const int sphere : readIntegers(*fix, "spheres", 0, notNegative)) {
       if (!taken.insert(sphere).second) {
         refuse(*fix, "spheres", "sphere " + std::to_string(sphere) + " is fixed twice");
       }
-      out.push_back({sphere, all ? FixedFreedom::all : FixedFreedom::translation});
+      out.fixed.push_back({sphere, freedom});
     }
   }
-  return out;
 }
 
 std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::vector<FixedSphere>& fixed) {
@@ -262,7 +283,7 @@ void readBodies(const XmlElement& root, Scene& scene) {
     readChoice(*e, "links", {"springs"}, 0);
     body.surface = readChoice(*e, "surface", {"full", "skin"}, 0) == 0 ? SurfaceMode::full : SurfaceMode::skin;
     body.worldFromModel = readPlacement(*e);
-    body.fixed = readFixedSpheres(*e);
+    readFixations(*e, body);
     body.driven = readDrivenSpheres(*e, body.fixed);
     body.factors = readLinkFactors(onlyChild(*e, "links"));
     scene.bodies.push_back(std::move(body));

@@ -24,7 +24,7 @@ const XmlRules& sceneRules() {
        {"name", "model", "tissue", "look"},
        {"position", "orientation", "links", "surface"},
        {{"fix", 0, many}, {"drive", 0, many}, {"links", 0, 1}, {"neighbours", 0, 1}}},
-      {"fix", {"spheres"}, {"dof"}, {}},
+      {"fix", {}, {"sphere", "spheres", "box", "dof"}, {}},
       {"drive", {"sphere", "axis", "amplitude", "frequency"}, {"phase", "velocity"}, {}},
       {"links", {}, {"select", "elongation", "flexion", "torsion"}, {}},
       {"neighbours", {"names"}, {}, {}},

@@ -206,6 +206,10 @@ const XmlAttribute* XmlElement::find(const std::string& attribute) const {
   return nullptr;
 }
 
+std::string rootElementOf(const std::string& path) {
+  return parseXml(path).name;
+}
+
 XmlElement readXml(const std::string& path, const XmlRules& rules, const std::function<void(XmlElement&)>& edit) {
   XmlElement root = parseXml(path);
   const std::string& expected = rules.front().element;

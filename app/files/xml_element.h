@@ -44,6 +44,9 @@ using XmlRules = std::vector<XmlRule>;  // the first is the root's; every child 
 // may change the tree before it is held against the rules.
 XmlElement readXml(const std::string& path, const XmlRules& rules, const std::function<void(XmlElement&)>& edit = {});
 
+// Name of the root element. Throws std::runtime_error "FILE:LINE: ..." on broken XML.
+std::string rootElementOf(const std::string& path);
+
 const XmlRule& ruleOf(const XmlRules& rules, const std::string& element);  // asserts that there is one
 
 // The known name with the fewest edits (insert, delete, replace, swap neighbours), the first among equals; "" of none.

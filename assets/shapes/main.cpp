@@ -15,6 +15,7 @@
 #include "assets/shapes/organs.h"
 #include "assets/shapes/remesh.h"
 #include "assets/shapes/surface_nets.h"
+#include "assets/shapes/toys.h"
 
 namespace medulla {
 
@@ -46,6 +47,10 @@ static std::vector<MeshRecipe> recipes() {
           {"gut", "small_intestine_fine", smallIntestine, intestineBox, 1.5, {20000, 12, 0.5}},
           {"dolphin", "dolphin", thickFins, dolphinBox, 12, {1120, 250, 0.3, true}},
           {"dolphin", "dolphin_fine", thinFins, dolphinBox, 8, {16000, 150, 0.3, true}},
+          {"toys", "bean", bean, {{-70, -40, -35}, {70, 45, 35}}, 2, {200, 30, 0.5}},
+          {"toys", "drop", drop, {{-40, -55, -40}, {40, 60, 40}}, 2, {160, 30, 0.5}},
+          {"toys", "star", star, {{-65, -60, -30}, {65, 65, 30}}, 2, {240, 30, 0.5}},
+          {"toys", "bowl", bowl, {{-230, -250, -230}, {230, 40, 230}}, 4, {4000, 200, 0.5}},
           {"scenery", "fat", fat, {{-220, -240, -125}, {190, -20, 150}}, 2.2, {18000, 15, 0.6}},
           {"scenery", "wall", cavity, {{-270, -450, -220}, {265, 205, 300}}, 9, {4000, 60, 0.6}, true}};
 }

@@ -54,6 +54,9 @@ void checkDescription(const BodyDescription& body) {
   for (const FixedSphere& f : body.fixed)
     require(f.sphere >= 0 && f.sphere < spheres,
             fmt::format("it fixes sphere {}: expected 0 to {}", f.sphere, spheres - 1));
+  const int nodes = static_cast<int>(m.restNodes.size());
+  for (const int node : body.fixedNodes)
+    require(node >= 0 && node < nodes, fmt::format("it fixes node {}: expected 0 to {}", node, nodes - 1));
   for (const DrivenSphere& driven : body.driven) {
     require(driven.sphere >= 0 && driven.sphere < spheres,
             fmt::format("it drives sphere {}: expected 0 to {}", driven.sphere, spheres - 1));
@@ -70,10 +73,13 @@ void checkDescription(const BodyDescription& body) {
     require(
         std::min(l.sphere0, l.sphere1) >= 0 && std::max(l.sphere0, l.sphere1) < spheres && l.sphere0 != l.sphere1,
         fmt::format("its model links spheres {} and {}: expected two of 0 to {}", l.sphere0, l.sphere1, spheres - 1));
-  for (const Attachment& a : m.attachments)
+  for (const Attachment& a : m.attachments) {
     require(
         a.host >= 0 && a.host < (a.onLink ? links : spheres),
         fmt::format("its model attaches a node to {} {}, which does not exist", a.onLink ? "link" : "sphere", a.host));
+    require(a.massSphere >= 0 && a.massSphere < spheres,
+            fmt::format("its model takes a node's mass from sphere {}, which does not exist", a.massSphere));
+  }
 }
 
 Vector3d centreLine(const SoftBodyModel& m, const ElasticLink& l) {
@@ -155,26 +161,15 @@ Matrix3d raised(const Matrix3d& a, double floor) {
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(floor).asDiagonal() * eigen.eigenvectors().transpose();
 }
 
-// What a node's mass takes from its hosts so that the whole body keeps mass, first moment along links and inertia: a
-// node at s of a link of line d counts as (1-s) and s at the ends, which alone would spread s (1-s) d d^T too much.
+// What the nodes' masses take from their cells' spheres: exactly the matter that sits at the nodes, so that spheres and
+// nodes together have the body's mass, centre and inertia (physics/model/node_volumes.h).
 void takeNodeMasses(const SoftBodyModel& m, const BodyMechanics& b, std::vector<double>& mass,
                     std::vector<Matrix3d>& moment) {
   for (std::size_t i = 0; i < b.attachments.size(); ++i) {
-    const Attachment& a = b.attachments[i];
-    const Matrix3d own = b.nodeMass[i] * a.restOffset * a.restOffset.transpose();
-    if (!a.onLink) {
-      mass[a.host] -= b.nodeMass[i];
-      moment[a.host] -= own;
-      continue;
-    }
-    const ElasticLink& l = m.links[a.host];
-    const Vector3d line = centreLine(m, l);
-    const double s = std::clamp(a.along, 0.0, 1.0);
-    const Matrix3d spread = b.nodeMass[i] * s * (1 - s) * line * line.transpose();
-    mass[l.sphere0] -= (1 - s) * b.nodeMass[i];
-    mass[l.sphere1] -= s * b.nodeMass[i];
-    moment[l.sphere0] -= (1 - s) * (own - spread);
-    moment[l.sphere1] -= s * (own - spread);
+    const int sphere = b.attachments[i].massSphere;
+    const Vector3d r = m.restNodes[i] - m.spheres[sphere].restFrame;
+    mass[sphere] -= b.nodeMass[i];
+    moment[sphere] -= b.nodeMass[i] * r * r.transpose();
   }
 }
 
@@ -218,6 +213,8 @@ BodyMechanics bodyMechanics(const BodyDescription& body) {
     out.moves[f.sphere] = false;
     if (f.freedom == FixedFreedom::all) out.turns[f.sphere] = false;
   }
+  out.nodeMoves.assign(body.model->restNodes.size(), true);
+  for (const int node : body.fixedNodes) out.nodeMoves[node] = false;
   for (const DrivenSphere& driven : body.driven) out.moves[driven.sphere] = false;
   out.links = linkStiffness(body);
   out.attachments = perpendicularAttachments(*body.model);

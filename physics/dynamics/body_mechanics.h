@@ -23,7 +23,10 @@ struct BodyMechanics {
   std::vector<double> attachmentStiffness;  // N/m per node; of the full surface
   std::vector<double> edgeStiffness;        // N/m per edge; of the full surface
   std::vector<double> nodeMass;             // kg; 0 on skin
-  double linkRelaxation = 0, surfaceRelaxation = 0;  // s, damping over stiffness; set by dampBody
+  std::vector<bool> nodeMoves;              // per node: not fixed
+  // Set by dampBody. s, damping over stiffness, Rayleigh's beta of links and surface; 1/s, damping over mass, his
+  // alpha.
+  double linkRelaxation = 0, surfaceRelaxation = 0, massDamping = 0;
 };
 
 // Throws std::runtime_error, without the body's name, where the description cannot be simulated.

@@ -140,7 +140,7 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
     d.ranges[b].node[k] = i;
     n.position[i] = quadOf(body.worldFromModel * body.model->restNodes[k]);
     n.mass[i] = mechanics[b].nodeMass[k];
-    n.inverseMass[i] = n.mass[i] > 0 ? 1 / n.mass[i] : 0;
+    n.inverseMass[i] = n.mass[i] > 0 && mechanics[b].nodeMoves[k] ? 1 / n.mass[i] : 0;
     NodeGroup& g = n.groups[i / 4];
     g.mass[lane] = n.mass[i];
     g.stiffness[lane] = mechanics[b].attachmentStiffness[k];
@@ -242,6 +242,8 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.linkCount = static_cast<int>(m.links.size());
     r.node.resize(m.restNodes.size());
     r.restVolume = enclosedVolume(m);
+    r.massDamping = mechanics[b].massDamping;
+    r.held = !d.bodies[b].fixed.empty() || !d.bodies[b].fixedNodes.empty();
     d.ranges.push_back(r);
     addSpheres(d, d.bodies[b], mechanics[b]);
     addLinks(d, d.bodies[b], mechanics[b], r.firstSphere);

@@ -211,7 +211,12 @@ void applyLoads(WorldData& d, const Loads& loads, double remaining, std::vector<
   constexpr double kSettled = 1e-12;  // of the largest force
   const std::size_t springs = loads.toolSprings.size(), count = springs + loads.heldNodes.size();
   assert(d.loadForces.size() == count);
-  for (Vector3d& f : d.loadForces) f.setZero();
+  // From the forces of the substep before: in a body at rest they are the answer already, and what few passes leave
+  // open settles over the substeps.
+  for (std::size_t k = 0; k < count; ++k) {
+    const PointSpring p = pointSpring(d, loads, k, remaining);
+    for (int i = 0; i < p.count; ++i) addNodeImpulse(d, p.nodes[i], d.substep * p.weights[i] * d.loadForces[k]);
+  }
   for (int pass = 0; pass < kPasses; ++pass) {
     double change = 0, largest = 0;
     for (std::size_t k = 0; k < count; ++k) {

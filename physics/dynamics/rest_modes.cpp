@@ -155,7 +155,7 @@ class RestModel {
       y.segment<3>(6 * i) *= mechanics_.moves[i] ? 1 / mechanics_.sphereMass[i] : 0;
       y.segment<3>(6 * i + 3) = (mechanics_.turns[i] ? 1.0 : 0.0) * (inverseInertia_[i] * x.segment<3>(6 * i + 3));
     }
-    for (int i = 0; i < nodes_; ++i) y.segment<3>(node(i)) /= mechanics_.nodeMass[i];
+    for (int i = 0; i < nodes_; ++i) y.segment<3>(node(i)) *= mechanics_.nodeMoves[i] ? 1 / mechanics_.nodeMass[i] : 0;
     return y;
   }
 
@@ -274,8 +274,10 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics) {
   // The surface's own modes are fast and die within a few substeps even below their critical damping; giving them the
   // body's beta would only cost step. An eighth of critical at the fastest of them costs a tenth of it, a half a third.
   constexpr double kLargestSurfaceRatio = 0.125;
-  // The links get the beta that damps the lowest mode as asked, unless the step would shrink by more than this.
-  constexpr double kLargestCost = 8;
+  // The links get the beta that damps the lowest mode as asked, unless the step would shrink by more than this. What is
+  // missing then is the mass-proportional part of Rayleigh's damping, which costs no step: zeta = beta w / 2 + alpha /
+  // 2w.
+  constexpr double kLargestCost = 1.5;
 
   const RestModel rest(body, mechanics);
   const double all = rest.largestEigenvalue(1, 1), links = rest.largestEigenvalue(1, 0),
@@ -288,6 +290,7 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics) {
   const double largestDamping = (4 / shortest - shortest * all) / 2;
   const double bound = links > 0 ? (largestDamping - mechanics.surfaceRelaxation * surface) / links : asked;
   mechanics.linkRelaxation = std::min(asked, std::max(0.0, bound));
+  mechanics.massDamping = (asked - mechanics.linkRelaxation) * lowest * lowest;
   // Both matrices are sums of the links' and the surface's, and the modes that are stiffest are not those damped most:
   // the step is searched for where the largest eigenvalue of h^2 K + 2 h C itself reaches 4.
   const double linkBeta = mechanics.linkRelaxation, surfaceBeta = mechanics.surfaceRelaxation;

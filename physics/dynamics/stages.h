@@ -11,8 +11,10 @@ void evaluateAttachments(WorldData&);  // surface.cpp: weight and host's pull of
 void addEdgeSprings(WorldData&);       // to the nodes' forces
 void returnLinkForces(WorldData&);     // link_force.cpp: links and what hangs on them, to their two spheres
 void sumSphereForces(WorldData&);      // spheres.cpp
-void stepVelocities(WorldData&);       // spheres and nodes
-void dragVelocities(WorldData&);       // driven.cpp: the medium's resistance
+// Before the forces' share of the velocities, which tools and contacts balance in a body at rest.
+void dampBodies(WorldData&);      // body_damping.cpp: Rayleigh's alpha
+void dragVelocities(WorldData&);  // driven.cpp: the medium's resistance
+void stepVelocities(WorldData&);  // spheres and nodes
 // driven.cpp: driven spheres get the velocity that takes them to their path at `time`, the substep's end (s).
 void driveSpheres(WorldData&, double time);
 // loads.cpp: tool springs and held nodes, implicitly against the velocities of this substep, so that their stiffness

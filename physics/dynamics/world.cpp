@@ -45,8 +45,9 @@ void step(WorldData& d, const Loads& loads, double remaining, FrameReport& repor
   addEdgeSprings(d);
   returnLinkForces(d);
   sumSphereForces(d);
-  stepVelocities(d);
+  dampBodies(d);
   dragVelocities(d);
+  stepVelocities(d);
   driveSpheres(d, static_cast<double>(d.frame + 1) * d.settings.frameDuration - remaining);
   applyLoads(d, loads, remaining, report.toolImpulse);
   resolveContacts(d);
@@ -169,7 +170,7 @@ FrameReport World::advance(const Loads& loads) {
   for (const ToolSpring& t : loads.toolSprings) tools = std::max(tools, t.tool + 1);
   for (const HeldNode& held : loads.heldNodes) tools = std::max(tools, held.tool + 1);
   report.toolImpulse.assign(tools, Eigen::Vector3d::Zero());
-  d.loadForces.resize(loads.toolSprings.size() + loads.heldNodes.size());
+  d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Eigen::Vector3d::Zero());
   for (int k = 1; k <= d.substeps; ++k) step(d, loads, (d.substeps - k) * d.substep, report);
   ++d.frame;
   // The frames that readers hang nodes on are those of the state at the end.

@@ -59,6 +59,7 @@ struct BodyDescription {
   SurfaceMode surface = SurfaceMode::full;
   Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
   std::vector<FixedSphere> fixed;
+  std::vector<int> fixedNodes;  // of the full surface; without effect on a skin, which follows its spheres
   std::vector<DrivenSphere> driven;
   std::optional<std::vector<int>> neighbours;  // bodies that it may touch; absent: all that do not choose others
 };

@@ -96,7 +96,7 @@ struct Nodes {
   int count = 0;                          // with pads
   std::vector<Quad> position, velocity;   // m, m/s
   std::vector<Quad> force;                // N, of the current substep; dynamic nodes only
-  std::vector<double> mass, inverseMass;  // kg, 1/kg; 0 on pads and on skin
+  std::vector<double> mass, inverseMass;  // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
   std::vector<NodeGroup> groups;
   std::vector<GroupHost> groupHosts;
   std::vector<HostRange> onLinks, onSpheres;          // dynamic nodes (SurfaceMode::full), first in the arrays
@@ -121,8 +121,10 @@ struct Springs {
 struct BodyRange {
   int firstSphere = 0, sphereCount = 0;
   int firstLink = 0, linkCount = 0;
-  std::vector<int> node;  // index in Nodes of every model node
-  double restVolume = 0;  // m3, enclosed by the rest nodes
+  std::vector<int> node;   // index in Nodes of every model node
+  double restVolume = 0;   // m3, enclosed by the rest nodes
+  double massDamping = 0;  // 1/s, Rayleigh's alpha
+  bool held = false;       // some sphere is fixed: deformation is motion against it rather than against a rigid motion
 };
 
 // A driven sphere; DrivenSphere with everything in world units.
@@ -144,7 +146,7 @@ struct WorldData {
   std::vector<SphereDrive> drives;
   ContactData contact;
 
-  // Force of each tool load in the current substep, tool springs first, then held nodes; sized once per frame.
+  // Force of each tool load in the current substep, tool springs first, then held nodes; zero at the frame's start.
   std::vector<Eigen::Vector3d> loadForces;
 
   Quad gravity;

@@ -5,21 +5,20 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <cmath>
 #include <stdexcept>
 
 #include "physics/model/attachment.h"
-#include "physics/model/ball_cover.h"
+#include "physics/model/ball_choice.h"
 #include "physics/model/build_report.h"
 #include "physics/model/edge_collapse_skeleton.h"
 #include "physics/model/link_graph.h"
 #include "physics/model/link_sections.h"
 #include "physics/model/mass_properties.h"
-#include "physics/model/medial_balls.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
 #include "physics/model/power_cells.h"
 #include "physics/model/render_surface.h"
-#include "physics/model/surface_samples.h"
 
 namespace medulla {
 
@@ -27,14 +26,6 @@ using Eigen::Vector3d;
 using Progress = std::function<void(double)>;
 
 namespace {
-
-// What every stage measures against.
-struct Shape {
-  const TriangleMesh& mesh;
-  SurfaceTree tree;
-  MassProperties exact;
-  double diagonal = 0;  // m, of the bounding box
-};
 
 struct SpheresAndLinks {
   std::vector<Ball> balls;
@@ -46,36 +37,15 @@ void checkSettings(const BuildSettings& s) {
   if (s.spheres < 1 || s.spheres > spheresMax) {
     throw std::runtime_error(fmt::format("{} spheres asked for; expected 1 to {}", s.spheres, spheresMax));
   }
+  if (!(s.gap >= 0 && s.gap < 100)) {
+    throw std::runtime_error(fmt::format("a gap of {} % asked for; expected more than 0 and less than 100", s.gap));
+  }
   if (!(s.surfaceMassFraction >= 0 && s.surfaceMassFraction <= 0.4)) {
     throw std::runtime_error(fmt::format("surface mass fraction {}; expected 0 to 0.4", s.surfaceMassFraction));
   }
   if (s.renderLevels < 0 || s.renderLevels > 4) {
     throw std::runtime_error(fmt::format("{} render levels; expected 0 to 4", s.renderLevels));
   }
-}
-
-Shape measureShape(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) throw std::runtime_error("the mesh has no triangles; expected a closed surface");
-  Shape shape{mesh, makeSurfaceTree(mesh), massProperties(mesh), 0};
-  shape.diagonal = boundsDiagonal(mesh);
-  if (!(shape.exact.volume > 0)) throw std::runtime_error("the mesh encloses no volume; expected an outward surface");
-  return shape;
-}
-
-std::vector<Ball> chooseBalls(const Shape& shape, int count, const Progress& progress) {
-  const int candidates = std::max(2500, 3 * count), samples = std::max(3000, 3 * count);
-  const std::vector<Ball> medial = medialBalls(shape.tree, sampleSurface(shape.mesh, candidates, 1), shape.diagonal);
-  if (static_cast<int>(medial.size()) < count) {
-    throw std::runtime_error(
-        fmt::format("the mesh holds {} inscribed balls; {} spheres were asked for", medial.size(), count));
-  }
-  std::vector<Vector3d> points;
-  for (const SurfaceSample& s : sampleSurface(shape.mesh, samples, 2)) points.push_back(s.point);
-  // Vertices stick out furthest; beyond a few thousand the samples lie as close.
-  if (shape.mesh.vertices.size() < 1500) {
-    points.insert(points.end(), shape.mesh.vertices.begin(), shape.mesh.vertices.end());
-  }
-  return coverWithBalls(shape.tree, medial, points, shape.diagonal, count, progress);
 }
 
 // Spheres without material of their own are dropped; links to them pass to the nearest other sphere.
@@ -107,10 +77,11 @@ void dropEmptyCells(const VoxelBody& voxels, const MassProperties& exact, Sphere
 }
 
 // The paper's raw result: skeleton nodes are spheres of inscribed radius, skeleton edges are links.
-SpheresAndLinks spheresOfSkeleton(const Shape& shape, const Skeleton& skeleton, const VoxelBody& voxels) {
+SpheresAndLinks spheresOfSkeleton(const BodyShape& shape, const Skeleton& skeleton) {
   SpheresAndLinks s;
   for (const Vector3d& node : skeleton.nodes) s.balls.push_back({node, inscribedRadius(shape.tree, node)});
   for (const std::array<int, 2>& link : skeleton.links) s.links.push_back({link[0], link[1]});
+  const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, voxelsFor(static_cast<int>(s.balls.size())));
   s.cells = divideByPower(voxels, s.balls, shape.exact);
   dropEmptyCells(voxels, shape.exact, s);
   std::vector<Vector3d> centres;
@@ -120,19 +91,22 @@ SpheresAndLinks spheresOfSkeleton(const Shape& shape, const Skeleton& skeleton, 
   return s;
 }
 
-SpheresAndLinks spheresByCover(const Shape& shape, const Skeleton& skeleton, const VoxelBody& voxels, int count,
-                               const Progress& progress) {
+SpheresAndLinks spheresByCover(const BodyShape& shape, const Skeleton& skeleton, std::vector<Ball> balls) {
   SpheresAndLinks s;
-  s.balls = chooseBalls(shape, count, progress);
+  s.balls = std::move(balls);
+  const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, voxelsFor(static_cast<int>(s.balls.size())));
   s.cells = divideByPower(voxels, s.balls, shape.exact);
   dropEmptyCells(voxels, shape.exact, s);
-  s.links = linkCells(shape.tree, s.cells, s.balls, isTubular(shape.mesh, shape.tree, skeleton));
+  // A ring is no tree: handles need the links that close them.
+  const bool treeOnly = countHandles(shape.mesh) == 0 && isTubular(shape.mesh, shape.tree, skeleton);
+  s.links = linkCells(shape.tree, s.cells, s.balls, treeOnly);
   return s;
 }
 
 // Where nodes hang depends on the frames, and the frames on the mass that hangs. Some rounds choose what every node
 // hangs on, the others only slide along: choosing to the end can swing between two hosts for ever.
-void hangNodesAndShareMass(const Shape& shape, const SpheresAndLinks& s, double massFraction, SoftBodyModel& model) {
+void hangNodesAndShareMass(const BodyShape& shape, const SpheresAndLinks& s, double massFraction,
+                           SoftBodyModel& model) {
   constexpr int choosingRounds = 3, slidingRounds = 8;
   for (std::size_t i = 0; i < s.balls.size(); ++i) {
     const MassProperties& cell = s.cells.cells[i];
@@ -149,7 +123,7 @@ void hangNodesAndShareMass(const Shape& shape, const SpheresAndLinks& s, double 
     } else {
       reprojectAttachments(shape.mesh, model.spheres, model.links, model.attachments);
     }
-    shareOutMass(model.restNodes, s.cells.cells, massFraction, model.links, model.attachments, model.spheres);
+    shareOutMass(model.restNodes, s.cells, massFraction, model.attachments, model.spheres);
   }
   reprojectAttachments(shape.mesh, model.spheres, model.links, model.attachments);
 }
@@ -174,8 +148,9 @@ std::string describeSettings(const BuildSettings& s) {
   if (s.method == BuildMethod::skeleton) {
     return fmt::format("--method skeleton --surface-mass {} --render-levels {}", s.surfaceMassFraction, s.renderLevels);
   }
-  return fmt::format("--method cover --spheres {} --surface-mass {} --render-levels {}", s.spheres,
-                     s.surfaceMassFraction, s.renderLevels);
+  const std::string resolution = s.gap > 0 ? fmt::format("--gap {}", s.gap) : fmt::format("--spheres {}", s.spheres);
+  return fmt::format("--method cover {} --surface-mass {} --render-levels {}", resolution, s.surfaceMassFraction,
+                     s.renderLevels);
 }
 
 SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine, const BuildSettings& settings,
@@ -185,7 +160,7 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
     if (progress) progress(part);
   };
   checkSettings(settings);
-  const Shape shape = measureShape(repaired.mesh);
+  const BodyShape shape = measureShape(repaired.mesh);
 
   SoftBodyModel model;
   model.meshHash = hashMesh(repaired.mesh);
@@ -197,12 +172,15 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
   model.skeleton = collapseEdges(shape.mesh);
   done(0.05);
 
-  const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, std::max(60000, 300 * settings.spheres));
-  done(0.1);
-  const SpheresAndLinks s = settings.method == BuildMethod::skeleton
-                                ? spheresOfSkeleton(shape, model.skeleton, voxels)
-                                : spheresByCover(shape, model.skeleton, voxels, settings.spheres,
-                                                 [&](double part) { done(0.1 + 0.6 * part); });
+  SpheresAndLinks s;
+  const auto choosing = [&](double part) { done(std::lerp(0.05, 0.7, part)); };
+  if (settings.method == BuildMethod::skeleton) {
+    s = spheresOfSkeleton(shape, model.skeleton);
+  } else if (settings.gap > 0) {
+    s = spheresByCover(shape, model.skeleton, fewestBalls(shape, settings.gap, spheresMax, choosing));
+  } else {
+    s = spheresByCover(shape, model.skeleton, chooseBalls(shape, settings.spheres, CoverGoal::gapAndVolume, choosing));
+  }
   done(0.7);
   hangNodesAndShareMass(shape, s, settings.surfaceMassFraction, model);
   measureLinks(shape.mesh, s.cells.sites, model.spheres, model.links);
@@ -210,7 +188,7 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
   done(0.8);
   model.renderSurface = makeRenderSurface(shape.mesh, settings.renderLevels, fine);
   done(0.9);
-  report = measureModel(model, shape.mesh, shape.tree, shape.exact, voxels, shape.diagonal);
+  report = measureModel(model);
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   done(1);
   return model;

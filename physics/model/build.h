@@ -20,6 +20,7 @@ constexpr int spheresMax = 2000;  // the choice of balls needs spheres^2 memory 
 struct BuildSettings {
   BuildMethod method = BuildMethod::cover;
   int spheres = 7;  // 1..spheresMax; cover only: the skeleton's node count follows from the mesh
+  double gap = 0;   // % of the diagonal; if > 0, cover takes the fewest spheres that leave no larger gap, not `spheres`
   double surfaceMassFraction =
       0.2;               // of the body's mass, carried by the surface nodes, 0..0.4; more allows larger substeps
   int renderLevels = 2;  // 0..4 Loop subdivisions of the physics mesh for the drawn surface
@@ -35,6 +36,7 @@ struct BuildReport {
   int components = 0, centresOutside = 0, attachmentsCrossing = 0;
   double attachmentMax = 0;
   int degreeMax = 0;
+  double volume = 0, diagonal = 0;  // m3 of the mesh, m of its bounding box
   double seconds = 0;
 };
 

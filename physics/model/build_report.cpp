@@ -5,6 +5,7 @@
 
 #include "physics/model/attachment.h"
 #include "physics/model/link_graph.h"
+#include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
 
 namespace medulla {
@@ -51,9 +52,7 @@ double distanceToCones(const Vector3d& p, const std::vector<Ball>& balls, const 
 
 void measureGaps(const SoftBodyModel& model, const TriangleMesh& mesh, const std::vector<Ball>& balls, double diagonal,
                  BuildReport& report) {
-  constexpr int samples = 12000;
-  std::vector<Vector3d> points = mesh.vertices;
-  for (const SurfaceSample& s : sampleSurface(mesh, samples, 99)) points.push_back(s.point);
+  const std::vector<Vector3d> points = gapPoints(mesh);
   double sum = 0;
   for (const Vector3d& p : points) {
     const double gap = std::max(0., distanceToBalls(p, balls));
@@ -83,8 +82,7 @@ void measureCover(const SoftBodyModel& model, const std::vector<Ball>& balls, co
 }
 
 void measureMasses(const SoftBodyModel& model, const MassProperties& exact, double diagonal, BuildReport& report) {
-  const std::vector<MassProperties> remaining =
-      remainingSpheres(model.restNodes, model.spheres, model.links, model.attachments);
+  const std::vector<MassProperties> remaining = remainingSpheres(model.restNodes, model.spheres, model.attachments);
   const MassProperties total = totalOf(remaining, model.restNodes, model.attachments);
   report.massError = std::abs(total.volume / exact.volume - 1) * 100;
   report.centreError = (total.centroid - exact.centroid).norm() / diagonal * 100;
@@ -106,9 +104,15 @@ void measureGraph(const SoftBodyModel& model, BuildReport& report) {
 
 }  // namespace
 
-BuildReport measureModel(const SoftBodyModel& model, const TriangleMesh& mesh, const SurfaceTree& tree,
-                         const MassProperties& exact, const VoxelBody& voxels, double diagonal) {
+BuildReport measureModel(const SoftBodyModel& model) {
+  const TriangleMesh mesh{model.restNodes, model.triangles};
+  const SurfaceTree tree = makeSurfaceTree(mesh);
+  const MassProperties exact = massProperties(mesh);
+  const VoxelBody voxels = voxelise(mesh, exact.volume, voxelsFor(static_cast<int>(model.spheres.size())));
+  const double diagonal = boundsDiagonal(mesh);
   BuildReport report;
+  report.volume = exact.volume;
+  report.diagonal = diagonal;
   report.triangles = static_cast<int>(model.triangles.size());
   report.skeletonNodes = static_cast<int>(model.skeleton.nodes.size());
   report.skeletonLinks = static_cast<int>(model.skeleton.links.size());

@@ -10,8 +10,7 @@ namespace medulla {
 // Distance from p to the surface of a link cone, the hull of two balls; negative inside. m.
 double signedDistanceToCone(const Eigen::Vector3d& p, const Ball& a, const Ball& b);
 
-// Everything of a report but the build's seconds. `exact` are the mesh's own mass properties.
-BuildReport measureModel(const SoftBodyModel& model, const TriangleMesh& mesh, const SurfaceTree& tree,
-                         const MassProperties& exact, const VoxelBody& voxels, double diagonal);
+// Everything of a report but the build's seconds, from the model alone.
+BuildReport measureModel(const SoftBodyModel& model);
 
 }  // namespace medulla

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "physics/model/mesh_topology.h"
 #include "physics/model/plane_section.h"
 
 namespace medulla {
@@ -118,7 +119,9 @@ bool isTubular(const TriangleMesh& mesh, const SurfaceTree& tree, const Skeleton
   constexpr double fillMin = 0.65;  // measured: gallbladder, stomach and guts .72 to .81; livers .47 to .56
   constexpr int stations = 5;
   // The part nearest to the link's own ends: other windings of a gut cross the same plane.
-  const PowerSites nearest{skeleton.nodes, std::vector<double>(skeleton.nodes.size(), 0)};
+  const std::size_t nodes = skeleton.nodes.size();
+  const PowerSites nearest{skeleton.nodes, std::vector<double>(nodes, 0),
+                           std::vector<double>(nodes, boundsDiagonal(mesh))};
   std::vector<double> fills;
   for (const std::array<int, 2>& link : skeleton.links) {
     const Eigen::Vector3d a = skeleton.nodes[link[0]], along = skeleton.nodes[link[1]] - a;

@@ -26,12 +26,12 @@ static SectionMoments disc(double radius) {
 
 static std::vector<SectionMoments> sectionsAlong(const TriangleMesh& mesh, const PowerSites& sites,
                                                  const Eigen::Vector3d& start, const Eigen::Vector3d& end,
-                                                 const Plane& across, std::pair<int, int> pair) {
+                                                 const Plane& across) {
   std::vector<SectionMoments> sections;
   double largest = 0;
   for (int k = 0; k < stations; ++k) {
     const Plane plane{start + (k + 0.5) / stations * (end - start), across.u, across.v};
-    sections.push_back(planeSection(mesh, plane, &sites, pair));
+    sections.push_back(planeSection(mesh, plane, &sites, {0, 1}));
     largest = std::max(largest, sections.back().area);
   }
   std::erase_if(sections, [&](const SectionMoments& s) { return s.area <= 0.01 * largest; });
@@ -42,8 +42,8 @@ static void measureLink(const TriangleMesh& mesh, const PowerSites& sites, const
                         ElasticLink& link) {
   const FillingSphere &s0 = spheres[link.sphere0], &s1 = spheres[link.sphere1];
   const Plane across = planeAcross(s0.restFrame, (s1.restFrame - s0.restFrame).normalized());
-  std::vector<SectionMoments> sections =
-      sectionsAlong(mesh, sites, s0.restFrame, s1.restFrame, across, {link.sphere0, link.sphere1});
+  const PowerSites around = sitesAround(sites, {link.sphere0, link.sphere1});
+  std::vector<SectionMoments> sections = sectionsAlong(mesh, around, s0.restFrame, s1.restFrame, across);
   if (sections.empty()) sections.push_back(disc(std::min(s0.radius, s1.radius)));
 
   double stretch = 0, twist = 0;

@@ -2,119 +2,154 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-
-#include "physics/model/attachment.h"
+#include <cmath>
+#include <limits>
 
 namespace medulla {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// `about` with the nodes' shares taken out, about the same points.
-static std::vector<MassProperties> withoutNodes(std::vector<MassProperties> about, const std::vector<Vector3d>& nodes,
-                                                const std::vector<ElasticLink>& links,
-                                                const std::vector<Attachment>& attachments) {
+namespace {
+
+struct CellNodes {  // of one cell
+  std::vector<int> nodes;
+  double stiffness = 0;  // m, sum over the nodes of area / depth: their attachments' stiffness over Young's modulus
+  double volumePerStiffness = 0;  // m2, what the cell can give at most
+};
+
+// Of the attachment of a node, over Young's modulus (physics/dynamics/body_mechanics.cpp).
+double stiffnessOf(const Attachment& a) {
+  const double depth = std::max(a.restOffset.norm(), std::sqrt(a.area));
+  return depth > 0 ? a.area / depth : 0;
+}
+
+int cellOf(const PowerCells& cells, const Vector3d& x) {
+  int best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < cells.cells.size(); ++i) {
+    const double power = (x - cells.sites.centres[i]).squaredNorm() - cells.sites.weights[i];
+    if (!(cells.cells[i].volume > 0) || power >= least) continue;
+    least = power;
+    best = static_cast<int>(i);
+  }
+  return best;
+}
+
+// Of nodes with the volumes c * stiffness: their sums about the cell's centroid.
+struct Moments {
+  double volume = 0;
+  Vector3d first = Vector3d::Zero();
+  Matrix3d second = Matrix3d::Zero();
+};
+
+Moments momentsOf(const CellNodes& cell, const Vector3d& centroid, const std::vector<Vector3d>& nodes,
+                  const std::vector<Attachment>& attachments) {
+  Moments m;
+  for (const int n : cell.nodes) {
+    const double k = stiffnessOf(attachments[n]);
+    const Vector3d r = nodes[n] - centroid;
+    m.volume += k;
+    m.first += k * r;
+    m.second += k * r * r.transpose();
+  }
+  return m;
+}
+
+// Largest part of its second moment in any direction that a cell loses, about the remainder's own centroid.
+double momentLoss(const MassProperties& cell, const Moments& taken, double c) {
+  const double left = cell.volume - c * taken.volume;
+  const Matrix3d remainder =
+      cell.secondMoment - c * taken.second - c * c * taken.first * taken.first.transpose() / left;
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix3d> solver(remainder, cell.secondMoment, Eigen::EigenvaluesOnly);
+  return 1 - solver.eigenvalues()[0];
+}
+
+double mostVolumePerStiffness(const MassProperties& cell, const Moments& taken) {
+  constexpr double kVolumeLoss = 0.5, kMomentLoss = 0.7, kStep = 0.95;
+  if (!(taken.volume > 0)) return 0;
+  double c = kVolumeLoss * cell.volume / taken.volume;
+  while (momentLoss(cell, taken, c) > kMomentLoss) c *= kStep;
+  return c;
+}
+
+std::vector<CellNodes> nodesOfCells(const std::vector<Vector3d>& nodes, const PowerCells& cells,
+                                    std::vector<Attachment>& attachments) {
+  std::vector<CellNodes> out(cells.cells.size());
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    attachments[n].massSphere = cellOf(cells, nodes[n]);
+    out[attachments[n].massSphere].nodes.push_back(static_cast<int>(n));
+  }
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const Moments m = momentsOf(out[i], cells.cells[i].centroid, nodes, attachments);
+    out[i].stiffness = m.volume;
+    out[i].volumePerStiffness = mostVolumePerStiffness(cells.cells[i], m);
+  }
+  return out;
+}
+
+// The volume per stiffness, the same for all cells that can afford it, that makes the nodes carry `wanted` (m3).
+double commonVolumePerStiffness(const std::vector<CellNodes>& cells, double wanted) {
+  const auto carried = [&](double c) {
+    double sum = 0;
+    for (const CellNodes& cell : cells) sum += std::min(c, cell.volumePerStiffness) * cell.stiffness;
+    return sum;
+  };
+  if (wanted <= 0) return 0;
+  double low = 0, high = 0;
+  for (const CellNodes& cell : cells) high = std::max(high, cell.volumePerStiffness);
+  if (carried(high) <= wanted) return high;
+  constexpr int kBisections = 60;
+  for (int k = 0; k < kBisections; ++k) {
+    const double middle = 0.5 * (low + high);
+    (carried(middle) < wanted ? low : high) = middle;
+  }
+  return high;
+}
+
+std::vector<MassProperties> withoutNodes(std::vector<MassProperties> about, const std::vector<Vector3d>& nodes,
+                                         const std::vector<Attachment>& attachments) {
   for (std::size_t n = 0; n < attachments.size(); ++n) {
-    const HostShares hosts = hostShares(attachments[n], links);
-    for (int k = 0; k < 2; ++k) {
-      MassProperties& sphere = about[hosts.sphere[k]];
-      const Vector3d r = nodes[n] - sphere.centroid;
-      sphere.volume -= hosts.share[k] * attachments[n].volume;
-      sphere.secondMoment -= hosts.share[k] * attachments[n].volume * r * r.transpose();
-    }
+    MassProperties& sphere = about[attachments[n].massSphere];
+    const Vector3d r = nodes[n] - sphere.centroid;
+    sphere.volume -= attachments[n].volume;
+    sphere.secondMoment -= attachments[n].volume * r * r.transpose();
   }
   return about;
 }
 
-// First moments of the nodes' shares about the cells' centroids, m4.
-static std::vector<Vector3d> firstMoments(const std::vector<MassProperties>& cells, const std::vector<Vector3d>& nodes,
-                                          const std::vector<ElasticLink>& links,
-                                          const std::vector<Attachment>& attachments) {
-  std::vector<Vector3d> moments(cells.size(), Vector3d::Zero());
-  for (std::size_t n = 0; n < attachments.size(); ++n) {
-    const HostShares hosts = hostShares(attachments[n], links);
-    for (int k = 0; k < 2; ++k) {
-      const int i = hosts.sphere[k];
-      moments[i] += hosts.share[k] * attachments[n].volume * (nodes[n] - cells[i].centroid);
-    }
-  }
-  return moments;
-}
+}  // namespace
 
-// Every cell gives `fraction` of its volume to its nodes, by the area that it shares in.
-static void shareByArea(const std::vector<MassProperties>& cells, double fraction,
-                        const std::vector<ElasticLink>& links, std::vector<Attachment>& attachments) {
-  std::vector<double> area(cells.size(), 0);
-  for (const Attachment& a : attachments) {
-    const HostShares hosts = hostShares(a, links);
-    for (int k = 0; k < 2; ++k) area[hosts.sphere[k]] += hosts.share[k] * a.area;
-  }
-  for (Attachment& a : attachments) {
-    const HostShares hosts = hostShares(a, links);
-    a.volume = 0;
-    for (int k = 0; k < 2; ++k) {
-      const int host = hosts.sphere[k];
-      if (hosts.share[k] > 0) a.volume += fraction * hosts.share[k] * a.area / area[host] * cells[host].volume;
+void shareOutMass(const std::vector<Vector3d>& nodes, const PowerCells& cells, double fraction,
+                  std::vector<Attachment>& attachments, std::vector<FillingSphere>& spheres) {
+  const std::vector<CellNodes> groups = nodesOfCells(nodes, cells, attachments);
+  double volume = 0;
+  for (const MassProperties& cell : cells.cells) volume += cell.volume;
+  const double common = commonVolumePerStiffness(groups, fraction * volume);
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const MassProperties& cell = cells.cells[i];
+    const double c = std::min(common, groups[i].volumePerStiffness);
+    Vector3d first = Vector3d::Zero();
+    double taken = 0;
+    for (const int n : groups[i].nodes) {
+      attachments[n].volume = c * stiffnessOf(attachments[n]);
+      taken += attachments[n].volume;
+      first += attachments[n].volume * (nodes[n] - cell.centroid);
     }
-  }
-}
-
-// Largest part of its volume, or of its second moment in any direction, that a cell loses to its nodes.
-static double largestLoss(const MassProperties& cell, const MassProperties& left, const Vector3d& moment) {
-  const double volumeLoss = 1 - left.volume / cell.volume;
-  if (volumeLoss >= 1) return volumeLoss;
-  // From the cell's centroid to the remainder's, which lies at -moment / left.volume.
-  const Matrix3d remainder = left.secondMoment - moment * moment.transpose() / left.volume;
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix3d> solver(remainder, cell.secondMoment, Eigen::EigenvaluesOnly);
-  return std::max(volumeLoss, 1 - solver.eigenvalues()[0]);
-}
-
-// Lowers the volumes of nodes whose hosts would lose too much.
-static void limitLosses(const std::vector<Vector3d>& nodes, const std::vector<MassProperties>& cells,
-                        const std::vector<ElasticLink>& links, std::vector<Attachment>& attachments) {
-  constexpr double lossMax = 0.7;
-  constexpr int rounds = 30;
-  std::vector<double> factor(cells.size());
-  for (int round = 0; round < rounds; ++round) {
-    const std::vector<MassProperties> left = withoutNodes(cells, nodes, links, attachments);
-    const std::vector<Vector3d> moments = firstMoments(cells, nodes, links, attachments);
-    bool within = true;
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      const double loss = largestLoss(cells[i], left[i], moments[i]);
-      factor[i] = loss > lossMax ? std::max(0.5, 0.99 * lossMax / loss) : 1;
-      within = within && loss <= lossMax;
-    }
-    if (within) return;
-    for (Attachment& a : attachments) {
-      const HostShares hosts = hostShares(a, links);
-      a.volume *= std::min(factor[hosts.sphere[0]], factor[hosts.sphere[1]]);
-    }
-  }
-}
-
-void shareOutMass(const std::vector<Vector3d>& nodes, const std::vector<MassProperties>& cells, double fraction,
-                  const std::vector<ElasticLink>& links, std::vector<Attachment>& attachments,
-                  std::vector<FillingSphere>& spheres) {
-  shareByArea(cells, fraction, links, attachments);
-  limitLosses(nodes, cells, links, attachments);
-  const std::vector<MassProperties> left = withoutNodes(cells, nodes, links, attachments);
-  const std::vector<Vector3d> moments = firstMoments(cells, nodes, links, attachments);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const Vector3d shift = -moments[i] / left[i].volume;
-    spheres[i].restFrame = cells[i].centroid + shift;
-    spheres[i].volume = cells[i].volume;
-    spheres[i].secondMoment = cells[i].secondMoment + cells[i].volume * shift * shift.transpose();
+    const Vector3d shift = -first / (cell.volume - taken);
+    spheres[i].restFrame = cell.centroid + shift;
+    spheres[i].volume = cell.volume;
+    spheres[i].secondMoment = cell.secondMoment + cell.volume * shift * shift.transpose();
   }
 }
 
 std::vector<MassProperties> remainingSpheres(const std::vector<Vector3d>& nodes,
                                              const std::vector<FillingSphere>& spheres,
-                                             const std::vector<ElasticLink>& links,
                                              const std::vector<Attachment>& attachments) {
   std::vector<MassProperties> whole;
   whole.reserve(spheres.size());
   for (const FillingSphere& s : spheres) whole.push_back({s.volume, s.restFrame, s.secondMoment});
-  return withoutNodes(std::move(whole), nodes, links, attachments);
+  return withoutNodes(std::move(whole), nodes, attachments);
 }
 
 MassProperties totalOf(const std::vector<MassProperties>& spheres, const std::vector<Vector3d>& nodes,

@@ -3,33 +3,32 @@
 #include <vector>
 
 #include "physics/model/mass_properties.h"
+#include "physics/model/power_cells.h"
 #include "physics/model/soft_body_model.h"
 
 namespace medulla {
 
 // Shares out the mass of every power cell between its sphere and the surface nodes (paper 2.3): sets
-// Attachment::volume of every node and restFrame, volume and secondMoment of every sphere.
+// Attachment::volume and massSphere of every node, and restFrame, volume and secondMoment of every sphere.
 //
-// A node takes its mass from the sphere it hangs on, or from both ends of its link with 1 - along and along. What is
-// left for the dynamics to give to sphere i is
-//   volume_i        - sum_n share_ni v_n
-//   secondMoment_i  - sum_n share_ni v_n r_ni r_ni^T      r_ni from restFrame_i to node n
-// and restFrame_i is the centroid of exactly that remainder. Spheres and nodes together then have the mass, centre and
-// inertia of the cells. With the frame at the whole cell's centroid they would not: the nodes' share moves outward and
-// the inertia grows by some per cent. Where anchors lie on links depends on the frames: call in turn with attachNodes
-// until both stand still.
+// A node takes its mass from the cell that it lies in, whatever it hangs on. What is left for the dynamics to give to
+// sphere i is
+//   volume_i        - sum_n v_n
+//   secondMoment_i  - sum_n v_n r_n r_n^T      r_n from restFrame_i to node n, over the nodes of that cell
+// and restFrame_i is the centroid of exactly that remainder: spheres and nodes together have the mass, centre and
+// inertia of the cells. (Taken from the ends of the link that a node hangs on, the moments of thin cells beside long
+// links would leave next to nothing for their nodes.) Where anchors lie on links depends on the frames: call in turn
+// with attachNodes until both stand still.
 //
-// Every cell gives `fraction` (0..0.4) of its volume to its nodes, by area: a share of the whole body's mass by area
-// would ask more of a thin duct than it has. A sphere gives at most 70 % of its volume, and of its second moment in any
-// direction: what remains stays positive definite; the sum falls short of `fraction` there.
-void shareOutMass(const std::vector<Eigen::Vector3d>& nodes, const std::vector<MassProperties>& cells, double fraction,
-                  const std::vector<ElasticLink>& links, std::vector<Attachment>& attachments,
-                  std::vector<FillingSphere>& spheres);
+// The nodes carry `fraction` (0..0.4) of the body in all, each by the stiffness of its attachment (area over depth), so
+// that all swing alike and none alone bounds the step of the dynamics. A cell gives at most half of its volume and 70 %
+// of its second moment in any direction: what remains stays positive definite; the sum may fall short of `fraction`.
+void shareOutMass(const std::vector<Eigen::Vector3d>& nodes, const PowerCells& cells, double fraction,
+                  std::vector<Attachment>& attachments, std::vector<FillingSphere>& spheres);
 
 // What remains of every sphere for the dynamics, by the two formulas above.
 std::vector<MassProperties> remainingSpheres(const std::vector<Eigen::Vector3d>& nodes,
                                              const std::vector<FillingSphere>& spheres,
-                                             const std::vector<ElasticLink>& links,
                                              const std::vector<Attachment>& attachments);
 
 // Remaining spheres and nodes as one rigid body.

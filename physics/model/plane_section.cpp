@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace medulla {
 
@@ -41,9 +42,13 @@ Outline cut(const TriangleMesh& mesh, const Plane& plane) {
 }
 
 // The part of a scan line in the cell of `site`: power differences are linear along a line, each rival cuts one side.
+// Beyond the cell's reach there is none of it.
 Interval cellInterval(const PowerSites& sites, int site, const Vector3d& start, const Vector3d& along) {
-  Interval part{-1e30, 1e30};
   const Vector3d& a = sites.centres[site];
+  const double middle = (a - start).dot(along), reach = sites.reaches[site];
+  const double chord = reach * reach - (start + middle * along - a).squaredNorm();
+  if (chord <= 0) return {0, 0};
+  Interval part{middle - std::sqrt(chord), middle + std::sqrt(chord)};
   for (std::size_t k = 0; k < sites.centres.size(); ++k) {
     if (static_cast<int>(k) == site) continue;
     // power(a) - power(k) = at + slope t along the line

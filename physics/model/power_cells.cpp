@@ -143,6 +143,39 @@ static std::vector<int> leastPower(const VoxelBody& body, const PowerSites& site
   return least;
 }
 
+static std::vector<double> reachesOf(const VoxelBody& body, const PowerSites& sites,
+                                     const std::vector<int>& cellOfPiece) {
+  std::vector<double> reaches(sites.centres.size(), 0);
+  for (std::size_t p = 0; p < body.pieces.size(); ++p) {
+    double& reach = reaches[cellOfPiece[p]];
+    reach = std::max(reach, (body.pieces[p].centre - sites.centres[cellOfPiece[p]]).norm());
+  }
+  for (double& reach : reaches) reach += 2 * body.size;  // thin edges lie beside the voxels' centres
+  return reaches;
+}
+
+PowerSites sitesAround(const PowerSites& sites, std::pair<int, int> pair) {
+  PowerSites around;
+  const auto take = [&](int k) {
+    around.centres.push_back(sites.centres[k]);
+    around.weights.push_back(sites.weights[k]);
+    around.reaches.push_back(sites.reaches[k]);
+  };
+  take(pair.first);
+  take(pair.second);
+  // power(k) - power(i) is linear in space and changes by at most 2 |c_k - c_i| per metre.
+  const auto bordersOn = [&](int k, int i) {
+    const double distance = (sites.centres[k] - sites.centres[i]).norm();
+    const double atCentre = distance * distance - sites.weights[k] + sites.weights[i];
+    return atCentre < 2 * distance * sites.reaches[i];
+  };
+  for (int k = 0; k < static_cast<int>(sites.centres.size()); ++k) {
+    if (k == pair.first || k == pair.second) continue;
+    if (bordersOn(k, pair.first) || bordersOn(k, pair.second)) take(k);
+  }
+  return around;
+}
+
 static std::vector<MassProperties> integrate(const VoxelBody& body, const std::vector<int>& cellOfPiece,
                                              std::size_t count) {
   std::vector<MassProperties> cells(count);
@@ -217,6 +250,7 @@ PowerCells divideByPower(const VoxelBody& body, const std::vector<Ball>& balls, 
       break;
     }
   }
+  result.sites.reaches = reachesOf(body, result.sites, result.cellOfPiece);
   matchExact(exact, result.cells);
   result.contactArea = contactAreas(body, result.cellOfPiece);
   return result;

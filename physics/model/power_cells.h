@@ -29,12 +29,21 @@ struct VoxelBody {
 // that the volume converges faster than by counting voxels.
 VoxelBody voxelise(const TriangleMesh& mesh, double volume, int target);
 
+// Voxels that give the cells of so many spheres their volumes and contacts.
+constexpr int voxelsFor(int spheres) {
+  return spheres > 200 ? 300 * spheres : 60000;
+}
+
 // Cell of a ball: the points whose power |x - centre|^2 - weight is least there (Aurenhammer 1987). Weight radius^2
 // gives the power diagram, 0 the Voronoi diagram.
 struct PowerSites {
   std::vector<Eigen::Vector3d> centres;  // m
   std::vector<double> weights;           // m2
+  std::vector<double> reaches;           // m; no point of the body in the cell is further from the centre
 };
+
+// The two sites and those whose cells can border on theirs within the body, in that order.
+PowerSites sitesAround(const PowerSites& sites, std::pair<int, int> pair);
 
 struct PowerCells {
   PowerSites sites;

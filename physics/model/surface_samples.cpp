@@ -49,4 +49,10 @@ std::vector<SurfaceSample> sampleSurface(const TriangleMesh& mesh, int count, st
   return samples;
 }
 
+std::vector<Eigen::Vector3d> gapPoints(const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3d> points = mesh.vertices;
+  for (const SurfaceSample& s : sampleSurface(mesh, 12000, 99)) points.push_back(s.point);
+  return points;
+}
+
 }  // namespace medulla

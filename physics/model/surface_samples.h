@@ -24,4 +24,7 @@ struct SurfaceSample {
 // `count` points spread over the area, one in each of `count` equal parts of it.
 std::vector<SurfaceSample> sampleSurface(const TriangleMesh& mesh, int count, std::uint64_t seed);
 
+// Where gaps are measured: the vertices, which stick out furthest, and 12 000 points spread over the area.
+std::vector<Eigen::Vector3d> gapPoints(const TriangleMesh& mesh);
+
 }  // namespace medulla

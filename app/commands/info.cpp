@@ -1,0 +1,118 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "app/commands/commands.h"
+#include "app/files/model_file.h"
+#include "app/files/xml_element.h"
+#include "physics/model/build_report.h"
+#include "physics/model/mesh_topology.h"
+
+namespace medulla {
+
+namespace {
+
+std::string text(double value) {
+  return fmt::format("{:.6g}", value);
+}
+
+std::string text(std::size_t value) {
+  return fmt::format("{}", value);
+}
+
+std::string text(const Eigen::Vector3d& v) {
+  return fmt::format("{:.6g} {:.6g} {:.6g}", v.x(), v.y(), v.z());
+}
+
+std::vector<Result> modelResults(const SoftBodyModel& model) {
+  constexpr double densityOfWater = 1000;
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& node : model.restNodes) box.extend(node);
+  double radiusMin = std::numeric_limits<double>::infinity(), radiusMax = 0;
+  for (const FillingSphere& s : model.spheres) {
+    radiusMin = std::min(radiusMin, s.radius);
+    radiusMax = std::max(radiusMax, s.radius);
+  }
+  const BuildReport report = measureModel(model);
+  std::vector<Result> results = {{"kind", "model", ""},
+                                 {"name", model.name, ""},
+                                 {"settings", model.settings, ""},
+                                 {"mesh_hash", fmt::format("{:016x}", model.meshHash), ""},
+                                 {"input_vertices", text(model.nodeOfInputVertex.size()), ""},
+                                 {"nodes", text(model.restNodes.size()), ""},
+                                 {"render_triangles", text(model.renderSurface.triangles.size()), ""},
+                                 {"mass_at_1000_kg/m3", text(densityOfWater * report.volume), "kg"},
+                                 {"extents", text(Eigen::Vector3d(box.sizes())), "m"},
+                                 {"radius_min", text(radiusMin), "m"},
+                                 {"radius_max", text(radiusMax), "m"}};
+  for (const Result& r : buildResults(report))
+    if (r.name != "seconds") results.push_back(r);
+  return results;
+}
+
+void addBody(const SceneBody& body, const SoftBodyModel& model, std::vector<Result>& results) {
+  const auto add = [&](const char* name, const std::string& value, const char* unit) {
+    results.push_back({fmt::format("body.{}.{}", body.name, name), value, unit});
+  };
+  const double volume = enclosedVolume({model.restNodes, model.triangles});
+  add("spheres", text(model.spheres.size()), "");
+  add("links", text(model.links.size()), "");
+  add("nodes", text(model.restNodes.size()), "");
+  add("triangles", text(model.triangles.size()), "");
+  add("mass", text(volume * body.tissue.density), "kg");
+  add("young", text(body.tissue.young), "Pa");
+  add("poisson", text(body.tissue.poisson), "");
+  add("damping", text(body.tissue.damping), "");
+  add("surface", body.surface == SurfaceMode::full ? "full" : "skin", "");
+  add("look", body.look, "");
+  add("fixed_spheres", text(body.fixed.size()), "");
+  add("driven_spheres", text(body.driven.size()), "");
+}
+
+std::vector<Result> sceneResults(const LoadedScene& loaded) {
+  const Scene& scene = loaded.scene;
+  const Simulation simulation(loaded);
+  const World& world = simulation.world();
+  std::size_t spheres = 0, links = 0, nodes = 0;
+  for (const auto& model : loaded.models) {
+    spheres += model->spheres.size();
+    links += model->links.size();
+    nodes += model->restNodes.size();
+  }
+  std::vector<Result> results = {{"kind", "scene", ""},
+                                 {"name", scene.name, ""},
+                                 {"duration", text(scene.duration), "s"},
+                                 {"servo", text(scene.servoRate), "Hz"},
+                                 {"dynamics", text(scene.dynamicsRate), "Hz"},
+                                 {"substeps_per_frame", fmt::format("{}", world.substepsPerFrame()), ""},
+                                 {"substep", text(world.substep()), "s"},
+                                 {"stable_substep", text(world.stableSubstep()), "s"},
+                                 {"gravity", text(scene.gravity), "m/s2"},
+                                 {"picture", fmt::format("{}x{}", scene.width, scene.height), ""},
+                                 {"fps", text(scene.fps), "Hz"},
+                                 {"bodies", text(scene.bodies.size()), ""},
+                                 {"statics", text(scene.statics.size()), ""},
+                                 {"tools", text(scene.tools.size()), ""},
+                                 {"spheres", text(spheres), ""},
+                                 {"links", text(links), ""},
+                                 {"nodes", text(nodes), ""}};
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) addBody(scene.bodies[b], *loaded.models[b], results);
+  for (const SceneTool& tool : scene.tools)
+    results.push_back({fmt::format("tool.{}.radius", tool.name), text(tool.settings.radius), "m"});
+  return results;
+}
+
+}  // namespace
+
+int runInfo(const std::string& path) {
+  if (rootElementOf(path) == "model") {
+    printResults(modelResults(readModel(path)));
+  } else {
+    RunOptions options;  // a third root is refused as no scene
+    options.scene = path;
+    printResults(sceneResults(loadRun(options)));
+  }
+  return 0;
+}
+
+}  // namespace medulla

@@ -1,0 +1,131 @@
+#include "physics/model/ball_choice.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+
+#include "physics/model/greedy_cover.h"
+#include "physics/model/mesh_topology.h"
+#include "physics/model/power_cells.h"
+
+namespace medulla {
+
+using Progress = std::function<void(double)>;
+
+BodyShape measureShape(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) throw std::runtime_error("the mesh has no triangles; expected a closed surface");
+  BodyShape shape{mesh, makeSurfaceTree(mesh), massProperties(mesh), boundsDiagonal(mesh)};
+  if (!(shape.exact.volume > 0)) throw std::runtime_error("the mesh encloses no volume; expected an outward surface");
+  return shape;
+}
+
+static std::vector<Ball> candidatesOf(const BodyShape& shape, int count) {
+  std::vector<Ball> medial =
+      medialBalls(shape.tree, sampleSurface(shape.mesh, std::max(2500, 3 * count), 1), shape.diagonal);
+  if (static_cast<int>(medial.size()) < count) {
+    throw std::runtime_error(
+        fmt::format("too thin: the mesh holds {} inscribed balls of 0.4 % of its diagonal or more; {} were asked for",
+                    medial.size(), count));
+  }
+  return medial;
+}
+
+static CoverTargets targetsOf(const BodyShape& shape, int count) {
+  CoverTargets targets;
+  targets.diagonal = shape.diagonal;
+  for (const SurfaceSample& s : sampleSurface(shape.mesh, std::max(3000, 3 * count), 2)) {
+    targets.surface.push_back(s.point);
+  }
+  // Vertices stick out furthest; beyond a few thousand the samples lie as close.
+  if (shape.mesh.vertices.size() < 1500) {
+    targets.surface.insert(targets.surface.end(), shape.mesh.vertices.begin(), shape.mesh.vertices.end());
+  }
+  const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, std::max(20000, 30 * count));
+  for (const VoxelPiece& piece : voxels.pieces) {
+    if (piece.height > voxels.size / 2) targets.volume.push_back(piece.centre);
+  }
+  return targets;
+}
+
+std::vector<Ball> chooseBalls(const BodyShape& shape, int count, CoverGoal goal, const Progress& progress) {
+  return coverWithBalls(shape.tree, candidatesOf(shape, count), targetsOf(shape, count), count, goal, progress);
+}
+
+double largestGap(const BodyShape& shape, const std::vector<Ball>& balls) {
+  double largest = 0;
+  for (const Eigen::Vector3d& p : gapPoints(shape.mesh)) {
+    double gap = std::numeric_limits<double>::infinity();
+    for (const Ball& ball : balls) gap = std::min(gap, (p - ball.centre).norm() - ball.radius);
+    largest = std::max(largest, gap);
+  }
+  return 100 * largest / shape.diagonal;
+}
+
+std::vector<Ball> fewestBalls(const BodyShape& shape, double gap, int most, const Progress& progress) {
+  const auto report = [&](double done) {
+    if (progress) progress(done);
+  };
+  std::vector<Ball> best;
+  double closest = std::numeric_limits<double>::infinity();
+  const auto reaches = [&](int count) {
+    std::vector<Ball> balls = chooseBalls(shape, count, CoverGoal::gap);
+    const double reached = largestGap(shape, balls);
+    closest = std::min(closest, reached);
+    if (reached > gap) return false;
+    best = std::move(balls);
+    return true;
+  };
+  int high = std::clamp(greedyCount(candidatesOf(shape, 1), targetsOf(shape, 1), gap), 1, most), low = 0;
+  const int first = high;
+  report(0.1);
+  while (!reaches(high)) {
+    if (high == most || high > 4 * first) {
+      throw std::runtime_error(
+          fmt::format("a gap of {:g} % is out of reach: {} spheres leave {:.3g} %", gap, high, closest));
+    }
+    low = high;
+    high = std::min(most, high + std::max(1, high / 2));
+  }
+  report(0.3);
+  const int range = high - low;
+  // Improvement saves a quarter or so of the greedy balls: the first probe is there.
+  for (int probe = std::max(low + 1, low + 3 * (high - low) / 4); high - low > 1; probe = (low + high) / 2) {
+    if (probe >= high) probe = high - 1;
+    (reaches(probe) ? high : low) = probe;
+    report(1 - 0.7 * (high - low) / range);
+  }
+  // Now and then one ball less does better than one more.
+  for (int below = 2; below <= 3 && high - below >= 1;) {
+    if (reaches(high - below)) {
+      high -= below;
+      below = 1;
+    } else {
+      ++below;
+    }
+  }
+  return best;
+}
+
+std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count) {
+  const int bodies = static_cast<int>(shapes.size());
+  if (count < bodies) {
+    throw std::runtime_error(fmt::format("{} spheres for {} bodies; expected one each at least", count, bodies));
+  }
+  std::vector<GreedyFilling> fillings;
+  for (const BodyShape& shape : shapes) {
+    fillings.emplace_back(candidatesOf(shape, 1), targetsOf(shape, 1));
+    fillings.back().add();
+  }
+  std::vector<int> counts(bodies, 1);
+  for (int spheres = bodies; spheres < count; ++spheres) {
+    const auto widest = std::max_element(fillings.begin(), fillings.end(),
+                                         [](const auto& a, const auto& b) { return a.largestGap() < b.largestGap(); });
+    widest->add();
+    ++counts[widest - fillings.begin()];
+  }
+  return counts;
+}
+
+}  // namespace medulla

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "physics/model/ball_cover.h"
+#include "physics/model/mass_properties.h"
+#include "physics/model/triangle_mesh.h"
+
+namespace medulla {
+
+// A closed mesh and what the choice of balls measures against.
+struct BodyShape {
+  const TriangleMesh& mesh;
+  SurfaceTree tree;
+  MassProperties exact;  // volume > 0
+  double diagonal = 0;   // m, of the bounding box
+};
+
+// Keeps a reference to the mesh. Throws std::runtime_error on a mesh without triangles or volume.
+BodyShape measureShape(const TriangleMesh& mesh);
+
+// `count` balls that fill the body (ball_cover.h). Throws std::runtime_error where fewer inscribed balls are to be had.
+std::vector<Ball> chooseBalls(const BodyShape& shape, int count, CoverGoal goal,
+                              const std::function<void(double)>& progress = {});
+
+// The fewest balls that leave no gap from the surface to the nearest ball above `gap` (% of the diagonal). Counts are
+// tried from that of a greedy set cover on, by bisection and a look at the next few below, each with all the
+// improvement that chooseBalls gives: gaps shrink with the count but for small jumps. Throws std::runtime_error where
+// `most` balls do not reach it.
+std::vector<Ball> fewestBalls(const BodyShape& shape, double gap, int most,
+                              const std::function<void(double)>& progress = {});
+
+// Largest gap from the surface to the nearest ball, % of the diagonal, on points other than those of the choice.
+double largestGap(const BodyShape& shape, const std::vector<Ball>& balls);
+
+// How many of `count` spheres each body gets: one each, then each next one goes where the largest gap, in metres, is
+// largest. Gaps are those of greedy filling. Throws std::runtime_error where there are fewer spheres than bodies.
+std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count);
+
+}  // namespace medulla
