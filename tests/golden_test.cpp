@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "render/image.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
@@ -9,14 +11,28 @@ namespace medulla {
 
 static const std::string kSource = MEDULLA_SOURCE_DIR;
 
-TEST(Golden, EveryShippedSceneLooksAsStored) {
+static std::vector<std::string> shippedScenes() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(kSource + "/scenes"))
+    if (entry.path().extension() == ".xml") names.push_back(entry.path().stem().string());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+class GoldenScene : public testing::TestWithParam<std::string> {};
+
+TEST_P(GoldenScene, LooksAsStored) {
   const TemporaryFolder folder;
   ProgramOptions options;
   options.folder = kSource;
-  const ProgramResult r = runProgram({"golden", "--failures", folder / "failures"}, options);
+  const ProgramResult r =
+      runProgram({"golden", "scenes/" + GetParam() + ".xml", "--failures", folder / "failures"}, options);
   EXPECT_EQ(r.exitCode, 0) << r.out << r.err;
   EXPECT_NE(r.out.find(" ok: "), std::string::npos);
 }
+
+INSTANTIATE_TEST_SUITE_P(Shipped, GoldenScene, testing::ValuesIn(shippedScenes()),
+                         [](const auto& scene) { return scene.param; });
 
 TEST(Golden, AnotherPictureFailsWithItsDifferenceAndTheCommandThatRepeatsIt) {
   const TemporaryFolder folder;
