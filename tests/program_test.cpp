@@ -181,7 +181,8 @@ TEST(Program, RepairsAreToldInOneLine) {
   const ProgramResult r =
       runProgram({"build", folder / "holed.obj", "-o", folder / "m.xml", "--spheres", "2", "--render-levels", "0"});
   ASSERT_EQ(r.exitCode, 0) << r.err;
-  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+  // Progress may follow, on a machine that is slow enough for it.
+  EXPECT_EQ(r.err.find("mesh repair"), r.err.rfind("mesh repair")) << r.err;
   EXPECT_NE(r.err.find("holed.obj: mesh repair: dropped 1 unused vertex; filled a hole"), std::string::npos) << r.err;
 }
 
