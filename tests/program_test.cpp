@@ -189,7 +189,7 @@ TEST(Program, RepairsAreToldInOneLine) {
 TEST(Program, HelpAndVersion) {
   EXPECT_EQ(runProgram({"--help"}).exitCode, 0);
   EXPECT_NE(runProgram({"--help"}).out.find("render"), std::string::npos);
-  for (const char* verb : {"render", "replay", "build", "info", "golden"})
+  for (const char* verb : {"render", "replay", "build", "new", "check", "info", "golden"})
     EXPECT_EQ(runProgram({verb, "--help"}).exitCode, 0);
   const ProgramResult version = runProgram({"--version"});
   for (const char* name : {"medulla", "compiler", "embree", "renderer"})

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "physics/model/attachment.h"
+
 namespace medulla {
 
 namespace {
@@ -115,10 +117,6 @@ std::vector<Attachment> perpendicularAttachments(const SoftBodyModel& m) {
     a.restOffset -= shift * line;
   }
   return out;
-}
-
-double attachmentDepth(const Attachment& a) {
-  return std::max(a.restOffset.norm(), std::sqrt(a.area));
 }
 
 void setSurfaceStiffness(const BodyDescription& body, BodyMechanics& out) {

@@ -1,6 +1,7 @@
 #include "physics/model/attachment.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "physics/model/mesh_topology.h"
 
@@ -85,6 +86,10 @@ Vector3d restAnchor(const Attachment& a, const std::vector<FillingSphere>& spher
                     const std::vector<ElasticLink>& links) {
   const HostShares hosts = hostShares(a, links);
   return hosts.share[0] * spheres[hosts.sphere[0]].restFrame + hosts.share[1] * spheres[hosts.sphere[1]].restFrame;
+}
+
+double attachmentDepth(const Attachment& a) {
+  return std::max(a.restOffset.norm(), std::sqrt(a.area));
 }
 
 HostShares hostShares(const Attachment& a, const std::vector<ElasticLink>& links) {

@@ -30,6 +30,10 @@ struct HostShares {
 };
 HostShares hostShares(const Attachment& attachment, const std::vector<ElasticLink>& links);
 
+// m, how deep the tissue between a node and what it hangs on is taken to be: its stiffness per area goes by the
+// inverse.
+double attachmentDepth(const Attachment& attachment);
+
 // Nodes whose segment to the skeleton crosses the surface.
 int countCrossings(const TriangleMesh& mesh, const SurfaceTree& tree, const std::vector<Attachment>& attachments,
                    const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "physics/model/attachment.h"
+
 namespace medulla {
 
 using Eigen::Matrix3d;
@@ -18,9 +20,9 @@ struct CellNodes {  // of one cell
   double volumePerStiffness = 0;  // m2, what the cell can give at most
 };
 
-// Of the attachment of a node, over Young's modulus (physics/dynamics/body_mechanics.cpp).
+// Of the attachment of a node, over Young's modulus.
 double stiffnessOf(const Attachment& a) {
-  const double depth = std::max(a.restOffset.norm(), std::sqrt(a.area));
+  const double depth = attachmentDepth(a);
   return depth > 0 ? a.area / depth : 0;
 }
 
