@@ -27,6 +27,7 @@ struct Bucket {
   std::vector<int> triangles;
   Vector3d centre = Vector3d::Zero();  // of the bounding sphere around both frames, not inflated
   double radius = 0;
+  bool stale = false;  // the scene bounds frames older than the surface's
 };
 }  // namespace
 
@@ -194,10 +195,19 @@ void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to) {
   surface.stepBefore.swap(surface.step);
   for (std::size_t n = 0; n < surface.step.size(); ++n) surface.step[n] = surface.to[n] - surface.from[n];
   for (Bucket& bucket : data_->buckets) {
+    renewBoundingSphere(bucket);
+    bucket.stale = true;
+  }
+}
+
+// Refits where a query gets as far as the bucket's triangles: in a large scene a tool is near a few of hundreds.
+static RTCScene currentScene(Bucket& bucket) {
+  if (bucket.stale) {
     rtcCommitGeometry(bucket.geometry);
     rtcCommitScene(bucket.scene);
-    renewBoundingSphere(bucket);
+    bucket.stale = false;
   }
+  return bucket.scene;
 }
 
 static bool isQueryable(const Vector3d& p) {
@@ -216,7 +226,7 @@ bool Buckets::sweep(const Vector3d& centre, const Vector3d& motion, double radiu
   if (motion2 < 1e-24) return false;  // far below every margin, and a ray needs a direction in float
   SweepContext context{{}, centre, motion, radius, alpha, {}};
   rtcInitIntersectContext(&context.embree);
-  for (const Bucket& bucket : data_->buckets) {
+  for (Bucket& bucket : data_->buckets) {
     const double reach = bucket.radius + bucket.inflation;
     if (distanceToSegment2(bucket.centre, centre, motion, motion2) > reach * reach) continue;
     RTCRayHit ray{};
@@ -229,7 +239,7 @@ bool Buckets::sweep(const Vector3d& centre, const Vector3d& motion, double radiu
     ray.ray.tfar = rayLength(context.best.t);
     ray.ray.mask = ~0U;
     ray.hit.geomID = ray.hit.primID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(bucket.scene, &context.embree, &ray);
+    rtcIntersect1(currentScene(bucket), &context.embree, &ray);
   }
   if (context.best.triangle < 0) return false;
   hit = context.best;
@@ -253,7 +263,7 @@ const std::vector<int>& Buckets::near(const Vector3d& centre, double distance) {
   assert(isQueryable(centre) && std::isfinite(distance) && distance >= 0);
   std::vector<int>& found = data_->near;
   found.clear();
-  for (const Bucket& bucket : data_->buckets) {
+  for (Bucket& bucket : data_->buckets) {
     const double reach = bucket.radius + bucket.inflation + distance;
     if ((centre - bucket.centre).squaredNorm() > reach * reach) continue;
     RTCPointQuery point{float(centre.x()), float(centre.y()), float(centre.z()), 0,
@@ -261,7 +271,7 @@ const std::vector<int>& Buckets::near(const Vector3d& centre, double distance) {
     RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
     NearQuery query{&bucket, &found};
-    rtcPointQuery(bucket.scene, &point, &context, collectTriangle, &query);
+    rtcPointQuery(currentScene(bucket), &point, &context, collectTriangle, &query);
   }
   std::sort(found.begin(), found.end());
   return found;

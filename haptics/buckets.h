@@ -49,7 +49,8 @@ class Buckets {
 
   const BlendedSurface& surface() const;
 
-  // The two frames to blend from now on; bounds are refitted around both.
+  // The two frames to blend from now on. Bounding spheres are renewed around both; a bucket's triangles are refitted by
+  // the first query that reaches them.
   void commit(const DynamicsFrame& from, const DynamicsFrame& to);
 
   // First touch of a sphere that moves from `centre` to `centre + motion` while the surface stands at alpha; of equal
