@@ -13,33 +13,47 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // Velocities are v = linear + angular x (x - centre): the rigid motion with the spheres' linear and orbital angular
-// momentum.
+// momentum. Vectors as (x, y, z, 0).
 struct RigidMotion {
-  Vector3d centre = Vector3d::Zero(), linear = Vector3d::Zero(), angular = Vector3d::Zero();
+  Lanes centre, linear, angular;
 };
 
+Quad quadFrom(Lanes a) {
+  Quad q;
+  store(q, a);
+  return q;
+}
+
+// One pass: sums about the body's first sphere, moved to the centre of mass by Steiner's theorem.
 RigidMotion rigidMotionOf(const Spheres& s, const BodyRange& r) {
+  const Lanes reference = load(s.position[r.firstSphere]), zero = splat(0);
+  Lanes first = zero, momentum = zero, angularMomentum = zero, squares = zero, products = zero;
+  double mass = 0;
+  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+    const double m = s.groups[i / 4].mass[i % 4];
+    const Lanes x = load(s.position[i]) - reference, mx = splat(m) * x, v = load(s.velocity[i]);
+    mass += m;
+    first = first + mx;
+    momentum = fma(splat(m), v, momentum);
+    angularMomentum = angularMomentum + crossProduct(mx, v);
+    squares = fma(mx, x, squares);
+    products = fma(mx, turnedLanes(x), products);  // xy, yz, zx
+  }
   RigidMotion motion;
-  double total = 0;
-  const auto mass = [&](int i) { return s.groups[i / 4].mass[i % 4]; };
-  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
-    total += mass(i);
-    motion.centre += mass(i) * vectorOf(s.position[i]);
-    motion.linear += mass(i) * vectorOf(s.velocity[i]);
-  }
-  motion.centre /= total;
-  motion.linear /= total;
-  Matrix3d inertia = Matrix3d::Zero();
-  Vector3d momentum = Vector3d::Zero();
-  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
-    const Vector3d x = vectorOf(s.position[i]) - motion.centre;
-    inertia += mass(i) * (x.squaredNorm() * Matrix3d::Identity() - x * x.transpose());
-    momentum += mass(i) * x.cross(vectorOf(s.velocity[i]) - motion.linear);
-  }
+  const Lanes centre = first / splat(mass);
+  motion.centre = reference + centre;
+  motion.linear = momentum / splat(mass);
+  const Lanes moved = fnma(first, centre, squares);
+  const Lanes q = fnma(first, turnedLanes(centre), products);
+  const double trace = sumOfLanes(moved);
   // Spheres in a line do not say how they turn about it, and need not: that turning moves none of their centres.
-  constexpr double kRegular = 1e-16;
-  inertia += (kRegular * inertia.trace() + std::numeric_limits<double>::min()) * Matrix3d::Identity();
-  motion.angular = inertia.ldlt().solve(momentum);
+  constexpr double kRegular = 1e-14;
+  const double regular = kRegular * trace + std::numeric_limits<double>::min();
+  Matrix3d inertia;
+  inertia << trace - moved[0], -q[0], -q[2], -q[0], trace - moved[1], -q[1], -q[2], -q[1], trace - moved[2];
+  inertia.diagonal().array() += regular;
+  const Vector3d about = vectorOf(quadFrom(angularMomentum - crossProduct(centre, momentum)));
+  motion.angular = load(quadOf(inertia.ldlt().solve(about)));
   return motion;
 }
 
@@ -51,11 +65,12 @@ void dampBodies(WorldData& d) {
   for (const BodyRange& r : d.ranges) {
     if (r.massDamping == 0) continue;
     const double lost = 1 - 1 / (1 + d.substep * r.massDamping);
-    const RigidMotion motion = r.held ? RigidMotion() : rigidMotionOf(s, r);
+    const Lanes zero = splat(0);
+    const RigidMotion motion = r.held ? RigidMotion{zero, zero, zero} : rigidMotionOf(s, r);
     for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
-      const Vector3d v = vectorOf(s.velocity[i]);
-      const Vector3d rigid = motion.linear + motion.angular.cross(vectorOf(s.position[i]) - motion.centre);
-      s.velocity[i] = quadOf(v - lost * (v - rigid));
+      const Lanes v = load(s.velocity[i]);
+      const Lanes rigid = motion.linear + crossProduct(motion.angular, load(s.position[i]) - motion.centre);
+      store(s.velocity[i], fma(splat(-lost), v - rigid, v));
     }
   }
 }

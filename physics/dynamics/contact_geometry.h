@@ -70,15 +70,4 @@ MEDULLA_INLINE ConeContact closestOnCones(const BallLanes& p0, const BallLanes& 
   return out;
 }
 
-// Vectors as (x, y, z, 0), one per register.
-inline Lanes turnedLanes(Lanes a) {  // y, z, x, w
-  return _mm256_permute4x64_pd(a, _MM_SHUFFLE(3, 0, 2, 1));
-}
-inline Lanes crossProduct(Lanes a, Lanes b) {
-  return turnedLanes(fnma(turnedLanes(a), b, a * turnedLanes(b)));
-}
-inline double dotProduct(Lanes a, Lanes b) {
-  return sumOfLanes(a * b);
-}
-
 }  // namespace medulla

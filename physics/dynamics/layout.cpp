@@ -89,7 +89,7 @@ void appendNodes(NodeOrder& order, Nodes& nodes, const BodyMechanics& mechanics,
                    [&](int i, int j) { return mechanics.attachments[i].host < mechanics.attachments[j].host; });
   for (std::size_t k = 0; k < sorted.size();) {
     const int host = mechanics.attachments[sorted[k]].host;
-    HostRange range{firstHost + host, static_cast<int>(order.node.size()) / 4, 0};
+    HostRange range{firstHost + host, static_cast<int>(order.node.size()) / 4, 0, mechanics.surfaceRelaxation};
     for (; k < sorted.size() && mechanics.attachments[sorted[k]].host == host; ++k) {
       order.body.push_back(b);
       order.node.push_back(sorted[k]);
@@ -142,9 +142,7 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
     n.mass[i] = mechanics[b].nodeMass[k];
     n.inverseMass[i] = n.mass[i] > 0 && mechanics[b].nodeMoves[k] ? 1 / n.mass[i] : 0;
     NodeGroup& g = n.groups[i / 4];
-    g.mass[lane] = n.mass[i];
     g.stiffness[lane] = mechanics[b].attachmentStiffness[k];
-    g.damping[lane] = mechanics[b].surfaceRelaxation * mechanics[b].attachmentStiffness[k];
     if (!a.onLink) {
       setLane(g.restOffset, lane, a.restOffset);
       continue;
@@ -172,8 +170,10 @@ void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     const SoftBodyModel& m = *d.bodies[b].model;
     if (d.bodies[b].surface != SurfaceMode::full) continue;
+    SpringRange range{static_cast<int>(s.groups.size()), 0, mechanics[b].surfaceRelaxation};
+    int lane = 3;
     for (const std::size_t e : interleaved(m.edges.size())) {
-      const int k = s.count++, lane = k % 4;
+      lane = (lane + 1) % 4;
       if (lane == 0) s.groups.emplace_back();
       SpringGroup& g = s.groups.back();
       const int n0 = d.ranges[b].node[m.edges[e][0]], n1 = d.ranges[b].node[m.edges[e][1]];
@@ -184,9 +184,15 @@ void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
         g.node1[l] = offset1;
         g.restLength[l] = (m.restNodes[m.edges[e][1]] - m.restNodes[m.edges[e][0]]).norm();
         g.stiffness[l] = l == lane ? mechanics[b].edgeStiffness[e] : 0;
-        g.damping[l] = mechanics[b].surfaceRelaxation * g.stiffness[l];
       }
     }
+    if ((s.groups.size() - range.firstGroup) % 2 == 1) {
+      s.groups.push_back(s.groups.back());
+      s.groups.back().stiffness = splat(0);
+    }
+    s.count += static_cast<int>(m.edges.size());
+    range.endGroup = static_cast<int>(s.groups.size());
+    s.ranges.push_back(range);
   }
 }
 

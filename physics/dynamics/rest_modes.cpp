@@ -277,7 +277,7 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics) {
   // The links get the beta that damps the lowest mode as asked, unless the step would shrink by more than this. What is
   // missing then is the mass-proportional part of Rayleigh's damping, which costs no step: zeta = beta w / 2 + alpha /
   // 2w.
-  constexpr double kLargestCost = 1.5;
+  constexpr double kLargestCost = 1.3;
 
   const RestModel rest(body, mechanics);
   const double all = rest.largestEigenvalue(1, 1), links = rest.largestEigenvalue(1, 0),

@@ -158,6 +158,17 @@ inline Lanes3 rotateBack(const Rotation& r, const Lanes3& a) {
   return {dot(r.x, a), dot(r.y, a), dot(r.z, a)};
 }
 
+// Vectors as (x, y, z, 0), one per register.
+inline Lanes turnedLanes(Lanes a) {  // y, z, x, w
+  return _mm256_permute4x64_pd(a, _MM_SHUFFLE(3, 0, 2, 1));
+}
+inline Lanes crossProduct(Lanes a, Lanes b) {
+  return turnedLanes(fnma(turnedLanes(a), b, a * turnedLanes(b)));
+}
+inline double dotProduct(Lanes a, Lanes b) {
+  return sumOfLanes(a * b);
+}
+
 // The fourth number is zeroed: sums over whole quads rely on it.
 inline Quad quadOf(const Eigen::Vector3d& a) {
   return {{a.x(), a.y(), a.z(), 0}};

@@ -55,12 +55,17 @@ void storeAngularVelocity(const SphereGroup& g, const Turning& t, Quad* out) {
   storeQuads(omega.x, omega.y, omega.z, splat(0), out);
 }
 
-void stepNodes(std::vector<Quad>& velocity, const std::vector<Quad>& force, const std::vector<double>& inverseMass,
-               double h, int count) {
-  Quad* v = velocity.data();
-  const Quad* f = force.data();
-  const double* inverse = inverseMass.data();
-  for (int i = 0; i < count; ++i) store(v[i], fma(splat(h * inverse[i]), load(f[i]), load(v[i])));
+// Nodes without an inverse mass, fixed or pads, do not fall either.
+void stepNodes(Nodes& n, Lanes gravity, double h) {
+  Quad* v = n.velocity.data();
+  const Quad* f = n.force.data();
+  const double* inverse = n.inverseMass.data();
+  const Lanes fall = splat(h) * gravity, zero = splat(0);
+  for (int i = 0; i < n.dynamicEnd; ++i) {
+    const Lanes perMass = splat(inverse[i]);
+    const Lanes falling = _mm256_and_pd(isLess(zero, perMass), fall);
+    store(v[i], fma(splat(h) * perMass, load(f[i]), load(v[i]) + falling));
+  }
 }
 
 }  // namespace
@@ -89,7 +94,7 @@ void stepVelocities(WorldData& d) {
     store(s.velocity[i], fma(h * splat(g.inverseMass[i % 4]), load(s.force[i]), load(s.velocity[i])));
     store(s.angularMomentum[i], fma(h * splat(g.freeToTurn[i % 4]), load(s.torque[i]), load(s.angularMomentum[i])));
   }
-  stepNodes(d.nodes.velocity, d.nodes.force, d.nodes.inverseMass, d.substep, d.nodes.dynamicEnd);
+  stepNodes(d.nodes, load(d.gravity), d.substep);
 }
 
 void stepPositions(WorldData& d) {

@@ -30,29 +30,28 @@ void storeNodes(const Lanes3& v, std::vector<Quad>& q, int i) {
   store(q[i + 3], d);
 }
 
-// Pull of the anchors on the four nodes of group g; with their weight it begins the sum of their forces. The spring
+// Pull of the anchors on the four nodes of group g; it begins the sum of their forces. The spring
 // pulls along the stretch, so that its moment is the same whether it acts on the host at the anchor or at the node. The
 // damper does not: it acts between the node and the point of the carrying frame where the node *is*, or the pair would
 // exert a couple on a free body.
-MEDULLA_INLINE void pullNodes(Nodes& n, const Lanes3& gravity, const NodeGroup& group, const Anchor& anchor, int g,
+MEDULLA_INLINE void pullNodes(Nodes& n, Lanes relaxation, const NodeGroup& group, const Anchor& anchor, int g,
                               Lanes3& force, Lanes3& moment) {
   const Lanes3 lever = gatherNodes(n.position, 4 * g) - anchor.base;
   const Lanes3 rate = velocityAt(anchor, lever) - gatherNodes(n.velocity, 4 * g);
-  force = fma(group.stiffness, anchor.offset - lever, group.damping * rate);
-  storeNodes(fma(group.mass, gravity, force), n.force, 4 * g);
+  force = group.stiffness * fma(relaxation, rate, anchor.offset - lever);
+  storeNodes(force, n.force, 4 * g);
   moment = cross(lever, force);
 }
 
 void evaluateOnLink(WorldData& d, const HostRange& range) {
   const LinkHost host = linkHost(d, range.host);
-  const Lanes3 gravity = splat(d.gravity);
-  const Lanes zero = splat(0);
+  const Lanes zero = splat(0), relaxation = splat(range.relaxation);
   Lanes3 sum{zero, zero, zero}, along = sum, moment = sum;
   Lanes twist = zero;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
     Lanes3 pull, turn;
-    pullNodes(d.nodes, gravity, group, anchorOnLink(host, group), g, pull, turn);
+    pullNodes(d.nodes, relaxation, group, anchorOnLink(host, group), g, pull, turn);
     sum = sum + pull;
     along = fma(group.along, pull, along);
     moment = moment + turn;
@@ -75,13 +74,12 @@ void evaluateOnLink(WorldData& d, const HostRange& range) {
 
 void evaluateOnSphere(WorldData& d, const HostRange& range) {
   const SphereHost host = sphereHost(d, range.host);
-  const Lanes3 gravity = splat(d.gravity);
-  const Lanes zero = splat(0);
+  const Lanes zero = splat(0), relaxation = splat(range.relaxation);
   Lanes3 sum{zero, zero, zero}, moment = sum;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
     Lanes3 pull, turn;
-    pullNodes(d.nodes, gravity, group, anchorOnSphere(host, group), g, pull, turn);
+    pullNodes(d.nodes, relaxation, group, anchorOnSphere(host, group), g, pull, turn);
     sum = sum + pull;
     moment = moment + turn;
   }
@@ -101,36 +99,61 @@ void evaluateAttachments(WorldData& d) {
   for (const HostRange& range : d.nodes.onSpheres) evaluateOnSphere(d, range);
 }
 
+namespace {
+
+// Lines of a group's springs, and their tensions over length.
+MEDULLA_INLINE Lanes pullOfSprings(const SpringGroup& s, Lanes relaxation, const Quad* x, const Quad* v,
+                                   Lanes (&line)[4]) {
+  Lanes rate[4];
+  for (int k = 0; k < 4; ++k) {
+    line[k] = load(at(x, s.node1[k])) - load(at(x, s.node0[k]));
+    rate[k] = (load(at(v, s.node1[k])) - load(at(v, s.node0[k]))) * line[k];
+  }
+  const Lanes squared = larger(dotOfFour(line[0] * line[0], line[1] * line[1], line[2] * line[2], line[3] * line[3]),
+                               splat(kSmallestSquaredLength));
+  const Lanes lengthRate = dotOfFour(rate[0], rate[1], rate[2], rate[3]);  // times length
+  const Lanes length = squareRoot(squared);
+  const Lanes scale = s.stiffness / squared;  // does not wait for the root
+  return scale * fma(length - s.restLength, length, relaxation * lengthRate);
+}
+
+MEDULLA_INLINE void pullEnds(const SpringGroup& s, Lanes pull, const Lanes (&line)[4], Quad* force) {
+  std::uint32_t node0[4], node1[4];  // copies: the stores below could change the group's for all the compiler knows
+  for (int k = 0; k < 4; ++k) {
+    node0[k] = s.node0[k];
+    node1[k] = s.node1[k];
+  }
+  const auto apply = [&](int k, Lanes pullOfOne) {
+    Quad &end0 = at(force, node0[k]), &end1 = at(force, node1[k]);
+    store(end0, fma(pullOfOne, line[k], load(end0)));
+    store(end1, fnma(pullOfOne, line[k], load(end1)));
+  };
+  apply(0, splatLane<0>(pull));
+  apply(1, splatLane<1>(pull));
+  apply(2, splatLane<2>(pull));
+  apply(3, splatLane<3>(pull));
+}
+
+}  // namespace
+
 // One pass over the springs, each added to its two nodes while its direction is in registers. Rejected: one number per
 // spring first and a sum per node after, which reads every position again and costs half as many instructions more.
+// Two groups at a time: from ends to pull is one long chain, in which a single group leaves the processor waiting.
 void addEdgeSprings(WorldData& d) {
   const Quad* x = d.nodes.position.data();
   const Quad* v = d.nodes.velocity.data();
   Quad* force = d.nodes.force.data();
-  for (const SpringGroup& s : d.springs.groups) {
-    Lanes line[4], rate[4];
-    std::uint32_t node0[4], node1[4];  // copies: the stores below could change the group's for all the compiler knows
-    for (int k = 0; k < 4; ++k) {
-      node0[k] = s.node0[k];
-      node1[k] = s.node1[k];
-      line[k] = load(at(x, node1[k])) - load(at(x, node0[k]));
-      rate[k] = (load(at(v, node1[k])) - load(at(v, node0[k]))) * line[k];
+  for (const SpringRange& range : d.springs.ranges) {
+    const Lanes relaxation = splat(range.relaxation);
+    for (int g = range.firstGroup; g < range.endGroup; g += 2) {
+      const SpringGroup& s0 = d.springs.groups[g];
+      const SpringGroup& s1 = d.springs.groups[g + 1];
+      Lanes line0[4], line1[4];
+      const Lanes pull0 = pullOfSprings(s0, relaxation, x, v, line0),
+                  pull1 = pullOfSprings(s1, relaxation, x, v, line1);
+      pullEnds(s0, pull0, line0, force);
+      pullEnds(s1, pull1, line1, force);
     }
-    const Lanes squared = larger(dotOfFour(line[0] * line[0], line[1] * line[1], line[2] * line[2], line[3] * line[3]),
-                                 splat(kSmallestSquaredLength));
-    const Lanes lengthRate = dotOfFour(rate[0], rate[1], rate[2], rate[3]);  // times length
-    const Lanes length = squareRoot(squared);
-    const Lanes pull = fma(s.stiffness * (length - s.restLength), length, s.damping * lengthRate);  // times length
-    const Lanes tension = pull / squared;                                                           // over length
-    const auto apply = [&](int k, Lanes tensionOfOne) {
-      Quad &end0 = at(force, node0[k]), &end1 = at(force, node1[k]);
-      store(end0, fma(tensionOfOne, line[k], load(end0)));
-      store(end1, fnma(tensionOfOne, line[k], load(end1)));
-    };
-    apply(0, splatLane<0>(tension));
-    apply(1, splatLane<1>(tension));
-    apply(2, splatLane<2>(tension));
-    apply(3, splatLane<3>(tension));
   }
 }
 
@@ -151,12 +174,13 @@ void placeSkin(WorldData& d) {
 
 double surfaceEnergy(const WorldData& d) {
   double sum = 0;
-  for (int k = 0; k < d.springs.count; ++k) {
-    const SpringGroup& s = d.springs.groups[k / 4];
-    const Eigen::Vector3d line =
-        vectorOf(at(d.nodes.position.data(), s.node1[k % 4])) - vectorOf(at(d.nodes.position.data(), s.node0[k % 4]));
-    const double stretch = line.norm() - s.restLength[k % 4];
-    sum += 0.5 * s.stiffness[k % 4] * stretch * stretch;
+  for (const SpringGroup& s : d.springs.groups) {
+    for (int k = 0; k < 4; ++k) {
+      const Eigen::Vector3d line =
+          vectorOf(at(d.nodes.position.data(), s.node1[k])) - vectorOf(at(d.nodes.position.data(), s.node0[k]));
+      const double stretch = line.norm() - s.restLength[k];
+      sum += 0.5 * s.stiffness[k] * stretch * stretch;
+    }
   }
   const auto add = [&](const Anchor& anchor, int g) {
     const Lanes3 stretch = positionOf(anchor) - gatherNodes(d.nodes.position, 4 * g);

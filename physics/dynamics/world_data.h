@@ -75,16 +75,16 @@ struct Links {
 
 // ---- Surface nodes: sorted by host, each host's range padded to four.
 
-struct NodeGroup {           // constants of four nodes
-  Lanes along;               // 0..1 on a link
-  Lanes3 restOffset;         // m; on a link (0, component on U, component on V), on a sphere in its frame
-  Lanes stiffness, damping;  // N/m, N s/m of the attachment; 0 on pads
-  Lanes mass;                // kg; 0 on pads and on skin
+struct NodeGroup {    // constants of four nodes
+  Lanes along;        // 0..1 on a link
+  Lanes3 restOffset;  // m; on a link (0, component on U, component on V), on a sphere in its frame
+  Lanes stiffness;    // N/m of the attachment; 0 on pads
 };
 
 struct HostRange {
   int host;                  // link or sphere
   int firstGroup, endGroup;  // of its nodes
+  double relaxation;         // s, the attachments' damping over stiffness
 };
 
 struct GroupHost {
@@ -95,7 +95,7 @@ struct GroupHost {
 struct Nodes {
   int count = 0;                          // with pads
   std::vector<Quad> position, velocity;   // m, m/s
-  std::vector<Quad> force;                // N, of the current substep; dynamic nodes only
+  std::vector<Quad> force;                // N, of the current substep, weight apart; dynamic nodes only
   std::vector<double> mass, inverseMass;  // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
   std::vector<NodeGroup> groups;
   std::vector<GroupHost> groupHosts;
@@ -104,16 +104,23 @@ struct Nodes {
   int dynamicEnd = 0;                                 // nodes [0, dynamicEnd) are dynamic
 };
 
-// ---- Edge springs between dynamic nodes; the last group is filled up with copies that have no stiffness.
+// ---- Edge springs between dynamic nodes; every body's are filled up with copies that have no stiffness to an even
+// number of groups.
 
 struct SpringGroup {
-  std::uint32_t node0[4], node1[4];      // byte offsets into Nodes::position
-  Lanes restLength, stiffness, damping;  // m, N/m, N s/m
+  std::uint32_t node0[4], node1[4];  // byte offsets into Nodes::position
+  Lanes restLength, stiffness;       // m, N/m
+};
+
+struct SpringRange {  // a body's
+  int firstGroup, endGroup;
+  double relaxation;  // s, damping over stiffness
 };
 
 struct Springs {
-  int count = 0;
+  int count = 0;  // without the fillings
   std::vector<SpringGroup> groups;
+  std::vector<SpringRange> ranges;
 };
 
 // ---- A body's share of the arrays.
