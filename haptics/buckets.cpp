@@ -25,6 +25,7 @@ struct Bucket {
   const BlendedSurface* surface = nullptr;
   double inflation = 0;  // m
   std::vector<int> triangles;
+  std::vector<int> nodes;              // of the triangles, each once
   Vector3d centre = Vector3d::Zero();  // of the bounding sphere around both frames, not inflated
   double radius = 0;
   bool stale = false;  // the scene bounds frames older than the surface's
@@ -125,7 +126,13 @@ static void appendBody(const SoftBodyModel& model, BlendedSurface& surface, std:
   for (const std::vector<int>& triangles : model.buckets) {
     if (triangles.empty()) continue;
     Bucket& bucket = buckets.emplace_back();
-    for (const int t : triangles) bucket.triangles.push_back(t + firstTriangle);
+    for (const int t : triangles) {
+      bucket.triangles.push_back(t + firstTriangle);
+      const std::array<int, 3>& corners = surface.triangles[t + firstTriangle];
+      bucket.nodes.insert(bucket.nodes.end(), corners.begin(), corners.end());
+    }
+    std::sort(bucket.nodes.begin(), bucket.nodes.end());
+    bucket.nodes.erase(std::unique(bucket.nodes.begin(), bucket.nodes.end()), bucket.nodes.end());
   }
 }
 
@@ -142,17 +149,15 @@ static void copyNodes(const DynamicsFrame& frame, std::vector<Vector3d>& nodes) 
 static void renewBoundingSphere(Bucket& bucket) {
   const BlendedSurface& surface = *bucket.surface;
   Vector3d lower = Vector3d::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
-  for (const int t : bucket.triangles)
-    for (const int n : surface.triangles[t]) {
-      lower = lower.cwiseMin(surface.from[n]).cwiseMin(surface.to[n]);
-      upper = upper.cwiseMax(surface.from[n]).cwiseMax(surface.to[n]);
-    }
+  for (const int n : bucket.nodes) {
+    lower = lower.cwiseMin(surface.from[n]).cwiseMin(surface.to[n]);
+    upper = upper.cwiseMax(surface.from[n]).cwiseMax(surface.to[n]);
+  }
   bucket.centre = 0.5 * (lower + upper);
   double radius2 = 0;
-  for (const int t : bucket.triangles)
-    for (const int n : surface.triangles[t])
-      radius2 = std::max(
-          {radius2, (surface.from[n] - bucket.centre).squaredNorm(), (surface.to[n] - bucket.centre).squaredNorm()});
+  for (const int n : bucket.nodes)
+    radius2 = std::max(
+        {radius2, (surface.from[n] - bucket.centre).squaredNorm(), (surface.to[n] - bucket.centre).squaredNorm()});
   bucket.radius = std::sqrt(radius2);
 }
 
