@@ -68,6 +68,7 @@ struct Renderer::Data {
   std::optional<HazeField> haze;
   LightView lightView;
   ShadowMap shadow;
+  VisibleTriangles seen;
   VertexLight lit;
   DrawLists lists;
 
@@ -139,8 +140,9 @@ void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view)
   if (picture.light.haze && picture.view != ViewKind::model) haze.emplace(picture.light, picture.camera, picture.time);
   lightView = makeLightView(picture.light, view, picture.camera, mesh);
   if (settings.shadows) renderShadowMap(mesh, lightView, shadow);
-  lightVertices(mesh, view, picture.light, lightView, haze ? &*haze : nullptr, picture.time, shadowIfOn(), lit);
-  sortVisibleTriangles(mesh, lit, shadowIfOn(), view, lists);
+  findVisibleTriangles(mesh, view, seen);
+  lightVertices(mesh, seen, view, picture.light, lightView, haze ? &*haze : nullptr, picture.time, shadowIfOn(), lit);
+  sortByVariant(mesh, seen, lit, shadowIfOn(), lists);
 }
 
 void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "render/visible_triangles.h"
+#include "render/draw_lists.h"
 
 namespace medulla {
 

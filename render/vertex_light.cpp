@@ -166,52 +166,68 @@ GlossLobes glossLobes(const Look& look) {
   return {a1, a1 / kPi * 0.18f * look.specular, a2, a2 / kPi * 0.22f * look.specular};
 }
 
-void lightVertices(const SceneMesh& mesh, const Viewpoint& view, const Light& light, const LightView& lightView,
-                   const HazeField* haze, float time, const ShadowMap* shadow, VertexLight& out) {
-  const std::size_t n = mesh.position.size();
-  out.vertices.resize(n);
-  out.picture.resize(n);
-  out.shade.assign(n, Shade::lit);
-  out.glinting.assign(n, 1);
+namespace {
+
+Surroundings makeSurroundings(const Viewpoint& view, const Light& light, const LightView& lightView,
+                              const HazeField* haze, float time) {
   const float corner = view.round ? 2 * kRimOuter : 1.6f * std::sqrt(1 + view.aspect * view.aspect);
   const float cone = std::atan(corner * view.tangent);
   Surroundings s{view, light, lightView, haze, time, std::cos(0.40f * cone), std::cos(std::min(1.07f * cone, 1.5f))};
-  if (haze) {
-    s.below = haze->below();
-    s.above = haze->above();
-    s.rim = 0.3f * light.haze->colour;
-    // The medium filters the lamp's light on its way, too.
-    const vec3 c = light.haze->colour;
-    s.lamp = glm::mix(vec3(1), c / std::max({c.x, c.y, c.z, 1e-6f}), 0.35f);
-  }
-  for (const MeshPart& part : mesh.parts) {
-    const Look& look = *part.look;
-    const GlossLobes lobes = glossLobes(look);
-    for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
-      LitVertex& o = out.vertices[i];
-      o.position = mesh.position[i];
-      o.uv = mesh.uv[i];
-      o.detail = 1 - mesh.blanch[i];
-      out.picture[i] = pictureFromWorld(view, mesh.position[i]);
-      const Shading v = shadingOf(mesh, look, i, out.picture[i], s);
-      if (look.metal)
-        lightMetal(v, o);
-      else
-        lightTissue(v, look, s, o);
-      o.ambient += v.veilColour * (v.veil * v.veilLight * look.ambient);
-      if (haze) o.detail *= 1 - v.veil;
+  if (!haze) return s;
+  s.below = haze->below();
+  s.above = haze->above();
+  s.rim = 0.3f * light.haze->colour;
+  // The medium filters the lamp's light on its way, too.
+  const vec3 c = light.haze->colour;
+  s.lamp = glm::mix(vec3(1), c / std::max({c.x, c.y, c.z, 1e-6f}), 0.35f);
+  return s;
+}
 
-      const vec3 halfway = glm::normalize(v.toLight + v.toEye);
-      const float lh = glm::dot(v.toLight, halfway);
-      const float fresnel = kFilmReflectance + (1 - kFilmReflectance) * std::exp2((-5.55473f * lh - 6.98316f) * lh);
-      o.gloss = fresnel * std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 3 * v.exposure * (1 - v.veil);
-      const vec3 t = mesh.tangent[i];
-      o.halfway = {glm::dot(halfway, t), glm::dot(halfway, glm::cross(v.normal, t)), glm::dot(halfway, v.normal)};
-      out.glinting[i] = canGlint(o.gloss, o.halfway.z, look, lobes);
-      o.shadowRadius = 2;
-      o.shadowBias = 0;
+// i: of the mesh. Returns what is left to do for shadow: how the light falls.
+Shading lightVertex(const SceneMesh& mesh, const Look& look, std::size_t i, vec3 picture, const Surroundings& s,
+                    LitVertex& o) {
+  o.position = mesh.position[i];
+  o.uv = mesh.uv[i];
+  o.detail = 1 - mesh.blanch[i];
+  const Shading v = shadingOf(mesh, look, i, picture, s);
+  if (look.metal)
+    lightMetal(v, o);
+  else
+    lightTissue(v, look, s, o);
+  o.ambient += v.veilColour * (v.veil * v.veilLight * look.ambient);
+  if (s.haze) o.detail *= 1 - v.veil;
+
+  const vec3 halfway = glm::normalize(v.toLight + v.toEye);
+  const float lh = glm::dot(v.toLight, halfway);
+  const float fresnel = kFilmReflectance + (1 - kFilmReflectance) * std::exp2((-5.55473f * lh - 6.98316f) * lh);
+  o.gloss = fresnel * std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 3 * v.exposure * (1 - v.veil);
+  const vec3 t = mesh.tangent[i];
+  o.halfway = {glm::dot(halfway, t), glm::dot(halfway, glm::cross(v.normal, t)), glm::dot(halfway, v.normal)};
+  o.shadowRadius = 2;
+  o.shadowBias = 0;
+  return v;
+}
+
+}  // namespace
+
+void lightVertices(const SceneMesh& mesh, const VisibleTriangles& seen, const Viewpoint& view, const Light& light,
+                   const LightView& lightView, const HazeField* haze, float time, const ShadowMap* shadow,
+                   VertexLight& out) {
+  const std::size_t n = seen.vertices.size();
+  out.vertices.resize(n);
+  out.shade.assign(n, Shade::lit);
+  out.glinting.resize(n);
+  const Surroundings s = makeSurroundings(view, light, lightView, haze, time);
+  for (const VisiblePart& visible : seen.parts) {
+    const MeshPart& part = mesh.parts[visible.part];
+    const GlossLobes lobes = glossLobes(*part.look);
+    for (std::size_t k = visible.firstVertex; k < visible.firstVertex + visible.vertexCount; ++k) {
+      const std::size_t i = seen.vertices[k];
+      LitVertex& o = out.vertices[k];
+      const Shading v = lightVertex(mesh, *part.look, i, seen.picture[i], s, o);
+      out.glinting[k] = canGlint(o.gloss, o.halfway.z, *part.look, lobes);
       // Instruments take no shadow: the light sits beside the lens, and a thin jaw only shadows itself in stripes.
-      if (shadow && !part.instrument) out.shade[i] = shadeVertex(*shadow, shadow->texel[i], v, lightView, o);
+      if (shadow && !part.instrument) out.shade[k] = shadeVertex(*shadow, shadow->texel[i], v, lightView, o);
     }
   }
 }

@@ -5,7 +5,7 @@
 
 #include "render/haze.h"
 #include "render/shadow_map.h"
-#include "render/viewpoint.h"
+#include "render/visible_triangles.h"
 
 namespace medulla {
 
@@ -31,9 +31,8 @@ GlossLobes glossLobes(const Look& look);
 constexpr float kFilmPeak = 13.2f;  // of the film's lobe: beyond it only aliasing grows
 
 struct VertexLight {
-  std::vector<LitVertex> vertices;
-  std::vector<glm::vec3> picture;      // pictureFromWorld of every vertex
-  std::vector<Shade> shade;            // of the vertex, by taps around it
+  std::vector<LitVertex> vertices;     // in the order of VisibleTriangles::vertices, as is all below
+  std::vector<Shade> shade;            // by taps around the vertex
   std::vector<std::uint8_t> glinting;  // 0 where no highlight can be seen even with the relief's slopes
 };
 
@@ -44,7 +43,8 @@ constexpr float kExposure = 1.3f, kSoftening = 0.14f;
 float lightFalloff(const Light& light, float distance);
 
 // haze: of light.haze, or nullptr. time: Picture::time.
-void lightVertices(const SceneMesh& mesh, const Viewpoint& viewpoint, const Light& light, const LightView& lightView,
-                   const HazeField* haze, float time, const ShadowMap* shadow, VertexLight& out);
+void lightVertices(const SceneMesh& mesh, const VisibleTriangles& seen, const Viewpoint& viewpoint, const Light& light,
+                   const LightView& lightView, const HazeField* haze, float time, const ShadowMap* shadow,
+                   VertexLight& out);
 
 }  // namespace medulla

@@ -8,12 +8,12 @@ namespace medulla {
 namespace {
 
 // Front to back by the farthest vertex: the cavity's wall, which surrounds the camera, comes last.
-std::vector<std::size_t> frontToBack(const SceneMesh& mesh, const VertexLight& lit) {
+std::vector<std::size_t> frontToBack(const SceneMesh& mesh, const std::vector<glm::vec3>& picture) {
   std::vector<float> farthest(mesh.parts.size(), 0.f);
   for (std::size_t p = 0; p < mesh.parts.size(); ++p) {
     const MeshPart& part = mesh.parts[p];
     for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
-      farthest[p] = std::max(farthest[p], lit.picture[i].z);
+      farthest[p] = std::max(farthest[p], picture[i].z);
   }
   std::vector<std::size_t> order(mesh.parts.size());
   std::iota(order.begin(), order.end(), 0);
@@ -33,42 +33,33 @@ bool isVisible(glm::vec3 a, glm::vec3 b, glm::vec3 c, const Viewpoint& view) {
   return !view.round || x * x + y * y < kRimOuter * kRimOuter;
 }
 
-Shade shadeOf(const Look& look, const VertexLight& lit, const ShadowMap& shadow, const std::uint32_t* t) {
-  // Coarse backdrops are judged by whole blocks of the map: an edge could pass between their vertices.
-  if (!look.castsShadow) return shadeOfTriangle(shadow, shadow.texel[t[0]], shadow.texel[t[1]], shadow.texel[t[2]]);
-  const Shade s = lit.shade[t[0]];
-  return s == lit.shade[t[1]] && s == lit.shade[t[2]] ? s : Shade::edge;
-}
-
-Variant variantOf(Shade shade, bool glinting) {
-  if (shade == Shade::dark) return Variant::dark;
-  if (shade == Shade::edge) return glinting ? Variant::edge : Variant::edgeDull;
-  return glinting ? Variant::lit : Variant::litDull;
-}
-
 }  // namespace
 
-void sortVisibleTriangles(const SceneMesh& mesh, const VertexLight& lit, const ShadowMap* shadow, const Viewpoint& view,
-                          DrawLists& out) {
+void findVisibleTriangles(const SceneMesh& mesh, const Viewpoint& view, VisibleTriangles& out) {
+  out.picture.resize(mesh.position.size());
+  for (std::size_t i = 0; i < out.picture.size(); ++i) out.picture[i] = pictureFromWorld(view, mesh.position[i]);
+  out.placeOf.assign(mesh.position.size(), VisibleTriangles::kUnused);
+  out.parts.clear();
+  out.vertices.clear();
   out.index.clear();
-  out.runs.clear();
-  for (const std::size_t p : frontToBack(mesh, lit)) {
+  for (const std::size_t p : frontToBack(mesh, out.picture)) {
     const MeshPart& part = mesh.parts[p];
-    for (auto& list : out.byVariant) list.clear();
+    VisiblePart seen{p, std::uint32_t(out.vertices.size()), 0, std::uint32_t(out.index.size()), 0};
     for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
       const std::uint32_t* t = &mesh.index[k];
-      if (!isVisible(lit.picture[t[0]], lit.picture[t[1]], lit.picture[t[2]], view)) continue;
-      const Shade shade = shadow && !part.instrument ? shadeOf(*part.look, lit, *shadow, t) : Shade::lit;
-      const bool glinting = lit.glinting[t[0]] || lit.glinting[t[1]] || lit.glinting[t[2]];
-      auto& list = out.byVariant[static_cast<std::size_t>(variantOf(shade, glinting))];
-      list.insert(list.end(), t, t + 3);
+      if (!isVisible(out.picture[t[0]], out.picture[t[1]], out.picture[t[2]], view)) continue;
+      for (int c = 0; c < 3; ++c) {
+        std::uint32_t& place = out.placeOf[t[c]];
+        if (place == VisibleTriangles::kUnused) {
+          place = std::uint32_t(out.vertices.size());
+          out.vertices.push_back(t[c]);
+        }
+        out.index.push_back(place);
+      }
     }
-    for (int v = 0; v < kVariants; ++v) {
-      const auto& list = out.byVariant[v];
-      if (list.empty()) continue;
-      out.runs.push_back({p, static_cast<Variant>(v), std::uint32_t(out.index.size()), std::uint32_t(list.size())});
-      out.index.insert(out.index.end(), list.begin(), list.end());
-    }
+    seen.vertexCount = std::uint32_t(out.vertices.size()) - seen.firstVertex;
+    seen.indexCount = std::uint32_t(out.index.size()) - seen.firstIndex;
+    if (seen.indexCount > 0) out.parts.push_back(seen);
   }
 }
 

@@ -1,33 +1,32 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <vector>
 
-#include "render/vertex_light.h"
+#include "render/scene_mesh.h"
+#include "render/viewpoint.h"
 
 namespace medulla {
 
-// Shader variants, cheapest that gives the right pixel: no highlight, no shadow edge.
-enum class Variant : std::uint8_t { lit, edge, dark, litDull, edgeDull };
-constexpr int kVariants = 5;
-
-// Triangles drawn by one call.
-struct DrawRun {
+// What can be seen of one part.
+struct VisiblePart {
   std::size_t part = 0;
-  Variant variant = Variant::lit;
-  std::uint32_t firstIndex = 0, indexCount = 0;
+  std::uint32_t firstVertex = 0, vertexCount = 0;  // of VisibleTriangles::vertices
+  std::uint32_t firstIndex = 0, indexCount = 0;    // of VisibleTriangles::index
 };
 
-struct DrawLists {
-  std::vector<std::uint32_t> index;
-  std::vector<DrawRun> runs;  // front to back: hidden pixels are never shaded
-  std::array<std::vector<std::uint32_t>, kVariants> byVariant;
+// Half of all triangles never reach OpenGL, and half of all vertices are never lit.
+struct VisibleTriangles {
+  std::vector<VisiblePart> parts;       // front to back: hidden pixels are never shaded
+  std::vector<std::uint32_t> vertices;  // of the mesh, those that triangles use
+  std::vector<std::uint32_t> index;     // of `vertices`, three per triangle
+  std::vector<glm::vec3> picture;       // pictureFromWorld of every vertex of the mesh
+  std::vector<std::uint32_t> placeOf;   // of every used vertex of the mesh in `vertices`; kUnused otherwise
+  static constexpr std::uint32_t kUnused = ~0u;
 };
 
-// Drops what faces away, lies outside the picture or behind the rim, and sorts the rest. Half of all triangles never
-// reach OpenGL.
-void sortVisibleTriangles(const SceneMesh& mesh, const VertexLight& lit, const ShadowMap* shadow,
-                          const Viewpoint& viewpoint, DrawLists& out);
+// Drops what faces away, lies outside the picture or behind the rim.
+void findVisibleTriangles(const SceneMesh& mesh, const Viewpoint& viewpoint, VisibleTriangles& out);
 
 }  // namespace medulla
