@@ -97,15 +97,21 @@ uniform float opacity;
 in vec4 vShadow;
 uniform sampler2DShadow shadowMap;
 uniform float texel;
+uniform int squares;
 
-// Taps on three turned squares. A rotation per pixel would hide their steps better but leaves a pattern.
+// Taps on three turned squares and in the middle. A rotation per pixel would hide their steps better but leaves a
+// pattern. Most pixels agree on the widest square and are done: llvmpipe runs both sides of a branch but leaves a loop
+// when all its pixels do, so the squares are a loop whose length the compiler cannot know.
 float softShadow(vec3 q, float radius) {
-  float r = radius * texel;
-#define TAP(X, Y) texture(shadowMap, q + vec3(X * r, Y * r, 0))
-  float inner = TAP(-.33, -.10) + TAP(.10, -.33) + TAP(.33, .10) + TAP(-.10, .33);
-  float middle = TAP(-.60, .32) + TAP(-.32, -.60) + TAP(.60, -.32) + TAP(.32, .60);
-  float outer = TAP(-.40, -.90) + TAP(.90, -.40) + TAP(.40, .90) + TAP(-.90, .40);
-  return (TAP(0., 0.) + inner + middle + outer) / 13.;
+  float r = radius * texel, sum = texture(shadowMap, q), taps = 1.;
+  for (int k = 0; k < squares; ++k) {
+    vec2 d = r * (k == 0 ? vec2(.40, .90) : k == 1 ? vec2(.60, -.32) : vec2(.33, .10));
+    sum += texture(shadowMap, q + vec3(d, 0)) + texture(shadowMap, q - vec3(d, 0)) +
+           texture(shadowMap, q + vec3(-d.y, d.x, 0)) + texture(shadowMap, q + vec3(d.y, -d.x, 0));
+    taps += 4.;
+    if (sum == 0. || sum == taps) break;
+  }
+  return sum / taps;
 }
 #endif
 

@@ -68,6 +68,7 @@ TissuePass::Program TissuePass::makeProgram(Variant v) {
   glUniform1i(uniform("detail"), 0);
   glUniform1i(uniform("shadowMap"), 1);
   glUniform1f(uniform("texel"), 1.f / kShadowSide);
+  glUniform1i(uniform("squares"), 3);
   return p;
 }
 

@@ -116,10 +116,16 @@ bool canGlint(float gloss, float cosine, const Look& look, const GlossLobes& lob
 // Is the vertex lit, dark, or near an edge? Looks around it in the shadow map as far as a soft edge reaches; the
 // distance of what it finds in the way sets how soft the edge is (Fernando 2005, percentage-closer soft shadows).
 Shade shadeVertex(const ShadowMap& shadow, vec3 texel, const Shading& v, const LightView& light, LitVertex& out) {
-  constexpr int kTaps = 17;
-  constexpr float kReach = 18, kMinimumBias = 0.0008f;
-  constexpr float kX[kTaps] = {0, 1, -1, 0, 0, .7f, .7f, -.7f, -.7f, .45f, -.45f, .2f, -.2f, 0, 0, 1.2f, -1.2f};
-  constexpr float kY[kTaps] = {0, 0, 0, 1, -1, .7f, -.7f, .7f, -.7f, .2f, -.2f, -.45f, .45f, 1.2f, -1.2f, 0, 0};
+  struct Tap {
+    float x, y, away;  // texels
+  };
+  constexpr Tap kTaps[] = {{0, 0, 0},       {18, 0, 18},      {-18, 0, 18},     {0, 18, 18},       {0, -18, 18},
+                           {13, 13, 18.4f}, {13, -13, 18.4f}, {-13, 13, 18.4f}, {-13, -13, 18.4f}, {8, 4, 8.9f},
+                           {-8, -4, 8.9f},  {4, -8, 8.9f},    {-4, 8, 8.9f},    {0, 22, 22},       {0, -22, 22},
+                           {22, 0, 22},     {-22, 0, 22}};
+  // The surface bends away from its tangent plane within the taps' reach: where it faces the light it would shade
+  // itself, and whole highlights would go to the dear shader.
+  constexpr float kMinimumBias = 0.0008f, kBend = 0.12f;
   const float cosine = glm::dot(v.normal, v.toLight);
   const float slope = std::min(std::sqrt(std::max(1 - cosine * cosine, 0.f)) / std::max(cosine, 0.12f), 4.f);
   const float range = light.farDistance * light.nearDistance / (light.farDistance - light.nearDistance);
@@ -127,12 +133,11 @@ Shade shadeVertex(const ShadowMap& shadow, vec3 texel, const Shading& v, const L
   const float metresPerTexel = 2 * v.lightDistance * light.tangent / kShadowSide;
   int lit = 0, tried = 0;
   float blockers = 0, blockerDepth = 0;
-  for (int k = 0; k < kTaps; ++k) {
-    const int x = int(texel.x + kX[k] * kReach), y = int(texel.y + kY[k] * kReach);
+  for (const Tap& tap : kTaps) {
+    const int x = int(texel.x + tap.x), y = int(texel.y + tap.y);
     if (x < 0 || y < 0 || x >= kShadowSide || y >= kShadowSide) continue;
     ++tried;
-    const float away = std::sqrt(kX[k] * kX[k] + kY[k] * kY[k]) * kReach;
-    const float bias = kMinimumBias + depthPerMetre * (0.5f + away) * metresPerTexel * slope;
+    const float bias = kMinimumBias + depthPerMetre * (0.5f + tap.away) * metresPerTexel * (slope + kBend);
     const float depth = shadow.map.at(x, y);
     if (texel.z - bias <= depth)
       ++lit;
