@@ -1,7 +1,9 @@
 #include "render/post_process.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "render/noise.h"
 #include "render/viewpoint.h"
@@ -158,6 +160,14 @@ void PostProcess::computeLuma(const Image& image) {
   for (std::size_t i = 0; i < n; ++i) out[i] = std::uint8_t(luma(p[4 * i], p[4 * i + 1], p[4 * i + 2]));
 }
 
+void PostProcess::smoothPixel(const Image& image, std::size_t at) {
+  const Blend blend = findBlend(&luma_[at], width_);
+  const std::uint8_t *p = &image.pixels[4 * at], *q = p + 4 * blend.neighbour;
+  Smoothed s{std::uint32_t(at), {}};
+  for (int c = 0; c < 3; ++c) s.rgb[c] = std::uint8_t(float(p[c]) + (float(q[c]) - float(p[c])) * blend.share + kRound);
+  smoothed_.push_back(s);
+}
+
 void PostProcess::smoothRow(const Image& image, int y) {
   const std::uint8_t *above = &luma_[std::size_t(y - 1) * width_], *here = above + width_, *below = here + width_;
   std::uint8_t* edge = edge_.data();
@@ -169,15 +179,12 @@ void PostProcess::smoothRow(const Image& image, int y) {
     const std::uint8_t limit = std::max<std::uint8_t>(kEdgeThreshold, high >> kRelativeShift);
     edge[x] = std::uint8_t(high - low) > limit;
   }
-  for (int x = kMargin; x < end; ++x) {
-    if (!edge[x]) continue;
-    const std::size_t at = std::size_t(y) * width_ + x;
-    const Blend blend = findBlend(&luma_[at], width_);
-    const std::uint8_t *p = &image.pixels[4 * at], *q = p + 4 * blend.neighbour;
-    Smoothed s{std::uint32_t(at), {}};
-    for (int c = 0; c < 3; ++c)
-      s.rgb[c] = std::uint8_t(float(p[c]) + (float(q[c]) - float(p[c])) * blend.share + kRound);
-    smoothed_.push_back(s);
+  // Eight flags of 0 or 1 at a time: few are set.
+  for (int x = kMargin; x < end; x += 8) {
+    std::uint64_t flags = 0;
+    std::memcpy(&flags, edge + x, sizeof flags);
+    for (; flags != 0; flags &= flags - 1)
+      smoothPixel(image, std::size_t(y) * width_ + x + std::countr_zero(flags) / 8);
   }
 }
 

@@ -27,6 +27,7 @@ class PostProcess {
   void gatherHighlights(const Image& image);
   void blurGlare();
   void computeLuma(const Image& image);
+  void smoothPixel(const Image& image, std::size_t at);
   void smoothRow(const Image& image, int y);
 
   int width_, height_;
