@@ -22,7 +22,7 @@ Look liver() {
   l.mottle = 0.95f;
   l.vessels = 0.10f;
   l.vesselTint = {1.3f, 0.6f, 0.6f};
-  l.bump = 0.44f;
+  l.bump = 0.28f;  // more and the highlight crinkles like foil
   l.specular = 0.66f;
   l.detailScale = 11;
   l.detail = {1024, 3, 1.2f, 0.4f, 74, 0.10f, 0};
@@ -155,6 +155,9 @@ Look dolphin() {
   l.mottleFrequency = 2;
   l.patches[0] = {{0.30f, 0.325f, 0.34f}, 4, 7, 0.12f, {0, -1, 0}, -0.46f, -0.30f, 0.9f};  // grey flanks
   l.patches[1] = {{0.56f, 0.55f, 0.54f}, 3, 5, 0.10f, {0, -1, 0}, -0.26f, -0.16f, 0.9f};   // pale belly
+  // Fins and flukes are as dark as the back: they reach out farther to both sides than a body of their height.
+  l.patches[2] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {0, -0.6f, 1}, 0.565f, 0.615f, 1};
+  l.patches[3] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {0, -0.6f, -1}, -0.435f, -0.385f, 1};
   l.wrap = {0.10f, 0.12f, 0.14f};
   l.roughness = 0.50f;
   l.wetRoughness = 0.30f;
