@@ -1,0 +1,183 @@
+"""The bodies and load cases of the references: what is held, what is loaded, how much. Lengths in mm, forces in mN."""
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+import meshes
+
+
+@dataclass
+class Load:
+    """A dead load, spread over flat triangles: a uniform traction of this total force, or (turn) the traction
+    c axis x (x - centre) of this total moment along the axis, mN mm, about the patch's centroid."""
+
+    patch: str
+    force: tuple = (0, 0, 0)
+    turn: float = 0
+    axis: tuple = (1, 0, 0)
+
+
+@dataclass
+class Case:
+    name: str
+    fix: str
+    load: Load
+    increments: int = 2  # least number of load increments
+
+
+@dataclass
+class Body:
+    name: str
+    mesh: str  # relative to the project
+    young: float  # Pa
+    density: float  # kg / m3
+    regions: dict  # name: set of vertices, as a function of the vertices and their outward normals
+    cases: list
+    grids: dict  # region held: meshes.Grid of the study of the mesh error, each finer at the region's rim than the last
+    kept: dict  # region held: number of the grid whose nonlinear results are written
+    poisson: float = 0.45
+    cut: tuple = ()  # regions held with all that lies behind them, not by their surface alone
+    modes: int = 5
+    step: tuple = ("tip", 0.4)  # damped step response: the load of this case times this factor
+    vertices: np.ndarray = None
+    triangles: np.ndarray = None
+    normals: np.ndarray = None
+
+    def read(self, project):
+        self.vertices, self.triangles = meshes.read_obj(os.path.join(project, self.mesh))
+        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
+        area = np.cross(b - a, c - a) / 2
+        self.normals = np.zeros_like(self.vertices)
+        for k in range(3):
+            np.add.at(self.normals, self.triangles[:, k], area)
+        self.normals /= np.linalg.norm(self.normals, axis=1)[:, None]
+
+    def patch(self, region):
+        """Numbers of the triangles that have all three corners in a region."""
+        inside = self.regions[region](self.vertices, self.normals)
+        triangles = np.nonzero(inside[self.triangles].all(axis=1))[0]
+        if not len(triangles):
+            raise RuntimeError(f"{self.name}: no triangle in region {region}")
+        return triangles
+
+    def held(self, region):
+        """Vertices of the patch of a region."""
+        return np.unique(self.triangles[self.patch(region)])
+
+    def area(self, patch):
+        a, b, c = (self.vertices[self.triangles[patch, k]] for k in range(3))
+        return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+
+    def traction(self, load):
+        """The traction (kPa) as a function of the points (n x 3) of the load's patch."""
+        patch = self.patch(load.patch)
+        area = self.area(patch)
+        corners = self.vertices[self.triangles[patch]]
+        centre = (corners.mean(axis=1) * area[:, None]).sum(axis=0) / area.sum()
+        axis = np.array(load.axis, float) / np.linalg.norm(load.axis)
+        # Second moment of the patch about the axis: edge middles integrate a quadratic over a triangle exactly.
+        middle = (corners + corners[:, [1, 2, 0]]) / 2
+        lever = np.cross(axis, middle - centre)
+        polar = ((lever**2).sum(axis=2).mean(axis=1) * area).sum()
+        uniform = np.array(load.force, float) / area.sum()
+        return lambda x: uniform + load.turn / polar * np.cross(axis, x - centre)
+
+
+def within(centre, radius):
+    return lambda x, n: np.linalg.norm(x - centre, axis=1) < radius
+
+
+def beyond(axis, distance):
+    return lambda x, n: x @ np.array(axis) > distance
+
+
+def box(low, high):
+    return lambda x, n: ((x > low) & (x < high)).all(axis=1)
+
+
+def facing(direction, cosine):
+    return lambda x, n: n @ np.array(direction) > cosine
+
+
+def grids(*numbers):
+    return [meshes.Grid(m, times) for m, times in zip(numbers[::2], numbers[1::2])]
+
+
+def cylinder():
+    # Angles are multiples of 20 degrees: the bed is 80 degrees wide, the patches 40 and 80.
+    regions = {
+        "root": box((-1, -99, -99), (0.1, 99, 99)),
+        "tip": beyond((1, 0, 0), 99.9),
+        "belt": box((44.9, -99, -99), (55.1, 99, 99)),
+        "bed": box((-1, -11, -99), (101, -7, 99)),
+        "small": box((44.9, 9.3, -99), (55.1, 11, 99)),
+        "large": box((39.9, 7.6, -99), (60.1, 11, 99)),
+    }
+    cases = [
+        Case("tip", "root", Load("tip", (0, 0, 1.2))),
+        Case("tip_large", "root", Load("tip", (0, 0, 12)), 4),
+        Case("mid", "root", Load("belt", (0, 0, 24)), 4),
+        Case("axial", "root", Load("tip", (627, 0, 0)), 4),
+        Case("torsion", "root", Load("tip", turn=260), 4),
+        Case("poke_small", "bed", Load("small", (0, -200, 0)), 3),
+        Case("poke_large", "bed", Load("large", (0, -500, 0)), 3),
+    ]
+    return Body("cylinder", "tests/accuracy/cylinder.obj", 10e3, 1000, regions, cases, modes=8,
+                grids={"root": grids(1, 2, 1, 4, 2, 4), "bed": grids(1, 0, 1, 2, 1, 4)}, kept={"root": 1, "bed": 2})
+
+
+def gallbladder():
+    # The axis from neck to fundus; side points to the patient's left, front away from the liver.
+    axis = np.array((-0.4887, -0.6834, 0.5423))
+    side = np.array((0.8138, -0.5812, 0.0))
+    front = np.cross(axis, side) * np.sign(np.cross(axis, side)[2])
+    body, belly = np.array((-55.5, -43.0, 12.0)), np.array((-50.0, -36.5, 24.0))
+    regions = {
+        "root": lambda x, n: x @ axis < 24,
+        "tip": beyond(axis, 89.5),
+        "flank": within(body - 15 * side, 11),
+        "bed": lambda x, n: (n @ front < -0.6) & (x @ axis > 40),
+        "small": within(belly, 8),
+        "large": within(belly, 13),
+    }
+    cases = [
+        Case("tip", "root", Load("tip", tuple(6 * side))),
+        Case("tip_large", "root", Load("tip", tuple(18 * side)), 4),
+        Case("mid", "root", Load("flank", tuple(30 * side)), 4),
+        Case("axial", "root", Load("tip", tuple(700 * axis)), 4),
+        Case("torsion", "root", Load("tip", turn=500, axis=tuple(axis)), 4),
+        Case("poke_small", "bed", Load("small", tuple(-200 * front)), 3),
+        Case("poke_large", "bed", Load("large", tuple(-500 * front)), 3),
+    ]
+    return Body("gallbladder", "assets/gallbladder/gallbladder.obj", 9e3, 1040, regions, cases,
+                grids={"root": grids(1, 2, 1, 4, 2, 4), "bed": grids(1, 0, 1, 2, 1, 4)}, kept={"root": 1, "bed": 2},
+                cut=("root",))
+
+
+def liver():
+    front = np.array((0.0, 0.0, 1.0))
+    regions = {
+        "root": box((-130, 20, -80), (-20, 120, -38)),
+        "tip": beyond((1, 0, 0), 55),
+        "border": within((-29, -30, 15), 20),
+        "bed": lambda x, n: n @ front < -0.7,
+        "small": within((-73, 33, 30), 16),
+        "large": within((-73, 33, 30), 27),
+    }
+    cases = [
+        Case("tip", "root", Load("tip", (0, 0, 300))),
+        Case("tip_in_plane", "root", Load("tip", (0, 400, 0))),
+        Case("mid", "root", Load("border", (0, 0, 400))),
+        Case("axial", "root", Load("tip", (1200, 0, 0))),
+        Case("torsion", "root", Load("tip", turn=15000)),
+        Case("poke_small", "bed", Load("small", (0, 0, -1000))),
+        Case("poke_large", "bed", Load("large", (0, 0, -2000))),
+    ]
+    return Body("liver", "assets/liver/liver.obj", 5e3, 1060, regions, cases,
+                grids={"root": grids(1, 2, 1, 4, 1, 6), "bed": grids(1, 0, 1, 2, 1, 4)}, kept={"root": 0, "bed": 1})
+
+
+def bodies():
+    return [cylinder(), gallbladder(), liver()]
