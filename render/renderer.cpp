@@ -73,7 +73,11 @@ struct Renderer::Data {
   DrawLists lists;
 
   explicit Data(const RendererSettings& s)
-      : settings(s), context(makeGlContext(s.context)), framebuffer(s.width, s.height), post(s.width, s.height) {
+      : settings(s),
+        context(makeGlContext(s.context)),
+        framebuffer(s.width, s.height),
+        post(s.width, s.height),
+        seen(s.height) {
     tissue.addLook(findLook("steel"));
     glFinish();
     spreadRasterThreads();
@@ -140,7 +144,7 @@ void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view)
   if (picture.light.haze && picture.view != ViewKind::model) haze.emplace(picture.light, picture.camera, picture.time);
   lightView = makeLightView(picture.light, view, picture.camera, mesh);
   if (settings.shadows) renderShadowMap(mesh, lightView, shadow);
-  findVisibleTriangles(mesh, view, seen);
+  findVisibleTriangles(mesh, view, picture.view == ViewKind::tissue, seen);
   lightVertices(mesh, seen, view, picture.light, lightView, haze ? &*haze : nullptr, picture.time, shadowIfOn(), lit);
   sortByVariant(mesh, seen, lit, shadowIfOn(), lists);
 }

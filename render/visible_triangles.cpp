@@ -33,9 +33,68 @@ bool isVisible(glm::vec3 a, glm::vec3 b, glm::vec3 c, const Viewpoint& view) {
   return !view.round || x * x + y * y < kRimOuter * kRimOuter;
 }
 
+// Appends the corners, vertices of the mesh, of the part's triangles that face the camera within the picture.
+void gatherFacing(const SceneMesh& mesh, const MeshPart& part, const Viewpoint& view, VisibleTriangles& out) {
+  for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
+    const std::uint32_t* t = &mesh.index[k];
+    if (isVisible(out.picture[t[0]], out.picture[t[1]], out.picture[t[2]], view))
+      out.index.insert(out.index.end(), t, t + 3);
+  }
+}
+
+void drawDepth(const Viewpoint& view, VisibleTriangles& out) {
+  const auto side = float(out.nearest.side);
+  out.texel.resize(out.picture.size());
+  for (std::size_t i = 0; i < out.texel.size(); ++i) {
+    const glm::vec3 p = out.picture[i];
+    out.texel[i] = {(p.x / view.aspect + 0.5f) * side, (p.y + 0.5f) * side, 1 - kNearPlane / std::max(p.z, kNearPlane)};
+  }
+  out.nearest.clear();
+  for (std::size_t k = 0; k < out.index.size(); k += 3) {
+    const glm::vec3 a = out.texel[out.index[k]], b = out.texel[out.index[k + 1]], c = out.texel[out.index[k + 2]];
+    if (std::min({a.z, b.z, c.z}) > 0) out.nearest.rasterize(a, b, c);
+  }
+}
+
+// Is there something nearer wherever the triangle or a texel beside it could show?
+bool isHidden(const VisibleTriangles& seen, const std::uint32_t* t) {
+  constexpr float kMargin = 2.5f;   // texels: the map knows its texels' centres only
+  constexpr float kBias = 0.0001f;  // 0.8 mm at 0.2 m: a fine surface must not hide itself
+  const glm::vec3 a = seen.texel[t[0]], b = seen.texel[t[1]], c = seen.texel[t[2]];
+  const float last = float(seen.nearest.side - 1), z = std::min({a.z, b.z, c.z}) - kBias;
+  if (z <= 0) return false;
+  const int x0 = int(std::clamp(std::min({a.x, b.x, c.x}) - kMargin, 0.f, last)),
+            x1 = int(std::clamp(std::max({a.x, b.x, c.x}) + kMargin, 0.f, last)),
+            y0 = int(std::clamp(std::min({a.y, b.y, c.y}) - kMargin, 0.f, last)),
+            y1 = int(std::clamp(std::max({a.y, b.y, c.y}) + kMargin, 0.f, last));
+  for (int y = y0; y <= y1; ++y)
+    for (int x = x0; x <= x1; ++x)
+      if (seen.nearest.at(x, y) >= z) return false;
+  return true;
+}
+
+// From first on: drops hidden triangles and turns the corners of the others into places in out.vertices.
+void keepSeen(std::size_t first, std::size_t last, bool opaque, VisibleTriangles& out, std::size_t& kept) {
+  for (std::size_t k = first; k < last; k += 3) {
+    if (opaque && isHidden(out, &out.index[k])) continue;
+    for (int c = 0; c < 3; ++c) {
+      const std::uint32_t vertex = out.index[k + c];
+      std::uint32_t& place = out.placeOf[vertex];
+      if (place == VisibleTriangles::kUnused) {
+        place = std::uint32_t(out.vertices.size());
+        out.vertices.push_back(vertex);
+      }
+      out.index[kept++] = place;
+    }
+  }
+}
+
 }  // namespace
 
-void findVisibleTriangles(const SceneMesh& mesh, const Viewpoint& view, VisibleTriangles& out) {
+// Texels of 2.5 by 1.4 pixels in pictures of 16:9: what shows through a narrower crack may be missed.
+VisibleTriangles::VisibleTriangles(int pictureHeight) : nearest((pictureHeight * 5 / 7 + 7) / 8 * 8) {}
+
+void findVisibleTriangles(const SceneMesh& mesh, const Viewpoint& view, bool opaque, VisibleTriangles& out) {
   out.picture.resize(mesh.position.size());
   for (std::size_t i = 0; i < out.picture.size(); ++i) out.picture[i] = pictureFromWorld(view, mesh.position[i]);
   out.placeOf.assign(mesh.position.size(), VisibleTriangles::kUnused);
@@ -43,24 +102,21 @@ void findVisibleTriangles(const SceneMesh& mesh, const Viewpoint& view, VisibleT
   out.vertices.clear();
   out.index.clear();
   for (const std::size_t p : frontToBack(mesh, out.picture)) {
-    const MeshPart& part = mesh.parts[p];
-    VisiblePart seen{p, std::uint32_t(out.vertices.size()), 0, std::uint32_t(out.index.size()), 0};
-    for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
-      const std::uint32_t* t = &mesh.index[k];
-      if (!isVisible(out.picture[t[0]], out.picture[t[1]], out.picture[t[2]], view)) continue;
-      for (int c = 0; c < 3; ++c) {
-        std::uint32_t& place = out.placeOf[t[c]];
-        if (place == VisibleTriangles::kUnused) {
-          place = std::uint32_t(out.vertices.size());
-          out.vertices.push_back(t[c]);
-        }
-        out.index.push_back(place);
-      }
-    }
-    seen.vertexCount = std::uint32_t(out.vertices.size()) - seen.firstVertex;
-    seen.indexCount = std::uint32_t(out.index.size()) - seen.firstIndex;
-    if (seen.indexCount > 0) out.parts.push_back(seen);
+    const auto first = std::uint32_t(out.index.size());
+    gatherFacing(mesh, mesh.parts[p], view, out);
+    out.parts.push_back({p, 0, 0, first, std::uint32_t(out.index.size()) - first});
   }
+  if (opaque) drawDepth(view, out);
+  std::size_t kept = 0;
+  for (VisiblePart& part : out.parts) {
+    const std::size_t first = part.firstIndex, last = first + part.indexCount;
+    part.firstVertex = std::uint32_t(out.vertices.size());
+    part.firstIndex = std::uint32_t(kept);
+    keepSeen(first, last, opaque, out, kept);
+    part.vertexCount = std::uint32_t(out.vertices.size()) - part.firstVertex;
+    part.indexCount = std::uint32_t(kept) - part.firstIndex;
+  }
+  out.index.resize(kept);
 }
 
 }  // namespace medulla

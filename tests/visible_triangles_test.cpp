@@ -1,0 +1,75 @@
+#include "render/visible_triangles.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace medulla {
+namespace {
+
+// Appends a square that faces +z, of cells^2 pairs of triangles.
+void addSquare(SceneMesh& mesh, glm::vec3 centre, float halfSide, std::uint32_t cells) {
+  MeshPart part;
+  part.look = &looks()[0];
+  part.firstVertex = std::uint32_t(mesh.position.size());
+  part.firstIndex = std::uint32_t(mesh.index.size());
+  for (std::uint32_t j = 0; j <= cells; ++j)
+    for (std::uint32_t i = 0; i <= cells; ++i)
+      mesh.position.push_back(
+          centre + halfSide * glm::vec3(2 * float(i) / float(cells) - 1, 2 * float(j) / float(cells) - 1, 0));
+  for (std::uint32_t j = 0; j < cells; ++j)
+    for (std::uint32_t i = 0; i < cells; ++i) {
+      const std::uint32_t a = part.firstVertex + j * (cells + 1) + i, b = a + cells + 1;
+      mesh.index.insert(mesh.index.end(), {a, a + 1, b + 1, a, b + 1, b});
+    }
+  part.vertexCount = std::uint32_t(mesh.position.size()) - part.firstVertex;
+  part.indexCount = std::uint32_t(mesh.index.size()) - part.firstIndex;
+  mesh.parts.push_back(part);
+}
+
+// Triangles seen per part of a picture of 480 x 480 pixels, from 0.3 m along +z.
+std::vector<std::uint32_t> trianglesSeen(const SceneMesh& mesh, bool opaque) {
+  VisibleTriangles seen(480);
+  findVisibleTriangles(mesh, makeViewpoint({.position = {0, 0, 0.3f}, .fovDegrees = 40}, 1, false), opaque, seen);
+  std::vector<std::uint32_t> count(mesh.parts.size(), 0);
+  for (const VisiblePart& part : seen.parts) {
+    count[part.part] = part.indexCount / 3;
+    for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; ++k) {
+      EXPECT_GE(seen.index[k], part.firstVertex);
+      EXPECT_LT(seen.index[k], part.firstVertex + part.vertexCount);
+    }
+  }
+  return count;
+}
+
+TEST(VisibleTriangles, WhatLiesBehindIsDroppedOnlyBehindWhatIsOpaque) {
+  SceneMesh mesh;
+  // Off the middle, where the centres of texels would lie on its diagonals and could be missed by both triangles.
+  addSquare(mesh, {0.0013f, 0.0007f, 0.05f}, 0.04f, 10);
+  addSquare(mesh, {0, 0, 0}, 0.04f, 10);
+  EXPECT_EQ(trianglesSeen(mesh, false), (std::vector<std::uint32_t>{200, 200}));
+  EXPECT_EQ(trianglesSeen(mesh, true), (std::vector<std::uint32_t>{200, 0}));
+}
+
+TEST(VisibleTriangles, WhatPeeksOutStays) {
+  SceneMesh mesh;
+  addSquare(mesh, {0, 0, 0.05f}, 0.02f, 10);
+  addSquare(mesh, {0, 0, 0}, 0.04f, 40);
+  // The shadow of the front square on the plane behind, seen from the lens, has half side 0.02 * 0.3 / 0.25 = 0.024: of
+  // cells of 0.002 just those inside can go, less a margin of 2.5 texels (1.4 px = 0.64 mm each): 20 to 24 across.
+  const std::uint32_t kept = trianglesSeen(mesh, true)[1];
+  EXPECT_GE(kept, 2u * (40 * 40 - 24 * 24));
+  EXPECT_LE(kept, 2u * (40 * 40 - 20 * 20));
+}
+
+TEST(VisibleTriangles, ASurfaceDoesNotHideItselfNorWhatLiesOnIt) {
+  SceneMesh mesh;
+  addSquare(mesh, {0, 0, 0}, 0.05f, 150);  // finer than the map of depths
+  addSquare(mesh, {0, 0, -0.0005f}, 0.05f, 150);
+  const std::vector<std::uint32_t> seen = trianglesSeen(mesh, true);
+  EXPECT_EQ(seen[0], 2u * 150 * 150);
+  EXPECT_EQ(seen[1], 2u * 150 * 150);  // half a millimetre behind: left to OpenGL
+}
+
+}  // namespace
+}  // namespace medulla
