@@ -6,8 +6,10 @@
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/trajectory_file.h"
+#include "app/files/vertex_file.h"
 #include "app/shape_mesh.h"
 #include "app/simulation.h"
+#include "physics/dynamics/fixation.h"
 #include "render/renderer.h"
 
 namespace medulla {
@@ -18,18 +20,38 @@ static void requireFile(const Scene& scene, int line, const std::string& what, c
     throw inputError(scene.path, line, fmt::format("{} \"{}\" does not exist", what, path));
 }
 
-// What regions fix: every node inside, and the spheres that those hold.
-static void resolveRegions(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
-  for (const SceneFixRegion& fix : body.regions) {
-    const std::vector<int> nodes = nodesInRegion(model, fix.region);
-    if (nodes.empty())
-      throw inputError(scene.path, fix.line, fmt::format("no surface node of body \"{}\" lies in here", body.name));
+static std::vector<int> findNodes(const Scene& scene, int line, const NodeChoice& choice, const SceneBody& body,
+                                  const SoftBodyModel& model) {
+  if (!choice.verticesPath.empty()) {
+    requireFile(scene, line, "list of vertices", choice.verticesPath);
+    return readVertices(choice.verticesPath, model);
+  }
+  std::vector<int> nodes = nodesInRegion(model, choice.region);
+  if (nodes.empty())
+    throw inputError(scene.path, line, fmt::format("no surface node of body \"{}\" lies in here", body.name));
+  return nodes;
+}
+
+// Nodes that are fixed, and the spheres that those hold.
+static void resolveFixes(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
+  for (const SceneFix& fix : body.fixes) {
+    const std::vector<int> nodes = findNodes(scene, fix.line, fix.nodes, body, model);
     for (const int sphere : spheresHeldBy(model, nodes)) {
       const bool known =
           std::any_of(body.fixed.begin(), body.fixed.end(), [&](const FixedSphere& f) { return f.sphere == sphere; });
       if (!known) body.fixed.push_back({sphere, fix.freedom});
     }
     body.fixedNodes.insert(body.fixedNodes.end(), nodes.begin(), nodes.end());
+  }
+}
+
+static void resolveLoads(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
+  for (const SceneLoad& load : body.loads) {
+    if (!load.forcesPath.empty()) requireFile(scene, load.line, "file of forces", load.forcesPath);
+    const std::vector<DeadLoad> loads =
+        load.forcesPath.empty() ? spreadLoad(model, findNodes(scene, load.line, load.nodes, body, model), load.whole)
+                                : readVertexForces(load.forcesPath, model, load.whole);
+    body.deadLoads.insert(body.deadLoads.end(), loads.begin(), loads.end());
   }
 }
 
@@ -84,7 +106,10 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
   }
   for (const SceneBody& body : scene.bodies) requireLook(scene, body.line, body.look);
   loaded.models = loadModels(scene);
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) resolveRegions(scene, *loaded.models[b], scene.bodies[b]);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    resolveFixes(scene, *loaded.models[b], scene.bodies[b]);
+    resolveLoads(scene, *loaded.models[b], scene.bodies[b]);
+  }
   for (const SceneStatic& item : scene.statics) {
     if (!item.look.empty()) requireLook(scene, item.line, item.look);
     if (!item.meshPath.empty()) requireFile(scene, item.line, "mesh", item.meshPath);

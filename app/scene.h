@@ -6,17 +6,30 @@
 #include <vector>
 
 #include "haptics/tool_input.h"
-#include "physics/dynamics/fixation.h"
+#include "physics/dynamics/region.h"
 #include "physics/dynamics/world.h"
 
 // A scene file as read: plain values with defaults, nothing loaded yet. Paths are already resolved against the scene
 // file's folder. `line` is where the element stands, for errors found later.
 namespace medulla {
 
-struct SceneFixRegion {
+// Surface nodes: those in a part of space, or those that the listed vertices of the mesh file became.
+struct NodeChoice {
+  Region region;
+  std::string verticesPath;  // empty: the region
+};
+
+struct SceneFix {
   int line = 0;
-  FixRegion region;
+  NodeChoice nodes;
   FixedFreedom freedom = FixedFreedom::all;  // of the spheres that the fixed nodes hold
+};
+
+struct SceneLoad {
+  int line = 0;
+  NodeChoice nodes;
+  std::string forcesPath;  // a force per vertex, instead of nodes and force; empty: those
+  DeadLoad whole;          // force on all chosen nodes together, N, world; its node is of no account
 };
 
 struct SceneBody {
@@ -25,9 +38,11 @@ struct SceneBody {
   std::string name, modelPath, look;
   Tissue tissue;
   LinkFactors factors;
-  std::vector<FixedSphere> fixed;  // by number; loadScene() adds those that the regions hold
-  std::vector<SceneFixRegion> regions;
-  std::vector<int> fixedNodes;  // found by loadScene()
+  std::vector<FixedSphere> fixed;  // by number; loadScene() adds those that fixed nodes hold
+  std::vector<SceneFix> fixes;
+  std::vector<SceneLoad> loads;
+  std::vector<int> fixedNodes;      // found by loadScene(), as are
+  std::vector<DeadLoad> deadLoads;  // these
   std::vector<DrivenSphere> driven;
   std::optional<std::vector<int>> neighbours;  // indices of bodies
   Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();

@@ -57,6 +57,32 @@ TEST(Analytic, AHangingChainStretchesLinkByLink) {
   EXPECT_NEAR(tip(world).x() - kLength, kDensity * g * kLength * kLength / (2 * kYoung), 1e-6);
 }
 
+TEST(Analytic, AnEndLoadStretchesABarLinkByLink) {
+  for (int links : {1, 3, 6}) {
+    BodyDescription body = bar(links, 1);
+    // The last ring hangs on the last link, the pole on the last sphere. Each link is a spring EA / l; what hangs at
+    // `along` of the last link loads its far end by that share.
+    const int pole = static_cast<int>(body.model->restNodes.size()) - 1;
+    std::vector<int> nodes{pole};
+    for (int k = 1; k <= 8; ++k) nodes.push_back(pole - k);
+    DeadLoad whole;
+    whole.force = {0.05, 0, 0};
+    body.deadLoads = spreadLoad(*body.model, nodes, whole);
+    double onLast = 0;
+    for (const DeadLoad& load : body.deadLoads) {
+      const Attachment& a = body.model->attachments[load.node];
+      ASSERT_TRUE(a.onLink ? a.host == links - 1 : a.host == links);
+      onLast += (a.onLink ? a.along : 1) * load.force.x();
+    }
+    World world(under(Vector3d::Zero()), {body});
+    settle(world, 6);
+    const double perLink = kLength / links / (kYoung * kArea);
+    EXPECT_NEAR(tip(world).x() - kLength, ((links - 1) * whole.force.x() + onLast) * perLink, 1e-8) << links;
+    EXPECT_LT(onLast, 0.999 * whole.force.x());
+    EXPECT_GT(tip(world).x() - kLength, 0.001);
+  }
+}
+
 // Deflection of the tip under weights at the spheres: bending angles M L / 2EI at either end of every link.
 static double discreteTip(int links, const std::vector<double>& weight) {
   const double l = kLength / links;

@@ -61,6 +61,106 @@ TEST(Loads, NodesGainExactlyWhatTheToolsGive) {
   }
 }
 
+// A load on half a dozen nodes that share no symmetry: it turns the body.
+static std::vector<DeadLoad> someDeadLoads(const SoftBodyModel& model, const Vector3d& force) {
+  DeadLoad whole;
+  whole.force = force;
+  whole.to = 0;
+  return spreadLoad(model, {3, 17, 40, 41, 42, 60}, whole);
+}
+
+TEST(DeadLoads, ALoadIsSpreadByArea) {
+  const World world = tubeWorld(SurfaceMode::full, false);
+  const SoftBodyModel& model = *world.bodies()[0].model;
+  const Vector3d force(1, -2, 3);
+  const std::vector<DeadLoad> loads = someDeadLoads(model, force);
+  ASSERT_EQ(loads.size(), 6u);
+  Vector3d sum = Vector3d::Zero();
+  for (const DeadLoad& load : loads) {
+    sum += load.force;
+    EXPECT_LT((load.force / model.attachments[load.node].area - loads[0].force / model.attachments[loads[0].node].area)
+                  .norm(),
+              1e-9 * loads[0].force.norm() / model.attachments[loads[0].node].area);
+  }
+  EXPECT_LT((sum - force).norm(), 1e-14 * force.norm());
+}
+
+static World loadedWorld(SurfaceMode surface, double from, double to, int substeps) {
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
+  b.surface = surface;
+  b.deadLoads = someDeadLoads(*b.model, {0.01, -0.02, 0.005});
+  for (DeadLoad& load : b.deadLoads) {
+    load.from = from;
+    load.to = to;
+  }
+  WorldSettings settings;
+  settings.gravity.setZero();
+  settings.substeps = substeps;
+  settings.frameDuration = substeps == 1 ? 1e-4 : settings.frameDuration;
+  return World(settings, {b});
+}
+
+TEST(DeadLoads, AFreeBodyGainsTheirForceAndMomentInOneSubstep) {
+  for (SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    World world = loadedWorld(surface, 0, 0, 1);
+    Vector3d force = Vector3d::Zero(), moment = force;
+    for (const DeadLoad& load : world.bodies()[0].deadLoads) {
+      force += load.force;
+      moment += restNode(world, load.node).cross(load.force);
+    }
+    world.advance({});
+    const double h = world.substep();
+    const Momentum gained = momentum(world.data());
+    EXPECT_LT((gained.linear - h * force).norm(), 1e-12 * h * force.norm());
+    EXPECT_LT((gained.angular - h * moment).norm(), 1e-9 * h * moment.norm());
+    EXPECT_GT(moment.norm(), 1e-5);
+  }
+}
+
+TEST(DeadLoads, TheyGrowLinearlyAndKeepTheirDirectionWhateverTheBodyDoes) {
+  for (SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    World world = loadedWorld(surface, 0.1, 0.3, 50);
+    Vector3d force = Vector3d::Zero();
+    for (const DeadLoad& load : world.bodies()[0].deadLoads) force += load.force;
+    double impulse = 0;  // of a force of 1 N, summed over the substeps' ends
+    for (int frame = 0; frame < 40; ++frame) {
+      for (int k = 1; k <= 50; ++k)
+        impulse += world.substep() * std::clamp((world.time() + k * world.substep() - 0.1) / 0.2, 0.0, 1.0);
+      world.advance({});
+    }
+    EXPECT_NEAR(impulse, 0.6, 1e-3);  // 0.8 s less half of the growth
+    const Momentum gained = momentum(world.data());
+    EXPECT_LT((gained.linear - impulse * force).norm(), 1e-10 * gained.linearScale);
+    const Quaterniond turned = orientation(world.data(), 0);
+    EXPECT_GT(turned.angularDistance(Quaterniond::Identity()), 0.5);
+  }
+}
+
+TEST(DeadLoads, BadOnesAreRefusedByName) {
+  const auto refusal = [](const DeadLoad& load) {
+    BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
+    b.deadLoads = {load};
+    try {
+      const World world({}, {b});
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  DeadLoad load;
+  EXPECT_EQ(refusal(load), "");
+  load.node = 82;
+  EXPECT_EQ(refusal(load), "body 'tube' cannot be simulated: it loads node 82: expected 0 to 81");
+  load.node = 0;
+  load.force.x() = std::nan("");
+  EXPECT_EQ(refusal(load), "body 'tube' cannot be simulated: the load on its node 0 is not finite");
+  load.force.setZero();
+  load.from = 2;
+  EXPECT_EQ(refusal(load),
+            "body 'tube' cannot be simulated: the load on its node 0 grows from 2 s to 1 s: expected the earlier time "
+            "first");
+}
+
 TEST(Loads, AtRestTheForceIsStiffnessTimesDistance) {
   for (SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
     World world = tubeWorld(surface, true, 1);

@@ -1,5 +1,6 @@
 #include "physics/dynamics/fixation.h"
 
+#include "physics/dynamics/region.h"
 #include "tests/dynamics_states.h"
 #include "tests/synthetic_model.h"
 
@@ -13,8 +14,8 @@ static std::shared_ptr<const SoftBodyModel> tube() {
   return synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10));
 }
 
-static FixRegion box(const Vector3d& low, const Vector3d& high) {
-  FixRegion region;
+static Region box(const Vector3d& low, const Vector3d& high) {
+  Region region;
   region.box = {low, high};
   return region;
 }
@@ -23,17 +24,24 @@ TEST(Fixation, RegionsFindTheNodesInside) {
   const auto model = tube();
   const double end = model->spheres.back().restFrame.x();
   const auto inBox = nodesInRegion(*model, box({0.6 * end, -1, -1}, {1, 1, 1}));
-  FixRegion ball;
-  ball.shape = FixRegion::Shape::ball;
+  Region ball;
+  ball.shape = Region::Shape::ball;
   ball.centre = model->spheres[0].restFrame;
   ball.radius = 0.03;
   const auto inBall = nodesInRegion(*model, ball);
+  Region below;
+  below.shape = Region::Shape::halfSpace;
+  below.normal = {2, 1, 0};
+  below.distance = end;
+  const auto inHalf = nodesInRegion(*model, below);
+  EXPECT_FALSE(inHalf.empty());
   EXPECT_FALSE(inBox.empty());
   EXPECT_FALSE(inBall.empty());
   for (int i = 0; i < static_cast<int>(model->restNodes.size()); ++i) {
     const Vector3d& x = model->restNodes[i];
     EXPECT_EQ(std::count(inBox.begin(), inBox.end(), i), x.x() >= 0.6 * end ? 1 : 0);
     EXPECT_EQ(std::count(inBall.begin(), inBall.end(), i), (x - ball.centre).norm() <= 0.03 ? 1 : 0);
+    EXPECT_EQ(std::count(inHalf.begin(), inHalf.end(), i), 2 * x.x() + x.y() <= end ? 1 : 0);
   }
 }
 

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -9,69 +8,10 @@
 
 #include "app/files/scene_rules.h"
 #include "app/files/text_file.h"
-#include "app/scene.h"
-#include "tests/temporary_folder.h"
+#include "tests/complete_scene.h"
 
 namespace medulla {
 namespace {
-
-// Every element and every attribute of the format, each value other than its default.
-const char* completeScene = R"(<?xml version="1.0"?>
-<?xml-model href="scene.xsd"?>
-<scene name="complete">
-  <clock servo="1000" dynamics="40" duration="12"/>
-  <dynamics integrator="explicit" order="1" gravity="0 0 -9.5" ambient_drag="0.3" substeps="16" contact="swept"/>
-  <!-- tissues -->
-  <tissue name="bile_sac" young="6e3" poisson="0.4" density="1030" damping="0.2" friction="0.3"/>
-  <tissue name="liver"/>
-  <body name="gallbladder" model="../assets/gallbladder.model.xml" tissue="bile_sac" look="gallbladder"
-        position="0.1 0.2 0.3"
-        orientation="0.707 0 0.707 0" links="springs" surface="skin">
-    <fix spheres="0 1" dof="translation"/>
-    <fix spheres="4" dof="all"/> <drive sphere="2" axis="0 1 1" amplitude="0.1" frequency="2" phase="0.5" velocity="1 0 0"/>
-    <links select="all" elongation="2" flexion="3" torsion="0.5"/><neighbours names="second"/>
-  </body>
-  <body name="second" model="second.model.xml" tissue="liver" look="liver"> <fix box="0 1 2 3 4 5"/> <fix sphere="1 2 3 0.5" dof="translation"/> </body>
-  <static shape="mesh" mesh="/abs/wall.obj" look="wall" position="1 0 0" orientation="0 1 0 0" unit="mm" contact="true" friction="0.4"/><static shape="plane" normal="0 0 2" position="0 0 3"/><static shape="box" size="1 2 3" look="fat" contact="false"/><static shape="sphere" radius="4"/>
-  <tool name="grasper" trajectory="gallbladder.csv" radius="0.004" stiffness="300" damping="2" friction="0.4 0.1"
-        force_max="5" grip_radius="0.007"/>
-  <camera position="0 0 0.2" target="0 0.01 0" fov="50" endoscope="false">
-    <key t="4" position="0 0.1 0.2"/>
-    <key t="6" target="0.1 0 0" fov="40"/>
-  </camera>
-  <light position="0.01 0 0.01" intensity="1.5" reference_distance="0.2" haze="0.1 0.2 0.3" haze_distance="4" caustics="0.5"/>
-  <output size="640 480" fps="25" golden="0.5 3 7"/>
-</scene>
-)";
-
-class SceneFile : public testing::Test {
- protected:
-  Scene read(const std::string& text, const std::vector<SceneOverride>& overrides = {}) const {
-    temporary.write("x.xml", text);
-    return readScene(temporary / "x.xml", overrides);
-  }
-  // The complaint, without the folder; empty where there is none.
-  std::string complaint(const std::string& text, const std::vector<SceneOverride>& overrides = {}) const {
-    try {
-      read(text, overrides);
-    } catch (const std::runtime_error& error) {
-      const std::string message = error.what();
-      EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-      return message.starts_with(folder + "/") ? message.substr(folder.size() + 1) : message;
-    }
-    return "";
-  }
-  // The complete scene with the first `from` replaced by `to`.
-  static std::string edited(const std::string& from, const std::string& to) {
-    std::string text = completeScene;
-    const std::size_t at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    return text.replace(at, from.size(), to);
-  }
-
-  TemporaryFolder temporary;
-  const std::string folder = temporary.path();
-};
 
 TEST_F(SceneFile, EveryValueArrives) {
   const Scene s = read(completeScene);
@@ -117,14 +57,40 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(body.driven[0].velocity, Eigen::Vector3d(1, 0, 0));
   EXPECT_EQ(s.bodies[1].tissue.young, Tissue().young);
   EXPECT_EQ(s.bodies[1].modelPath, folder + "/second.model.xml");
-  const std::vector<SceneFixRegion>& regions = s.bodies[1].regions;
-  ASSERT_EQ(regions.size(), 2u);
-  EXPECT_EQ(regions[0].region.box.min(), Eigen::Vector3d(0, 1, 2));
-  EXPECT_EQ(regions[0].region.box.max(), Eigen::Vector3d(3, 4, 5));
-  EXPECT_EQ(regions[0].freedom, FixedFreedom::all);
-  EXPECT_EQ(regions[1].region.centre, Eigen::Vector3d(1, 2, 3));
-  EXPECT_EQ(regions[1].region.radius, 0.5);
-  EXPECT_EQ(regions[1].freedom, FixedFreedom::translation);
+}
+
+TEST_F(SceneFile, EveryValueOfFixesAndLoadsArrives) {
+  const Scene s = read(completeScene);
+  const std::vector<SceneFix>& fixes = s.bodies[1].fixes;
+  ASSERT_EQ(fixes.size(), 4u);
+  EXPECT_EQ(fixes[0].nodes.region.box.min(), Eigen::Vector3d(0, 1, 2));
+  EXPECT_EQ(fixes[0].nodes.region.box.max(), Eigen::Vector3d(3, 4, 5));
+  EXPECT_EQ(fixes[0].freedom, FixedFreedom::all);
+  EXPECT_EQ(fixes[1].nodes.region.shape, Region::Shape::ball);
+  EXPECT_EQ(fixes[1].nodes.region.centre, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(fixes[1].nodes.region.radius, 0.5);
+  EXPECT_EQ(fixes[1].freedom, FixedFreedom::translation);
+  EXPECT_EQ(fixes[2].nodes.region.shape, Region::Shape::halfSpace);
+  EXPECT_EQ(fixes[2].nodes.region.normal, Eigen::Vector3d(0, 2, 0));
+  EXPECT_EQ(fixes[2].nodes.region.distance, 0.5);
+  EXPECT_EQ(fixes[2].nodes.verticesPath, "");
+  EXPECT_EQ(fixes[3].nodes.verticesPath, folder + "/held.csv");
+  const std::vector<SceneLoad>& loads = s.bodies[1].loads;
+  ASSERT_EQ(loads.size(), 5u);
+  EXPECT_EQ(loads[0].line, 16);
+  EXPECT_EQ(loads[0].nodes.region.box.max(), Eigen::Vector3d(4, 5, 6));
+  EXPECT_EQ(loads[0].whole.force, Eigen::Vector3d(0, 0, 1.5));
+  EXPECT_EQ(loads[0].whole.from, 0.5);
+  EXPECT_EQ(loads[0].whole.to, 2);
+  EXPECT_EQ(loads[1].nodes.region.radius, 1);
+  EXPECT_EQ(loads[1].whole.from, 0);
+  EXPECT_EQ(loads[1].whole.to, 1);
+  EXPECT_EQ(loads[2].nodes.region.distance, 3);
+  EXPECT_EQ(loads[3].nodes.verticesPath, folder + "/pulled.csv");
+  EXPECT_EQ(loads[3].whole.to, 0);
+  EXPECT_EQ(loads[3].forcesPath, "");
+  EXPECT_EQ(loads[4].forcesPath, folder + "/loads.csv");
+  EXPECT_EQ(loads[4].whole.to, 4);
 }
 
 TEST_F(SceneFile, EveryValueOfScenerysToolsAndPictureArrives) {
@@ -221,7 +187,7 @@ TEST_F(SceneFile, MistakesInTheStructureNameTheLineAndWhatWasExpected) {
   const Mistake mistakes[] = {
       {"position=\"0.1", "positon=\"0.1", R"(x.xml:10: <body> has no attribute "positon"; did you mean "position"?)"},
       {"<light ", "<lihgt ", R"(x.xml:24: <scene> has no child <lihgt>; did you mean "light"?)"},
-      {"<fix spheres=\"4\"", "<body spheres=\"4\"", R"(x.xml:13: <body> has no child <body>; did you mean "fix"?)"},
+      {"<fix spheres=\"4\"", "<body spheres=\"4\"", R"(x.xml:13: <body> has no child <body>; did you mean "load"?)"},
       {" duration=\"12\"", "", R"(x.xml:4: <clock> lacks the attribute "duration")"},
       {"<clock servo=\"1000\" dynamics=\"40\" duration=\"12\"/>", "", "x.xml:3: <scene> lacks a <clock>"},
       {"<dynamics ", "<dynamics/><dynamics ", "x.xml:5: <scene> has more than 1 <dynamics>"},
@@ -265,7 +231,28 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4 1\"",
        R"(x.xml:16: <fix> box="0 1 2 3 4 1": expected the lower corner first: x0 y0 z0 x1 y1 z1)"},
       {"1 2 3 0.5", "1 2 3 0", R"(x.xml:16: <fix> sphere="1 2 3 0": expected x y z and a radius > 0)"},
-      {"<fix box=\"0 1 2 3 4 5\"/>", "<fix/>", "x.xml:16: <fix> says what it fixes by one of spheres, box and sphere"},
+      {"<fix box=\"0 1 2 3 4 5\"/>", "<fix/>",
+       "x.xml:16: <fix> says where by one attribute of spheres, box, sphere, plane, vertices"},
+      {"<fix box", "<fix vertices=\"a.csv\" box",
+       "x.xml:16: <fix> says where by one attribute of spheres, box, sphere, plane, vertices"},
+      {"plane=\"0 2 0 0.5\"", "plane=\"0 0 0 1\"",
+       R"(x.xml:16: <fix> plane="0 0 0 1": expected a direction and a distance: nx ny nz d)"},
+      {"plane=\"0 2 0 0.5\"", "plane=\"0 nan 0 1\"", R"(x.xml:16: <fix> plane="0 nan 0 1": expected 4 numbers)"},
+      {"held.csv", "", R"(x.xml:16: <fix> vertices="": is empty)"},
+      {"<load box=\"1 2 3 4 5 6\"", "<load",
+       "x.xml:16: <load> says where by one attribute of file, box, sphere, plane, vertices"},
+      {"<load box", "<load sphere=\"0 0 0 1\" box",
+       "x.xml:16: <load> says where by one attribute of file, box, sphere, plane, vertices"},
+      {" force=\"0 0 1.5\"", "", "x.xml:16: <load>: expected the attribute \"force\""},
+      {"0 0 1.5", "0 0 nan", R"(x.xml:16: <load> force="0 0 nan": expected 3 numbers)"},
+      {"0 0 1.5", "1.5", R"(x.xml:16: <load> force="1.5": expected 3 numbers)"},
+      {"loads.csv\"", "loads.csv\" force=\"1 0 0\"",
+       R"(x.xml:16: <load> force="1 0 0": the file has the forces, expected one of the two)"},
+      {"to=\"2\"", "to=\"0.25\"",
+       R"(x.xml:16: <load> to="0.25": the load grows from 0.5 s to 0.25 s, expected the earlier time first)"},
+      {"from=\"0.5\" to=\"2\"", "from=\"3\"",
+       R"(x.xml:16: <load> from="3": the load grows from 3 s to 1 s, expected the earlier time first)"},
+      {"from=\"0.5\"", "from=\"-1\"", R"(x.xml:16: <load> from="-1": expected 1 number >= 0)"},
       {"sphere=\"2\"", "sphere=\"4\"", R"(x.xml:13: <drive> sphere="4": this sphere is fixed)"},
       {"axis=\"0 1 1\"", "axis=\"0 0 0\"", R"(x.xml:13: <drive> axis="0 0 0": expected a direction)"},
       {"frequency=\"2\"", "frequency=\"0\"", R"(x.xml:13: <drive> frequency="0": expected 1 number > 0)"},
@@ -354,54 +341,6 @@ TEST_F(SceneFile, FilesThatAreNoScenes) {
     return text;
   }();
   EXPECT_EQ(complaint(deep), "x.xml:1: broken XML: elements are nested too deeply");
-}
-
-TEST_F(SceneFile, OverridesReplaceSingleAttributes) {
-  const Scene s = read(completeScene, {{"body.gallbladder.surface", "full"},
-                                       {"tissue.bile_sac.young", "1"},
-                                       {"tissue.bile_sac.young", "1e4"},
-                                       {"dynamics.gravity", "0 0 0"},
-                                       {"tool.grasper.radius", "0.005"},
-                                       {"body.gallbladder.links.torsion", "7"},
-                                       {"body.second.links.flexion", "8"},
-                                       {"body.second.position", "1 2 3"},
-                                       {"scene.name", "other"}});
-  EXPECT_EQ(s.bodies[0].surface, SurfaceMode::full);
-  EXPECT_EQ(s.bodies[0].tissue.young, 1e4);  // the later one
-  EXPECT_EQ(s.gravity, Eigen::Vector3d::Zero());
-  EXPECT_EQ(s.tools[0].settings.radius, 0.005);
-  EXPECT_EQ(s.bodies[0].factors.torsion, 7);
-  EXPECT_EQ(s.bodies[1].factors.flexion, 8);  // where the scene has no <links>
-  EXPECT_EQ(s.bodies[1].worldFromModel.translation(), Eigen::Vector3d(1, 2, 3));
-  EXPECT_EQ(s.name, "other");
-}
-
-TEST_F(SceneFile, OverridesReachElementsLeftToTheirDefaults) {
-  const std::string text = edited(
-      R"(<light position="0.01 0 0.01" intensity="1.5" reference_distance="0.2" haze="0.1 0.2 0.3" haze_distance="4" caustics="0.5"/>)",
-      "");
-  EXPECT_EQ(read(text, {{"light.intensity", "3"}}).lightIntensity, 3);
-}
-
-TEST_F(SceneFile, AShorterRunDropsTheGoldenTimesBeyondIt) {
-  EXPECT_EQ(read(completeScene, {{"clock.duration", "3.5"}}).goldenTimes, (std::vector<double>{0.5, 3}));
-}
-
-TEST_F(SceneFile, MistakesInOverridesNameTheOverride) {
-  const auto set = [&](const char* path, const char* value) { return complaint(completeScene, {{path, value}}); };
-  EXPECT_EQ(
-      set("body.galbladder.surface", "skin"),
-      "--set body.galbladder.surface: the scene has nothing of this name; did you mean body.gallbladder.surface?");
-  EXPECT_EQ(set("dynamics.gravty", "0 0 0"),
-            "--set dynamics.gravty: the scene has nothing of this name; did you mean dynamics.gravity?");
-  EXPECT_EQ(set("body.gallbladder", "x"),
-            "--set body.gallbladder: the scene has nothing of this name; did you mean body.gallbladder.name?");
-  EXPECT_EQ(set("camera.key.fov", "50"), "--set camera.key.fov: several elements answer to this, expected one");
-  EXPECT_EQ(set("body.gallbladder.surface", "contact"),
-            R"(--set body.gallbladder.surface: <body> surface="contact": unknown value; known: "full", "skin")");
-  EXPECT_EQ(set("tissue.bile_sac.young", "-1"),
-            R"(--set tissue.bile_sac.young: <tissue> young="-1": expected 1 number > 0)");
-  EXPECT_EQ(set("", "x").substr(0, 6), "--set ");
 }
 
 // The XML with every comment and declaration blanked, so that only tags are left to search.

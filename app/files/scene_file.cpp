@@ -6,6 +6,7 @@
 #include <set>
 #include <sstream>
 
+#include "app/files/scene_overrides.h"
 #include "app/files/scene_rules.h"
 #include "app/files/xml_element.h"
 #include "app/scene.h"
@@ -13,68 +14,6 @@
 namespace medulla {
 
 namespace {
-
-// Attributes that an override can reach, with their paths: every one that the rules know, present or not.
-struct Target {
-  std::string path;
-  XmlElement* element;
-  std::string attribute;
-};
-
-void listTargets(XmlElement& element, const std::string& prefix, std::vector<Target>& out) {
-  const XmlRule& rule = ruleOf(sceneRules(), element.name);
-  for (const auto* attributes : {&rule.required, &rule.optional}) {
-    for (const std::string& a : *attributes) out.push_back({prefix + a, &element, a});
-  }
-  for (XmlElement& child : element.children) {
-    const bool known = std::any_of(rule.children.begin(), rule.children.end(),
-                                   [&](const XmlRule::Child& c) { return c.name == child.name; });
-    if (!known) continue;  // refused later, at its own line
-    const XmlAttribute* name = child.find("name");
-    listTargets(child, prefix + child.name + "." + (name ? name->value + "." : ""), out);
-  }
-}
-
-// So that light.intensity can be overridden where the scene leaves <light> to its defaults. An element that cannot be
-// empty has none.
-void addOptionalSingles(XmlElement& element) {
-  const XmlRule& rule = ruleOf(sceneRules(), element.name);
-  for (const XmlRule::Child& child : rule.children) {
-    const bool present = std::any_of(element.children.begin(), element.children.end(),
-                                     [&](const XmlElement& e) { return e.name == child.name; });
-    if (present || child.least > 0 || child.most != 1 || !ruleOf(sceneRules(), child.name).required.empty()) continue;
-    XmlElement added;
-    added.name = child.name;
-    added.where = element.where;
-    added.line = element.line;
-    element.children.push_back(added);
-  }
-  for (XmlElement& child : element.children) {
-    if (child.name == "body") addOptionalSingles(child);
-  }
-}
-
-void applyOverride(XmlElement& root, const SceneOverride& override) {
-  const std::string where = "--set " + override.path;
-  std::vector<Target> targets;
-  listTargets(root, "", targets);
-  targets.push_back({"scene.name", &root, "name"});
-  const auto matches = [&](const Target& t) { return t.path == override.path; };
-  const auto found = std::find_if(targets.begin(), targets.end(), matches);
-  if (found == targets.end()) {
-    std::vector<std::string> known;
-    known.reserve(targets.size());
-    for (const Target& t : targets) known.push_back(t.path);
-    throw std::runtime_error(where + ": the scene has nothing of this name; did you mean " +
-                             nearestName(override.path, known) + "?");
-  }
-  if (std::count_if(targets.begin(), targets.end(), matches) > 1) {
-    throw std::runtime_error(where + ": several elements answer to this, expected one");
-  }
-  XmlElement& element = *found->element;
-  std::erase_if(element.attributes, [&](const XmlAttribute& a) { return a.name == found->attribute; });
-  element.attributes.push_back({found->attribute, override.value, where});
-}
 
 std::vector<const XmlElement*> childrenOf(const XmlElement& parent, const std::string& name) {
   std::vector<const XmlElement*> out;
@@ -185,31 +124,54 @@ Tissue findTissue(const XmlElement& body, const std::vector<NamedTissue>& tissue
   refuse(body, "tissue", "no <tissue> of this name; did you mean \"" + nearestName(name, known) + "\"?");
 }
 
-FixRegion readFixRegion(const XmlElement& fix) {
-  FixRegion region;
-  const std::vector<double> box = readNumbers(fix, "box", 6), ball = readNumbers(fix, "sphere", 4);
+Region readRegion(const XmlElement& e) {
+  Region region;
+  const std::vector<double> box = readNumbers(e, "box", 6), ball = readNumbers(e, "sphere", 4),
+                            plane = readNumbers(e, "plane", 4);
   if (!box.empty()) {
     region.box = {Eigen::Vector3d(box[0], box[1], box[2]), Eigen::Vector3d(box[3], box[4], box[5])};
-    if (region.box.isEmpty()) refuse(fix, "box", "expected the lower corner first: x0 y0 z0 x1 y1 z1");
-    return region;
+    if (region.box.isEmpty()) refuse(e, "box", "expected the lower corner first: x0 y0 z0 x1 y1 z1");
   }
-  region.shape = FixRegion::Shape::ball;
-  region.centre = {ball[0], ball[1], ball[2]};
-  region.radius = ball[3];
-  if (!(region.radius > 0)) refuse(fix, "sphere", "expected x y z and a radius > 0");
+  if (!ball.empty()) {
+    region.shape = Region::Shape::ball;
+    region.centre = {ball[0], ball[1], ball[2]};
+    region.radius = ball[3];
+    if (!(region.radius > 0)) refuse(e, "sphere", "expected x y z and a radius > 0");
+  }
+  if (!plane.empty()) {
+    region.shape = Region::Shape::halfSpace;
+    region.normal = {plane[0], plane[1], plane[2]};
+    region.distance = plane[3];
+    if (region.normal.isZero()) refuse(e, "plane", "expected a direction and a distance: nx ny nz d");
+  }
   return region;
 }
 
-void readFixations(const XmlElement& body, SceneBody& out) {
+// The surface nodes that an element means; exactly one attribute says so, or one of `others`, which mean something
+// else.
+NodeChoice readNodeChoice(const XmlElement& e, const std::vector<std::string>& others, const std::string& scenePath) {
+  std::vector<std::string> ways = others;
+  ways.insert(ways.end(), {"box", "sphere", "plane", "vertices"});
+  const auto given = [&](const std::string& way) { return e.find(way) != nullptr; };
+  if (std::count_if(ways.begin(), ways.end(), given) != 1) {
+    std::string list;  // by hand: g++ 12 sees an overflow in fmt::join where there is none
+    for (const std::string& way : ways) list += (list.empty() ? "" : ", ") + way;
+    throw std::runtime_error(fmt::format("{}: <{}> says where by one attribute of {}", e.where, e.name, list));
+  }
+  NodeChoice choice;
+  choice.region = readRegion(e);
+  if (e.find("vertices")) choice.verticesPath = readPath(e, "vertices", scenePath);
+  return choice;
+}
+
+void readFixations(const XmlElement& body, const std::string& scenePath, SceneBody& out) {
   std::set<int> taken;
   for (const XmlElement* fix : childrenOf(body, "fix")) {
     const bool all = readChoice(*fix, "dof", {"all", "translation"}, 0) == 0;
     const FixedFreedom freedom = all ? FixedFreedom::all : FixedFreedom::translation;
-    const int ways = (fix->find("spheres") ? 1 : 0) + (fix->find("box") ? 1 : 0) + (fix->find("sphere") ? 1 : 0);
-    if (ways != 1)
-      throw std::runtime_error(fix->where + ": <fix> says what it fixes by one of spheres, box and sphere");
+    const NodeChoice nodes = readNodeChoice(*fix, {"spheres"}, scenePath);
     if (!fix->find("spheres")) {
-      out.regions.push_back({fix->line, readFixRegion(*fix), freedom});
+      out.fixes.push_back({fix->line, nodes, freedom});
       continue;
     }
     for (const int sphere : readIntegers(*fix, "spheres", 0, notNegative)) {
@@ -219,6 +181,28 @@ void readFixations(const XmlElement& body, SceneBody& out) {
       out.fixed.push_back({sphere, freedom});
     }
   }
+}
+
+std::vector<SceneLoad> readLoads(const XmlElement& body, const std::string& scenePath) {
+  std::vector<SceneLoad> out;
+  for (const XmlElement* e : childrenOf(body, "load")) {
+    SceneLoad load;
+    load.line = e->line;
+    load.nodes = readNodeChoice(*e, {"file"}, scenePath);
+    const bool fromFile = e->find("file") != nullptr;
+    if (fromFile) load.forcesPath = readPath(*e, "file", scenePath);
+    if (fromFile && e->find("force")) refuse(*e, "force", "the file has the forces, expected one of the two");
+    if (!fromFile && !e->find("force")) refuse(*e, "force", "expected the attribute \"force\"");
+    load.whole.force = readVector(*e, "force", load.whole.force);
+    load.whole.from = readNumber(*e, "from", load.whole.from, notNegative);
+    load.whole.to = readNumber(*e, "to", load.whole.to, notNegative);
+    if (load.whole.to < load.whole.from)
+      refuse(*e, e->find("to") ? "to" : "from",
+             fmt::format("the load grows from {} s to {} s, expected the earlier time first", load.whole.from,
+                         load.whole.to));
+    out.push_back(std::move(load));
+  }
+  return out;
 }
 
 std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::vector<FixedSphere>& fixed) {
@@ -283,7 +267,8 @@ void readBodies(const XmlElement& root, Scene& scene) {
     readChoice(*e, "links", {"springs"}, 0);
     body.surface = readChoice(*e, "surface", {"full", "skin"}, 0) == 0 ? SurfaceMode::full : SurfaceMode::skin;
     body.worldFromModel = readPlacement(*e);
-    readFixations(*e, body);
+    readFixations(*e, scene.path, body);
+    body.loads = readLoads(*e, scene.path);
     body.driven = readDrivenSpheres(*e, body.fixed);
     body.factors = readLinkFactors(onlyChild(*e, "links"));
     scene.bodies.push_back(std::move(body));
@@ -426,10 +411,8 @@ void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene)
 }  // namespace
 
 Scene readScene(const std::string& path, const std::vector<SceneOverride>& overrides) {
-  const XmlElement root = readXml(path, sceneRules(), [&](XmlElement& editable) {
-    if (!overrides.empty()) addOptionalSingles(editable);
-    for (const SceneOverride& override : overrides) applyOverride(editable, override);
-  });
+  const XmlElement root =
+      readXml(path, sceneRules(), [&](XmlElement& editable) { applyOverrides(editable, overrides); });
   const bool durationOverridden = std::any_of(overrides.begin(), overrides.end(),
                                               [](const SceneOverride& o) { return o.path == "clock.duration"; });
   Scene scene;

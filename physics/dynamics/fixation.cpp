@@ -4,17 +4,6 @@
 
 namespace medulla {
 
-std::vector<int> nodesInRegion(const SoftBodyModel& model, const FixRegion& region) {
-  std::vector<int> out;
-  for (std::size_t i = 0; i < model.restNodes.size(); ++i) {
-    const Eigen::Vector3d& x = model.restNodes[i];
-    const bool inside =
-        region.shape == FixRegion::Shape::box ? region.box.contains(x) : (x - region.centre).norm() <= region.radius;
-    if (inside) out.push_back(static_cast<int>(i));
-  }
-  return out;
-}
-
 std::vector<int> spheresHeldBy(const SoftBodyModel& model, const std::vector<int>& fixedNodes) {
   std::vector<double> area(model.spheres.size(), 0), fixedArea = area;
   const auto add = [&](int node, std::vector<double>& to) {

@@ -4,9 +4,12 @@
 #include <array>
 #include <vector>
 
-// Loads from outside that the dynamics evaluates in its own substeps. A frozen force held for a 20 ms frame loses
-// contact at usual coupling stiffness; a spring does not.
+// Loads from outside that the dynamics evaluates in its own substeps. What a tool does is new in every frame and comes
+// as springs: a frozen force held for a 20 ms frame loses contact at usual coupling stiffness. What the scene
+// prescribes is known beforehand and stands in BodyDescription.
 namespace medulla {
+
+struct SoftBodyModel;
 
 // The virtual coupling between a tool and the point of the surface that it touches. The surface point is
 // x = sum weights x_nodes; force on it: stiffness (anchor - x) + damping (anchorVelocity - x'), spread to the nodes by
@@ -33,6 +36,17 @@ struct HeldNode {
   double stiffness = 0;
   double damping = 0;
 };
+
+// A force that belongs to the scene rather than to a tool: constant in the world's frame, whichever way the body turns
+// (a dead load), and growing linearly from 0 at `from` to the whole at `to`; all at once where the two are the same.
+struct DeadLoad {
+  int node = 0;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();  // N
+  double from = 0, to = 1;                          // s, from <= to
+};
+
+// `whole` shared out over the nodes by the area that each stands for; its own node is of no account.
+std::vector<DeadLoad> spreadLoad(const SoftBodyModel& model, const std::vector<int>& nodes, const DeadLoad& whole);
 
 struct Loads {
   std::vector<ToolSpring> toolSprings;

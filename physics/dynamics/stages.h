@@ -15,6 +15,8 @@ void sumSphereForces(WorldData&);      // spheres.cpp
 void dampBodies(WorldData&);      // body_damping.cpp: Rayleigh's alpha
 void dragVelocities(WorldData&);  // driven.cpp: the medium's resistance
 void stepVelocities(WorldData&);  // spheres and nodes
+// loads.cpp: dead loads as they are at `time`, the substep's end (s).
+void applyDeadLoads(WorldData&, double time);
 // driven.cpp: driven spheres get the velocity that takes them to their path at `time`, the substep's end (s).
 void driveSpheres(WorldData&, double time);
 // loads.cpp: tool springs and held nodes, implicitly against the velocities of this substep, so that their stiffness
@@ -33,6 +35,10 @@ inline void evaluateForces(WorldData& d) {
   returnLinkForces(d);
   sumSphereForces(d);
 }
+
+// loads.cpp: the bodies' dead loads into WorldData::deadLoads. Throws std::runtime_error naming the body where one is
+// on no node, not finite, or ends before it begins.
+void layOutDeadLoads(WorldData&);
 
 // Skin nodes to where their hosts carry them; needs evaluateLinks at the current state.
 void placeSkin(WorldData&);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cassert>
 #include <cmath>
@@ -48,7 +49,9 @@ void step(WorldData& d, const Loads& loads, double remaining, FrameReport& repor
   dampBodies(d);
   dragVelocities(d);
   stepVelocities(d);
-  driveSpheres(d, static_cast<double>(d.frame + 1) * d.settings.frameDuration - remaining);
+  const double end = static_cast<double>(d.frame + 1) * d.settings.frameDuration - remaining;
+  applyDeadLoads(d, end);
+  driveSpheres(d, end);
   applyLoads(d, loads, remaining, report.toolImpulse);
   resolveContacts(d);
   stepPositions(d);
@@ -139,6 +142,7 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
   if (settings.substeps == 0)
     data_->substeps = std::max(1, static_cast<int>(std::ceil(settings.frameDuration / (kStepSafety * stable))));
   data_->substep = settings.frameDuration / data_->substeps;
+  layOutDeadLoads(*data_);
   layOutContact(*data_, statics);
 }
 
@@ -222,6 +226,13 @@ double World::volumeRatio(int body) const {
   const auto x = [&](int node) { return vectorOf(data_->nodes.position[r.node[node]]); };
   for (const auto& t : data_->bodies[body].model->triangles) volume += x(t[0]).dot(x(t[1]).cross(x(t[2]))) / 6;
   return volume / r.restVolume;
+}
+
+double World::nodeSpeed(int body) const {
+  double squared = 0;
+  for (int i : data_->ranges.at(body).node)
+    squared = std::max(squared, vectorOf(data_->nodes.velocity[i]).squaredNorm());
+  return std::sqrt(squared);
 }
 
 PenetrationReport World::penetration() const {

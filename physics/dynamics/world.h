@@ -62,6 +62,7 @@ struct BodyDescription {
   std::vector<int> fixedNodes;  // of the full surface; without effect on a skin, which follows its spheres
   std::vector<DrivenSphere> driven;
   std::optional<std::vector<int>> neighbours;  // bodies that it may touch; absent: all that do not choose others
+  std::vector<DeadLoad> deadLoads;             // several on one node add up
 };
 
 struct WorldSettings {
@@ -106,6 +107,7 @@ class World {
   void readFrame(DynamicsFrame& out) const;  // resized once and reused
   Energies energies() const;
   double volumeRatio(int body) const;  // enclosed by the nodes, over rest
+  double nodeSpeed(int body) const;    // m/s, of the fastest node
   // What contact has let through so far; who overlapped before anything moved, each pair of bodies once, in order.
   PenetrationReport penetration() const;
   const std::vector<BodyOverlap>& startOverlaps() const;

@@ -141,6 +141,13 @@ struct SphereDrive {
   double frequency = 0, phase = 0;
 };
 
+// A dead load; DeadLoad on an index in Nodes.
+struct NodeForce {
+  int node = 0;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();  // N, whole
+  double from = 0, to = 0;                          // s
+};
+
 struct WorldData {
   WorldSettings settings;
   std::vector<BodyDescription> bodies;
@@ -151,6 +158,7 @@ struct WorldData {
   Nodes nodes;
   Springs springs;
   std::vector<SphereDrive> drives;
+  std::vector<NodeForce> deadLoads;  // body after body, as described
   ContactData contact;
 
   // Force of each tool load in the current substep, tool springs first, then held nodes; zero at the frame's start.

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace medulla {
+
+// Walks a CSV text row by row, for formats whose errors must name the line. Cells come without the white space around
+// them; # starts a comment; rows without content are skipped; lines end in LF or CRLF.
+class CsvRows {
+ public:
+  // `text` must outlive this object; `name` is the path that errors begin with.
+  CsvRows(std::string_view text, std::string name) : rest_(text), name_(std::move(name)) {}
+
+  // Moves to the next row with content. False at the end.
+  bool next();
+
+  const std::vector<std::string_view>& cells() const { return cells_; }
+  int line() const { return line_; }  // 1-based
+
+  // The whole cell as a finite number, or as a whole one from 0 to `count` - 1; `column` is what errors call it.
+  double number(std::size_t cell, std::string_view column) const;
+  int index(std::size_t cell, std::string_view column, std::size_t count) const;
+
+  // Throws "NAME:LINE: message".
+  [[noreturn]] void fail(const std::string& message) const;
+
+ private:
+  std::string_view rest_;
+  std::string name_;
+  int line_ = 0;
+  std::vector<std::string_view> cells_;
+};
+
+}  // namespace medulla

@@ -1,0 +1,81 @@
+#include "app/files/scene_overrides.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "app/files/scene_rules.h"
+
+namespace medulla {
+
+namespace {
+
+// Attributes that an override can reach, with their paths: every one that the rules know, present or not.
+struct Target {
+  std::string path;
+  XmlElement* element;
+  std::string attribute;
+};
+
+void listTargets(XmlElement& element, const std::string& prefix, std::vector<Target>& out) {
+  const XmlRule& rule = ruleOf(sceneRules(), element.name);
+  for (const auto* attributes : {&rule.required, &rule.optional}) {
+    for (const std::string& a : *attributes) out.push_back({prefix + a, &element, a});
+  }
+  for (XmlElement& child : element.children) {
+    const bool known = std::any_of(rule.children.begin(), rule.children.end(),
+                                   [&](const XmlRule::Child& c) { return c.name == child.name; });
+    if (!known) continue;  // refused later, at its own line
+    const XmlAttribute* name = child.find("name");
+    listTargets(child, prefix + child.name + "." + (name ? name->value + "." : ""), out);
+  }
+}
+
+// So that light.intensity can be overridden where the scene leaves <light> to its defaults. An element that cannot be
+// empty has none.
+void addOptionalSingles(XmlElement& element) {
+  const XmlRule& rule = ruleOf(sceneRules(), element.name);
+  for (const XmlRule::Child& child : rule.children) {
+    const bool present = std::any_of(element.children.begin(), element.children.end(),
+                                     [&](const XmlElement& e) { return e.name == child.name; });
+    if (present || child.least > 0 || child.most != 1 || !ruleOf(sceneRules(), child.name).required.empty()) continue;
+    XmlElement added;
+    added.name = child.name;
+    added.where = element.where;
+    added.line = element.line;
+    element.children.push_back(added);
+  }
+  for (XmlElement& child : element.children) {
+    if (child.name == "body") addOptionalSingles(child);
+  }
+}
+
+void applyOverride(XmlElement& root, const SceneOverride& override) {
+  const std::string where = "--set " + override.path;
+  std::vector<Target> targets;
+  listTargets(root, "", targets);
+  targets.push_back({"scene.name", &root, "name"});
+  const auto matches = [&](const Target& t) { return t.path == override.path; };
+  const auto found = std::find_if(targets.begin(), targets.end(), matches);
+  if (found == targets.end()) {
+    std::vector<std::string> known;
+    known.reserve(targets.size());
+    for (const Target& t : targets) known.push_back(t.path);
+    throw std::runtime_error(where + ": the scene has nothing of this name; did you mean " +
+                             nearestName(override.path, known) + "?");
+  }
+  if (std::count_if(targets.begin(), targets.end(), matches) > 1) {
+    throw std::runtime_error(where + ": several elements answer to this, expected one");
+  }
+  XmlElement& element = *found->element;
+  std::erase_if(element.attributes, [&](const XmlAttribute& a) { return a.name == found->attribute; });
+  element.attributes.push_back({found->attribute, override.value, where});
+}
+
+}  // namespace
+
+void applyOverrides(XmlElement& root, const std::vector<SceneOverride>& overrides) {
+  if (!overrides.empty()) addOptionalSingles(root);
+  for (const SceneOverride& override : overrides) applyOverride(root, override);
+}
+
+}  // namespace medulla

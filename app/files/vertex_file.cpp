@@ -1,0 +1,74 @@
+#include "app/files/vertex_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <span>
+
+#include "app/files/csv_rows.h"
+#include "app/files/input_error.h"
+#include "app/files/text_file.h"
+
+namespace medulla {
+
+namespace {
+
+constexpr std::array<std::string_view, 1> kVertexColumns = {"vertex"};
+constexpr std::array<std::string_view, 4> kForceColumns = {"vertex", "fx", "fy", "fz"};
+
+std::string joined(std::span<const std::string_view> names) {
+  std::string out;
+  for (const std::string_view name : names) out.append(out.empty() ? "" : ",").append(name);
+  return out;
+}
+
+// Calls `row` for every row but a header, with the node of the vertex in its first column.
+template <typename Row>
+void forEachVertex(std::string_view text, const std::string& name, const SoftBodyModel& model,
+                   std::span<const std::string_view> columns, const Row& row) {
+  CsvRows rows(text, name);
+  bool first = true, any = false;
+  for (; rows.next(); first = false) {
+    if (first && std::equal(columns.begin(), columns.end(), rows.cells().begin(), rows.cells().end())) continue;
+    if (rows.cells().size() != columns.size())
+      rows.fail(fmt::format("{} columns in this row, expected {}", rows.cells().size(), joined(columns)));
+    const int vertex = rows.index(0, columns[0], model.nodeOfInputVertex.size());
+    const int node = model.nodeOfInputVertex[vertex];
+    if (node < 0) rows.fail(fmt::format("vertex {} is none of the surface: repair dropped it from the mesh", vertex));
+    row(rows, node);
+    any = true;
+  }
+  if (!any) throw inputError(name, 0, fmt::format("no rows, expected at least one of {}", joined(columns)));
+}
+
+}  // namespace
+
+std::vector<int> parseVertices(std::string_view text, const std::string& name, const SoftBodyModel& model) {
+  std::vector<int> nodes;
+  forEachVertex(text, name, model, kVertexColumns, [&](const CsvRows&, int node) { nodes.push_back(node); });
+  std::sort(nodes.begin(), nodes.end());
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  return nodes;
+}
+
+std::vector<int> readVertices(const std::string& path, const SoftBodyModel& model) {
+  return parseVertices(readTextFile(path), path, model);
+}
+
+std::vector<DeadLoad> parseVertexForces(std::string_view text, const std::string& name, const SoftBodyModel& model,
+                                        const DeadLoad& whole) {
+  std::vector<DeadLoad> loads;
+  forEachVertex(text, name, model, kForceColumns, [&](const CsvRows& row, int node) {
+    DeadLoad& load = loads.emplace_back(whole);
+    load.node = node;
+    for (int k = 0; k < 3; ++k) load.force[k] = row.number(k + 1, kForceColumns[k + 1]);
+  });
+  return loads;
+}
+
+std::vector<DeadLoad> readVertexForces(const std::string& path, const SoftBodyModel& model, const DeadLoad& whole) {
+  return parseVertexForces(readTextFile(path), path, model, whole);
+}
+
+}  // namespace medulla

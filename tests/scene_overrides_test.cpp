@@ -1,0 +1,60 @@
+#include "app/files/scene_overrides.h"
+
+#include "tests/complete_scene.h"
+
+// `--set PATH=VALUE`.
+namespace medulla {
+namespace {
+
+using SceneOverrides = SceneFile;
+
+TEST_F(SceneOverrides, OverridesReplaceSingleAttributes) {
+  const Scene s = read(completeScene, {{"body.gallbladder.surface", "full"},
+                                       {"tissue.bile_sac.young", "1"},
+                                       {"tissue.bile_sac.young", "1e4"},
+                                       {"dynamics.gravity", "0 0 0"},
+                                       {"tool.grasper.radius", "0.005"},
+                                       {"body.gallbladder.links.torsion", "7"},
+                                       {"body.second.links.flexion", "8"},
+                                       {"body.second.position", "1 2 3"},
+                                       {"scene.name", "other"}});
+  EXPECT_EQ(s.bodies[0].surface, SurfaceMode::full);
+  EXPECT_EQ(s.bodies[0].tissue.young, 1e4);  // the later one
+  EXPECT_EQ(s.gravity, Eigen::Vector3d::Zero());
+  EXPECT_EQ(s.tools[0].settings.radius, 0.005);
+  EXPECT_EQ(s.bodies[0].factors.torsion, 7);
+  EXPECT_EQ(s.bodies[1].factors.flexion, 8);  // where the scene has no <links>
+  EXPECT_EQ(s.bodies[1].worldFromModel.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(s.name, "other");
+}
+
+TEST_F(SceneOverrides, OverridesReachElementsLeftToTheirDefaults) {
+  const std::string text = edited(
+      R"(<light position="0.01 0 0.01" intensity="1.5" reference_distance="0.2" haze="0.1 0.2 0.3" haze_distance="4" caustics="0.5"/>)",
+      "");
+  EXPECT_EQ(read(text, {{"light.intensity", "3"}}).lightIntensity, 3);
+}
+
+TEST_F(SceneOverrides, AShorterRunDropsTheGoldenTimesBeyondIt) {
+  EXPECT_EQ(read(completeScene, {{"clock.duration", "3.5"}}).goldenTimes, (std::vector<double>{0.5, 3}));
+}
+
+TEST_F(SceneOverrides, MistakesInOverridesNameTheOverride) {
+  const auto set = [&](const char* path, const char* value) { return complaint(completeScene, {{path, value}}); };
+  EXPECT_EQ(
+      set("body.galbladder.surface", "skin"),
+      "--set body.galbladder.surface: the scene has nothing of this name; did you mean body.gallbladder.surface?");
+  EXPECT_EQ(set("dynamics.gravty", "0 0 0"),
+            "--set dynamics.gravty: the scene has nothing of this name; did you mean dynamics.gravity?");
+  EXPECT_EQ(set("body.gallbladder", "x"),
+            "--set body.gallbladder: the scene has nothing of this name; did you mean body.gallbladder.name?");
+  EXPECT_EQ(set("camera.key.fov", "50"), "--set camera.key.fov: several elements answer to this, expected one");
+  EXPECT_EQ(set("body.gallbladder.surface", "contact"),
+            R"(--set body.gallbladder.surface: <body> surface="contact": unknown value; known: "full", "skin")");
+  EXPECT_EQ(set("tissue.bile_sac.young", "-1"),
+            R"(--set tissue.bile_sac.young: <tissue> young="-1": expected 1 number > 0)");
+  EXPECT_EQ(set("", "x").substr(0, 6), "--set ");
+}
+
+}  // namespace
+}  // namespace medulla
