@@ -5,6 +5,8 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <memory>
 
 #include "app/commands/commands.h"
 #include "app/files/number_text.h"
@@ -26,7 +28,14 @@ constexpr const char* kIntroduction =
 
 constexpr const char* kExitCodes =
     "Results go to standard output as \"name value [unit]\" lines, everything else to standard error.\n"
-    "Exit codes: 0 done, 1 input or run failed, 2 wrong usage, 3 golden mismatch, 130 interrupted.";
+    "Exit codes: 0 done, 1 input or run failed, 2 wrong usage, 3 mismatch, 4 not at rest in\n"
+    "time, 130 interrupted.";
+
+// A verb with what it does once its words are parsed: options that contradict each other are usage errors, too.
+struct Verb {
+  CLI::App* command;
+  std::function<int()> run;
+};
 
 std::optional<std::pair<int, int>> splitPair(const std::string& text, char separator) {
   const std::size_t at = text.find(separator);
@@ -133,7 +142,9 @@ RenderOptions renderOptions(const RenderArguments& a) {
   return options;
 }
 
-void addRender(CLI::App& app, RenderArguments& a) {
+Verb addRender(CLI::App& app) {
+  const auto arguments = std::make_shared<RenderArguments>();
+  RenderArguments& a = *arguments;
   CLI::App* c = app.add_subcommand("render", "run a scene and draw it into a video or numbered PNG files");
   addRunOptions(*c, a.run);
   c->add_option("-o,--output", a.outputs,
@@ -152,6 +163,40 @@ void addRender(CLI::App& app, RenderArguments& a) {
   c->add_option("--context", a.context, "how to draw off screen")
       ->check(CLI::IsMember({"auto", "osmesa", "egl"}))
       ->capture_default_str();
+  return {c, [arguments] { return runRender(renderOptions(*arguments)); }};
+}
+
+Verb addReplay(CLI::App& app) {
+  struct Arguments {
+    RunArguments run;
+    bool untilRest = false;
+  };
+  const auto a = std::make_shared<Arguments>();
+  CLI::App* c = app.add_subcommand("replay", "run a scene without pictures, as fast as it goes, and print its results");
+  addRunOptions(*c, a->run);
+  c->add_flag(
+      "--until-rest", a->untilRest,
+      "end when every surface node is slower than 1e-5 m/s and no load is still growing; exit code 4 where that "
+      "is not before the scene's duration");
+  return {c, [a] {
+            RunOptions options = runOptions(a->run);
+            options.untilRest = a->untilRest;
+            return runReplay(options);
+          }};
+}
+
+Verb addCheck(CLI::App& app) {
+  const auto a = std::make_shared<RunArguments>();
+  CLI::App* c = app.add_subcommand("check", "say whether a scene and all that it names can run");
+  addSceneOptions(*c, *a);
+  return {c, [a] { return runCheck(runOptions(*a)); }};
+}
+
+Verb addInfo(CLI::App& app) {
+  const auto path = std::make_shared<std::string>();
+  CLI::App* c = app.add_subcommand("info", "tell what is in a model or a scene");
+  c->add_option("FILE", *path, "model or scene file (XML)")->required();
+  return {c, [path] { return runInfo(*path); }};
 }
 
 struct BuildArguments {
@@ -159,7 +204,20 @@ struct BuildArguments {
   std::string method = "cover";
 };
 
-void addBuild(CLI::App& app, BuildArguments& a) {
+BuildOptions buildOptions(const BuildArguments& a) {
+  BuildOptions options = a.options;
+  options.settings.method = a.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
+  if (options.settings.gap > 0 && options.settings.method != BuildMethod::cover)
+    usageError("--gap", fmt::format("{}", options.settings.gap), "together with --method cover");
+  if (!options.fine.empty() && options.fine.size() != options.meshes.size())
+    usageError("--fine", options.fine.back(),
+               fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
+  return options;
+}
+
+Verb addBuild(CLI::App& app) {
+  const auto arguments = std::make_shared<BuildArguments>();
+  BuildArguments& a = *arguments;
   CLI::App* c = app.add_subcommand("build", "make a model of filling spheres from each closed triangle mesh");
   c->add_option("MESH", a.options.meshes, "closed surface: OBJ, OFF, STL, PLY, ...; one body each")->required();
   c->add_option("-o,--output", a.options.output,
@@ -196,20 +254,12 @@ void addBuild(CLI::App& app, BuildArguments& a) {
       ->check(CLI::Range(0, 4))
       ->capture_default_str();
   c->add_option("--report", a.options.reportPath, "write the quality report as CSV too")->type_name("FILE.csv");
+  return {c, [arguments] { return runBuild(buildOptions(*arguments)); }};
 }
 
-BuildOptions buildOptions(const BuildArguments& a) {
-  BuildOptions options = a.options;
-  options.settings.method = a.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
-  if (options.settings.gap > 0 && options.settings.method != BuildMethod::cover)
-    usageError("--gap", fmt::format("{}", options.settings.gap), "together with --method cover");
-  if (!options.fine.empty() && options.fine.size() != options.meshes.size())
-    usageError("--fine", options.fine.back(),
-               fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
-  return options;
-}
-
-void addNew(CLI::App& app, NewOptions& o) {
+Verb addNew(CLI::App& app) {
+  const auto options = std::make_shared<NewOptions>();
+  NewOptions& o = *options;
   CLI::App* c = app.add_subcommand("new", "make a scene, a model and a trajectory around a mesh, ready to render");
   c->add_option("MESH", o.build.meshes, "closed surface: OBJ, OFF, STL, PLY, ...")->required()->expected(1);
   c->add_option("-o,--output", o.folder, "folder for NAME.xml, NAME.model.xml and NAME.csv; made where missing")
@@ -221,9 +271,12 @@ void addNew(CLI::App& app, NewOptions& o) {
   c->add_option("--unit", o.build.unit, "unit of the mesh file")
       ->check(CLI::IsMember({"m", "cm", "mm", "inch"}))
       ->capture_default_str();
+  return {c, [options] { return runNew(*options); }};
 }
 
-void addGolden(CLI::App& app, GoldenOptions& o) {
+Verb addGolden(CLI::App& app) {
+  const auto options = std::make_shared<GoldenOptions>();
+  GoldenOptions& o = *options;
   CLI::App* c = app.add_subcommand("golden", "render the scenes' golden moments and compare with the stored images");
   c->add_option("SCENE", o.scenes, "scene files (default: scenes/*.xml)");
   c->add_flag("--update", o.update, "store what is drawn now as the new golden images");
@@ -233,6 +286,71 @@ void addGolden(CLI::App& app, GoldenOptions& o) {
   c->add_option("--context", o.context, "how to draw off screen")
       ->check(CLI::IsMember({"auto", "osmesa", "egl"}))
       ->capture_default_str();
+  return {c, [options] { return runGolden(*options); }};
+}
+
+struct CompareArguments {
+  CompareOptions options;
+  std::string tolerance = "0";
+};
+
+CompareOptions compareOptions(const CompareArguments& a) {
+  CompareOptions options = a.options;
+  const auto tolerance = parseNumber<double>(a.tolerance);
+  if (!tolerance || *tolerance < 0) usageError("--tolerance", a.tolerance, "a number of 0 or more");
+  options.tolerance = *tolerance;
+  return options;
+}
+
+Verb addCompare(CLI::App& app) {
+  const auto arguments = std::make_shared<CompareArguments>();
+  CompareArguments& a = *arguments;
+  CLI::App* c = app.add_subcommand("compare", "say where two logs differ first; exit code 3 where they do");
+  c->add_option("A", a.options.a, "log of a run (CSV)")->required();
+  c->add_option("B", a.options.b, "another")->required();
+  c->add_option("--tolerance", a.tolerance,
+                "differences that do not count, as a share of the column's largest value; 0: every field is the same "
+                "text")
+      ->capture_default_str();
+  return {c, [arguments] { return runCompare(compareOptions(*arguments)); }};
+}
+
+struct ChartArguments {
+  RunArguments run;
+  ChartOptions options;
+  std::vector<std::string> steps = {"0.1", "0.2", "0.5", "1", "2", "5", "10", "20"};
+};
+
+ChartOptions chartOptions(const ChartArguments& a) {
+  ChartOptions options = a.options;
+  options.run = runOptions(a.run);
+  for (const std::string& step : a.steps) {
+    const auto ms = parseNumber<double>(step);
+    if (!ms || *ms < 1e-3 || *ms > 50) usageError("--steps", step, "milliseconds from 0.001 to 50");
+    options.steps.push_back(1e-3 * *ms);
+  }
+  return options;
+}
+
+Verb addChart(CLI::App& app) {
+  const auto arguments = std::make_shared<ChartArguments>();
+  ChartArguments& a = *arguments;
+  CLI::App* c =
+      app.add_subcommand("chart", "run a scene by several methods and steps, and draw their time against their error");
+  addSceneOptions(*c, a.run);
+  c->add_option("-o,--output", a.options.folder,
+                "folder for chart.csv, chart.gnuplot and chart.svg; made where missing")
+      ->type_name("DIR")
+      ->required();
+  c->add_option("--steps", a.steps, "substeps to run with, ms; the nearest whole shares of a dynamics frame are taken")
+      ->type_name("MS,MS,...")
+      ->delimiter(',')
+      ->capture_default_str();
+  c->add_option("--models", a.options.models,
+                "models of the same mesh with other numbers of spheres, for curves of their own (repeatable)")
+      ->type_name("[BODY=]FILE")
+      ->allow_extra_args(false);
+  return {c, [arguments] { return runChart(chartOptions(*arguments)); }};
 }
 
 int dispatch(int argc, char** argv) {
@@ -242,47 +360,20 @@ int dispatch(int argc, char** argv) {
   app.get_formatter()->column_width(34);
   bool version = false;
   app.add_flag("--version", version, "version, and those of Mesa, Embree and the compiler");
-  RenderArguments render;
-  RunArguments replay, check;
-  BuildArguments build;
-  NewOptions starter;
-  GoldenOptions golden;
-  addRender(app, render);
-  CLI::App* replayCommand =
-      app.add_subcommand("replay", "run a scene without pictures, as fast as it goes, and print its results");
-  addRunOptions(*replayCommand, replay);
-  CLI::App* checkCommand = app.add_subcommand("check", "say whether a scene and all that it names can run");
-  addSceneOptions(*checkCommand, check);
-  std::string infoPath;
-  app.add_subcommand("info", "tell what is in a model or a scene")
-      ->add_option("FILE", infoPath, "model or scene file (XML)")
-      ->required();
-  addBuild(app, build);
-  addNew(app, starter);
-  addGolden(app, golden);
-  RenderOptions renderRun;
-  RunOptions replayRun, checkRun;
-  BuildOptions buildRun;
+  std::vector<Verb> verbs;
+  for (const auto add : {addRender, addReplay, addCheck, addInfo, addBuild, addNew, addGolden, addCompare, addChart})
+    verbs.push_back(add(app));
   try {
     app.parse(argc, argv);
-    if (app.got_subcommand("render")) renderRun = renderOptions(render);
-    if (app.got_subcommand("replay")) replayRun = runOptions(replay);
-    if (app.got_subcommand("check")) checkRun = runOptions(check);
-    if (app.got_subcommand("build")) buildRun = buildOptions(build);
+    if (version) return printVersion();
+    for (const Verb& verb : verbs)
+      if (verb.command->parsed()) return verb.run();
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
     std::fprintf(stderr, "medulla: %s (see medulla --help)\n", error.what());
     return 2;
   }
-  if (version) return printVersion();
-  if (app.got_subcommand("render")) return runRender(renderRun);
-  if (app.got_subcommand("replay")) return runReplay(replayRun);
-  if (app.got_subcommand("check")) return runCheck(checkRun);
-  if (app.got_subcommand("new")) return runNew(starter);
-  if (app.got_subcommand("golden")) return runGolden(golden);
-  if (app.got_subcommand("build")) return runBuild(buildRun);
-  if (app.got_subcommand("info")) return runInfo(infoPath);
   std::fputs(app.help().c_str(), stderr);
   return 2;
 }
@@ -298,6 +389,9 @@ int runCommandLine(int argc, char** argv) {
   } catch (const Interrupted&) {
     std::fputs("medulla: interrupted, nothing unfinished was kept\n", stderr);
     return 130;
+  } catch (const NotAtRest& error) {
+    std::fprintf(stderr, "medulla: %s\n", error.what());
+    return 4;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "medulla: %s\n", error.what());
     return 1;

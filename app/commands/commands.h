@@ -52,6 +52,20 @@ struct GoldenOptions {
 };
 int runGolden(const GoldenOptions& options);
 
+struct CompareOptions {
+  std::string a, b;      // logs
+  double tolerance = 0;  // share of the largest value that a column has in either; 0: the same text
+};
+int runCompare(const CompareOptions& options);
+
+struct ChartOptions {
+  RunOptions run;                   // scene, overrides and trajectories
+  std::string folder;               // for chart.csv, chart.gnuplot and chart.svg; made where missing
+  std::vector<double> steps;        // s, > 0; substeps are whole shares of a dynamics frame, the nearest to these
+  std::vector<std::string> models;  // [BODY=]FILE: of the scene's mesh with other numbers of spheres; empty: its own
+};
+int runChart(const ChartOptions& options);
+
 int printVersion();
 
 }  // namespace medulla

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <chrono>
 
 #include "app/commands/commands.h"
@@ -14,7 +16,9 @@ int runReplay(const RunOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   runToEnd(loaded, options, simulation, [&] { progress.update(simulation.time()); });
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));
+  std::vector<Result> results = runResults(simulation, processCpuSeconds() - cpuStart, wall);
+  if (options.untilRest) results.insert(results.begin(), {"rest_at", fmt::format("{:.6g}", simulation.time()), "s"});
+  printResults(results);
   return 0;
 }
 

@@ -18,6 +18,16 @@ double processCpuSeconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
+void recordFrames(const Simulation& simulation, bool last, std::vector<RecordedFrame>& moments) {
+  const double start = simulation.previous().time, end = simulation.current().time;
+  for (RecordedFrame& m : moments) {
+    const bool due = m.time <= end + 1e-9 || last;
+    if (!due || !m.frame.bodies.empty()) continue;
+    const double alpha = std::clamp((m.time - start) / (end - start), 0.0, 1.0);
+    blendFrames(simulation.previous(), simulation.current(), alpha, m.frame);
+  }
+}
+
 LoadedScene loadRun(const RunOptions& options) {
   Scene scene = readScene(options.scene, options.overrides);
   std::map<std::string, std::string> trajectories;
@@ -42,29 +52,56 @@ class SurfaceRecorder {
         throw std::runtime_error(
             fmt::format("--surface-at {}: expected a time from 0 to {} s or \"end\"", time, loaded.scene.duration));
       const OutputFile writableAtAll(request.path);
-      requests_.push_back({time, request.path, {}});
+      moments_.push_back({time, {}});
+      paths_.push_back(request.path);
     }
   }
-  void afterFrame(const Simulation& simulation) {
-    const double start = simulation.previous().time, end = simulation.current().time;
-    for (Request& r : requests_) {
-      const bool due = r.time <= end + 1e-9 || simulation.finished();
-      if (!due || !r.frame.bodies.empty()) continue;
-      const double alpha = std::clamp((r.time - start) / (end - start), 0.0, 1.0);
-      blendFrames(simulation.previous(), simulation.current(), alpha, r.frame);
-    }
-  }
+  void afterFrame(const Simulation& simulation, bool last) { recordFrames(simulation, last, moments_); }
   void write(const Simulation& simulation) const {
-    for (const Request& r : requests_) writeSurface(r.path, simulation.world().bodies(), r.frame);
+    for (std::size_t k = 0; k < paths_.size(); ++k)
+      writeSurface(paths_[k], simulation.world().bodies(), moments_[k].frame);
   }
 
  private:
-  struct Request {
-    double time;
-    std::string path;
-    DynamicsFrame frame;
-  };
-  std::vector<Request> requests_;
+  std::vector<RecordedFrame> moments_;
+  std::vector<std::string> paths_;  // one each
+};
+
+// Whether a scene has come to rest.
+class RestWatch {
+ public:
+  explicit RestWatch(const LoadedScene& loaded) {
+    for (const SceneBody& body : loaded.scene.bodies)
+      for (const DeadLoad& load : body.deadLoads) busyUntil_ = std::max(busyUntil_, load.to);
+    for (const Trajectory& motion : loaded.trajectories) busyUntil_ = std::max(busyUntil_, motion.samples.back().time);
+  }
+  void afterFrame(const Simulation& simulation) {
+    const World& world = simulation.world();
+    fastest_ = 0;
+    for (std::size_t b = 0; b < world.bodies().size(); ++b) {
+      const double speed = world.nodeSpeed(static_cast<int>(b));
+      if (speed <= fastest_) continue;
+      fastest_ = speed;
+      body_ = world.bodies()[b].name;
+    }
+    const double time = simulation.time();
+    if (!(fastest_ < kStill) || time < busyUntil_) movedAt_ = time;
+    atRest_ = time - movedAt_ >= kStillFor - 1e-9;
+  }
+  bool atRest() const { return atRest_; }
+  [[noreturn]] void fail(double time) const {
+    throw NotAtRest(fastest_ < kStill
+                        ? fmt::format("not at rest: loads or tools act up to the end at {:.6g} s, or nearly", time)
+                        : fmt::format("not at rest at {:.6g} s: a node of body '{}' moves at {:.3g} m/s, expected less "
+                                      "than {:.0e} m/s",
+                                      time, body_, fastest_, kStill));
+  }
+
+ private:
+  static constexpr double kStill = 1e-5, kStillFor = 0.1;  // m/s, s
+  double busyUntil_ = 0, movedAt_ = 0, fastest_ = 0;
+  std::string body_;
+  bool atRest_ = false;
 };
 
 class LogRecorder {
@@ -117,6 +154,10 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
   for (const SceneStatic& item : scene.statics)
     if (!item.meshPath.empty()) inputs.push_back(item.meshPath);
   for (const SceneTool& tool : scene.tools) inputs.push_back(tool.trajectoryPath);
+  for (const SceneBody& body : scene.bodies) {
+    for (const SceneFix& fix : body.fixes) inputs.push_back(fix.nodes.verticesPath);
+    for (const SceneLoad& load : body.loads) inputs.insert(inputs.end(), {load.nodes.verticesPath, load.forcesPath});
+  }
   outputs.push_back(options.logPath);
   for (const SurfaceRequest& request : options.surfaces) outputs.push_back(request.path);
   requireDistinctFiles(outputs, inputs);
@@ -126,14 +167,18 @@ void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& 
               const std::function<void()>& afterFrame, const std::function<void()>& finish) {
   SurfaceRecorder surfaces(loaded, options);
   LogRecorder log(loaded, options);
+  RestWatch rest(loaded);
   for (const BodyOverlap& o : simulation.world().startOverlaps())
     fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n",
                loaded.scene.bodies[o.body0].name, loaded.scene.bodies[o.body1].name, 1e3 * o.depth);
-  while (!simulation.finished()) {
+  for (bool last = false; !last;) {
     checkInterrupt();
     simulation.advanceFrame();
+    if (options.untilRest) rest.afterFrame(simulation);
+    if (options.untilRest && !rest.atRest() && simulation.finished()) rest.fail(simulation.time());
+    last = simulation.finished() || rest.atRest();
     log.afterFrame(simulation);
-    surfaces.afterFrame(simulation);
+    surfaces.afterFrame(simulation, last);
     afterFrame();
   }
   if (finish) finish();

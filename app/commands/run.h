@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -24,7 +25,22 @@ struct RunOptions {
   std::string logPath;
   bool logEveryTick = false;
   std::vector<SurfaceRequest> surfaces;
+  bool untilRest = false;  // ends when nothing moves any more; the scene's duration is the longest it may take
 };
+
+// The scene's duration is over and something still moves.
+struct NotAtRest : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// The state at a time, once a run has passed it.
+struct RecordedFrame {
+  double time = 0;  // s
+  DynamicsFrame frame;
+};
+
+// Fills in those moments that the last dynamics frame has reached; all that are still open after the `last` one.
+void recordFrames(const Simulation& simulation, bool last, std::vector<RecordedFrame>& moments);
 
 // Process CPU time over all threads, s.
 double processCpuSeconds();
@@ -32,8 +48,10 @@ double processCpuSeconds();
 LoadedScene loadRun(const RunOptions& options);
 
 // Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` after the last, before
-// log and surfaces appear under their names: what fails there leaves those as they were. Throws Interrupted after a
-// signal.
+// log and surfaces appear under their names: what fails there leaves those as they were. Until rest: until every node
+// has been slower than 1e-5 m/s for 0.1 s, so that the turning point of a swing does not count, and neither a load nor
+// a tool's recorded motion is still to come; surfaces asked for at a later time are those at rest. Throws NotAtRest,
+// and Interrupted after a signal.
 void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
               const std::function<void()>& afterFrame, const std::function<void()>& finish = {});
 

@@ -1,0 +1,66 @@
+#include "app/files/gnuplot.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+
+extern char** environ;
+
+namespace medulla {
+
+namespace {
+
+// A file in memory takes what a program says: a pipe nobody reads could fill and stop it.
+class MemoryFile {
+ public:
+  explicit MemoryFile(const char* name) : descriptor_(memfd_create(name, MFD_CLOEXEC)) {
+    if (descriptor_ < 0) throw std::runtime_error(std::string("no file in memory: ") + std::strerror(errno));
+  }
+  ~MemoryFile() { close(descriptor_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  int descriptor() const { return descriptor_; }
+  std::string text() const {
+    std::string out(static_cast<std::size_t>(lseek(descriptor_, 0, SEEK_END)), '\0');
+    const ssize_t n = pread(descriptor_, out.data(), out.size(), 0);
+    out.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
+    return out;
+  }
+
+ private:
+  int descriptor_;
+};
+
+}  // namespace
+
+std::optional<std::string> runGnuplot(const std::string& scriptPath) {
+  const MemoryFile picture("chart"), complaints("gnuplot-errors");
+  std::string program = "gnuplot", script = scriptPath;
+  char* const argv[] = {program.data(), script.data(), nullptr};
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, picture.descriptor(), STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, complaints.descriptor(), STDERR_FILENO);
+  pid_t child = -1;
+  const int failure = posix_spawnp(&child, program.c_str(), &actions, nullptr, argv, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failure == ENOENT) return std::nullopt;
+  if (failure != 0) throw std::runtime_error(std::string("gnuplot cannot be started: ") + std::strerror(failure));
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return picture.text();
+  std::string complaint = complaints.text();
+  while (!complaint.empty() && (complaint.back() == '\n' || complaint.back() == ' ')) complaint.pop_back();
+  complaint.erase(0, complaint.rfind('\n') + 1);
+  throw std::runtime_error("gnuplot failed: " + (complaint.empty() ? "it gave no reason" : complaint));
+}
+
+}  // namespace medulla

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace medulla {
+
+// What gnuplot writes to standard output for a script; nothing where it is not installed. Throws std::runtime_error
+// with gnuplot's complaint.
+std::optional<std::string> runGnuplot(const std::string& scriptPath);
+
+}  // namespace medulla

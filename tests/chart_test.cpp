@@ -1,0 +1,133 @@
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <sstream>
+
+#include "app/files/chart_file.h"
+#include "tests/program_run.h"
+#include "tests/temporary_folder.h"
+
+// `medulla chart`: time against error.
+namespace medulla {
+namespace {
+
+ChartPoint point(const std::string& curve, double cpu, double error) {
+  ChartPoint p;
+  p.curve = curve;
+  p.step = 1e-3;
+  p.cpu = cpu;
+  p.errorMax = error;
+  return p;
+}
+
+TEST(Chart, TheFrontHoldsWhatNothingBeats) {
+  std::vector<ChartPoint> points{point("a", 1, 1),      point("a", 0.1, 10), point("b", 0.5, 1),
+                                 point("b", 0.05, 20),  point("b", 0.2, 10), point("c", 0.01, 150),
+                                 point("c", 0.02, 1e-6)};
+  points.back().failedAt = 0.5;
+  markFront(points);
+  std::vector<bool> front;
+  for (const ChartPoint& p : points) front.push_back(p.onFront);
+  EXPECT_EQ(front, (std::vector<bool>{false, true, true, true, false, false, false}));
+}
+
+class ChartCommand : public testing::Test {
+ protected:
+  ChartCommand() {
+    folder.write("case.xml", fmt::format("<scene name='case'><clock duration='0.4'/><dynamics gravity='0 0 0'/>\n"
+                                         "<tissue name='t' young='5e3' damping='0.3'/>\n"
+                                         "<body name='pear' model='{}/assets/gallbladder/gallbladder.model.xml' "
+                                         "tissue='t' look='gallbladder'>\n<fix plane='0 -1 0 0.02'/>"
+                                         "<load plane='0 1 0 -0.06' force='0 0 1e-2' to='0.1'/>\n</body>\n"
+                                         "<camera position='0 0 1' target='0 0 0'/><output golden='0.1'/></scene>",
+                                         MEDULLA_SOURCE_DIR));
+  }
+  ProgramResult chart(const std::vector<std::string>& more, const ProgramOptions& options = {}) const {
+    std::vector<std::string> words{"chart", folder / "case.xml", "-o", folder / "out"};
+    words.insert(words.end(), more.begin(), more.end());
+    return runProgram(words, options);
+  }
+  TemporaryFolder folder;
+};
+
+// Rows of a CSV file as cells.
+std::vector<std::vector<std::string>> rowsOf(const std::string& path) {
+  std::vector<std::vector<std::string>> out;
+  std::istringstream lines(readFile(path));
+  for (std::string line, cell; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    out.emplace_back();
+    while (std::getline(cells, cell, ',')) out.back().push_back(cell);
+  }
+  return out;
+}
+
+TEST_F(ChartCommand, SmallerStepsComeNearerAndTooLargeOnesFail) {
+  ProgramOptions withoutGnuplot;
+  withoutGnuplot.path = folder.path();
+  const ProgramResult r = chart({"--steps", "0.25,0.5,20"}, withoutGnuplot);
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_TRUE(r.out.starts_with("runs 6\nfailed 2\nreference_step 0.000125 s\nreference_spheres 7\n")) << r.out;
+  EXPECT_NE(r.err.find("no chart.svg: gnuplot is not installed"), std::string::npos) << r.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/chart.svg"));
+  const auto rows = rowsOf(folder / "out/chart.csv");
+  ASSERT_EQ(rows.size(), 7u);
+  EXPECT_EQ(rows[0][2], "step[s]");
+  // Runs are ordered by method, then by step from large to small.
+  EXPECT_EQ(rows[1][0], "full");
+  EXPECT_EQ(rows[1][2], "0.02");
+  EXPECT_EQ(rows[1][4], "");  // no error
+  EXPECT_NE(rows[1][8], "");  // but a time of failure
+  EXPECT_EQ(rows[2][2], "0.0005");
+  EXPECT_EQ(rows[3][2], "0.00025");
+  const double coarse = std::stod(rows[2][4]), fine = std::stod(rows[3][4]);
+  EXPECT_GT(fine, 0);
+  // First order: errors against a reference at an eighth of a millisecond are 3 : 1.
+  EXPECT_NEAR(coarse / fine, 3, 0.6);
+  EXPECT_LE(std::stod(rows[3][5]), fine);  // RMS
+  EXPECT_EQ(rows[4][0], "skin");
+  EXPECT_GT(std::stod(rows[6][4]), coarse);  // another model of the same body
+  const std::string script = readFile(folder / "out/chart.gnuplot");
+  EXPECT_NE(script.find("title 'skin'"), std::string::npos);
+}
+
+TEST_F(ChartCommand, GnuplotDrawsIt) {
+  if (std::system("gnuplot --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "gnuplot is not installed";
+  const std::string model = folder / "three.xml";
+  ASSERT_EQ(runProgram({"build", std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj", "-o", model,
+                        "--spheres", "3", "--render-levels", "0"})
+                .exitCode,
+            0);
+  const ProgramResult r = chart({"--steps", "0.5,20", "--models", model, "--models",
+                                 std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.model.xml"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  const std::string svg = readFile(folder / "out/chart.svg");
+  EXPECT_TRUE(svg.starts_with("<?xml")) << svg.substr(0, 100);
+  EXPECT_NE(svg.find("full 3 spheres"), std::string::npos);
+  EXPECT_NE(svg.find("skin 7 spheres"), std::string::npos);
+  EXPECT_TRUE(svg.ends_with("</svg>\n\n") || svg.ends_with("</svg>\n")) << svg.substr(svg.size() - 20);
+}
+
+TEST_F(ChartCommand, BadInputIsRefusedInOneLineAndLeavesNoFolder) {
+  const auto refused = [&](const ProgramResult& r, int exitCode, const std::string& words) {
+    EXPECT_EQ(r.exitCode, exitCode);
+    EXPECT_EQ(r.out, "");
+    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+    EXPECT_NE(r.err.find(words), std::string::npos) << r.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  };
+  refused(chart({"--steps", "nan"}), 2, "--steps nan");
+  refused(chart({"--steps", "0"}), 2, "--steps 0");
+  refused(chart({"--steps", "60"}), 2, "--steps 60");
+  refused(chart({"--models", folder / "none.xml"}), 1, "none.xml does not exist");
+  refused(chart({"--models", std::string(MEDULLA_SOURCE_DIR) + "/assets/stomach/stomach.model.xml"}), 1,
+          "is of another mesh");
+  refused(chart({"--models", "apple=" + (folder / "case.xml")}), 1, "body.apple.model");
+  refused(chart({"--set", "body.pear.fix.plane=0 -1 0 1", "--steps", "1"}), 1, "nothing moves");
+  refused(chart({"--steps", "40"}), 1, "the reference run with substeps of 10 ms is not finite at ");
+}
+
+}  // namespace
+}  // namespace medulla

@@ -1,0 +1,203 @@
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <functional>
+#include <sstream>
+
+#include "app/files/vertex_file.h"
+#include "app/simulation.h"
+#include "tests/program_run.h"
+#include "tests/temporary_folder.h"
+
+// Static load cases as scenes: what is fixed and loaded where, runs that end at rest, and their refusals.
+namespace medulla {
+namespace {
+
+// Six vertices of a mesh file: the second was welded to the first, repair dropped the third.
+SoftBodyModel repairedModel() {
+  SoftBodyModel model;
+  model.restNodes.resize(4);
+  model.nodeOfInputVertex = {3, 3, -1, 0, 1, 2};
+  return model;
+}
+
+std::string complaint(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(VertexFile, VerticesOfTheMeshFileBecomeNodes) {
+  const SoftBodyModel model = repairedModel();
+  EXPECT_EQ(parseVertices("vertex\n5\n# a comment\n 0 \r\n1\n4", "v.csv", model), (std::vector<int>{1, 2, 3}));
+  EXPECT_EQ(parseVertices("3", "v.csv", model), std::vector<int>{0});
+  DeadLoad whole;
+  whole.from = 0.5;
+  whole.to = 2;
+  for (const char* text :
+       {"vertex,fx,fy,fz\n4,1,2,3\n0,0,0,-1e-3\n1,0,0,-1e-3\n", "4,1,2,3\n0,0,0,-1e-3\n1,0,0,-1e-3"}) {
+    const std::vector<DeadLoad> loads = parseVertexForces(text, "f.csv", model, whole);
+    ASSERT_EQ(loads.size(), 3u);  // those of welded vertices add up
+    EXPECT_EQ(loads[0].node, 1);
+    EXPECT_EQ(loads[0].force, Eigen::Vector3d(1, 2, 3));
+    EXPECT_EQ(loads[0].from, 0.5);
+    EXPECT_EQ(loads[0].to, 2);
+    EXPECT_EQ(loads[1].node, 3);
+    EXPECT_EQ(loads[2].node, 3);
+    EXPECT_EQ(loads[2].force, Eigen::Vector3d(0, 0, -1e-3));
+  }
+}
+
+TEST(VertexFile, MistakesNameTheLine) {
+  const SoftBodyModel model = repairedModel();
+  const auto vertices = [&](const char* text) { return complaint([&] { parseVertices(text, "v.csv", model); }); };
+  const auto forces = [&](const char* text) { return complaint([&] { parseVertexForces(text, "f.csv", model, {}); }); };
+  EXPECT_EQ(vertices("0\n6\n"), "v.csv:2: column vertex is '6', expected a whole number from 0 to 5");
+  EXPECT_EQ(vertices("-1\n"), "v.csv:1: column vertex is '-1', expected a whole number from 0 to 5");
+  EXPECT_EQ(vertices("0\n1.5\n"), "v.csv:2: column vertex is '1.5', expected a whole number from 0 to 5");
+  EXPECT_EQ(vertices("0,1\n"), "v.csv:1: 2 columns in this row, expected vertex");
+  EXPECT_EQ(vertices("vertices\n0\n"), "v.csv:1: column vertex is 'vertices', expected a whole number from 0 to 5");
+  EXPECT_EQ(vertices("vertex\n\n2\n"), "v.csv:3: vertex 2 is none of the surface: repair dropped it from the mesh");
+  EXPECT_EQ(vertices("vertex\n"), "v.csv: no rows, expected at least one of vertex");
+  EXPECT_EQ(vertices(""), "v.csv: no rows, expected at least one of vertex");
+  EXPECT_EQ(forces("# x\n0,0,0,nan\n"), "f.csv:2: column fz is 'nan', expected a finite number");
+  EXPECT_EQ(forces("0,1e999,0,0\n"), "f.csv:1: column fx is '1e999', expected a finite number");
+  EXPECT_EQ(forces("vertex,fx,fy,fz\n0,0,0\n"), "f.csv:2: 3 columns in this row, expected vertex,fx,fy,fz");
+  EXPECT_EQ(forces("0,0,0,\n"), "f.csv:1: column fz is '', expected a finite number");
+  EXPECT_EQ(forces("7,0,0,0\n"), "f.csv:1: column vertex is '7', expected a whole number from 0 to 5");
+}
+
+class LoadCase : public testing::Test {
+ protected:
+  // The gallbladder without weight, `inside` on its fourth line.
+  std::string scene(const std::string& inside, const std::string& duration = "8") const {
+    folder.write("case.xml", fmt::format("<scene name='case'><clock duration='{}'/><dynamics gravity='0 0 0'/>\n"
+                                         "<tissue name='t' young='5e3' damping='1'/>\n"
+                                         "<body name='pear' model='{}/assets/gallbladder/gallbladder.model.xml' "
+                                         "tissue='t' look='gallbladder'>\n{}\n</body>\n"
+                                         "<camera position='0 0 1' target='0 0 0'/></scene>",
+                                         duration, MEDULLA_SOURCE_DIR, inside));
+    return folder / "case.xml";
+  }
+  std::string refusal(const std::string& inside) const {
+    const std::string path = scene(inside);
+    std::string message = complaint([&] { loadScene(readScene(path)); });
+    for (std::size_t at; (at = message.find(folder / "")) != std::string::npos;)
+      message.erase(at, (folder / "").size());
+    return message;
+  }
+  TemporaryFolder folder;
+};
+
+// The upper end, and the lower.
+constexpr const char* kHeld = "<fix plane='0 -1 0 0.02'/>";
+
+TEST_F(LoadCase, PartsOfSpaceAndTheirVerticesMeanTheSameNodes) {
+  const LoadedScene byPlane = loadScene(
+      readScene(scene("<fix plane='0 -1 0 0.02'/><load plane='0 1 0 -0.06' force='0 0 1e-2' from='0.5' to='2'/>")));
+  const SceneBody& a = byPlane.scene.bodies[0];
+  ASSERT_GT(a.fixedNodes.size(), 10u);
+  ASSERT_GT(a.deadLoads.size(), 10u);
+  std::string held, loaded;
+  for (std::size_t v = 0; v < byPlane.models[0]->nodeOfInputVertex.size(); ++v) {
+    const int node = byPlane.models[0]->nodeOfInputVertex[v];
+    const double y = byPlane.models[0]->restNodes[node].y();
+    if (-y <= 0.02) held += fmt::format("{}\n", v);
+    if (y <= -0.06) loaded += fmt::format("{}\n", v);
+  }
+  folder.write("held.csv", held);
+  folder.write("loaded.csv", loaded);
+  const LoadedScene byVertex = loadScene(
+      readScene(scene("<fix vertices='held.csv'/><load vertices='loaded.csv' force='0 0 1e-2' from='0.5' to='2'/>")));
+  const SceneBody& b = byVertex.scene.bodies[0];
+  EXPECT_EQ(a.fixedNodes, b.fixedNodes);
+  ASSERT_EQ(a.deadLoads.size(), b.deadLoads.size());
+  EXPECT_EQ(a.fixed.size(), b.fixed.size());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < a.deadLoads.size(); ++k) {
+    EXPECT_EQ(a.deadLoads[k].node, b.deadLoads[k].node);
+    EXPECT_EQ(a.deadLoads[k].force, b.deadLoads[k].force);
+    EXPECT_EQ(b.deadLoads[k].from, 0.5);
+    EXPECT_EQ(b.deadLoads[k].to, 2);
+    sum += a.deadLoads[k].force;
+  }
+  EXPECT_LT((sum - Eigen::Vector3d(0, 0, 1e-2)).norm(), 1e-15);
+}
+
+TEST_F(LoadCase, MistakesNameFileAndLine) {
+  folder.write("far.csv", "vertex\n10\n235\n");
+  folder.write("nan.csv", "vertex,fx,fy,fz\n10,0,nan,0\n");
+  EXPECT_EQ(refusal("<fix vertices='none.csv'/>"), "case.xml:4: list of vertices \"none.csv\" does not exist");
+  EXPECT_EQ(refusal("<fix vertices='far.csv'/>"),
+            "far.csv:3: column vertex is '235', expected a whole number from 0 to 234");
+  EXPECT_EQ(refusal("<fix plane='0 1 0 -5'/>"), "case.xml:4: no surface node of body \"pear\" lies in here");
+  EXPECT_EQ(refusal("<load box='5 5 5 6 6 6' force='1 0 0'/>"),
+            "case.xml:4: no surface node of body \"pear\" lies in here");
+  EXPECT_EQ(refusal("<load vertices='none.csv' force='1 0 0'/>"),
+            "case.xml:4: list of vertices \"none.csv\" does not exist");
+  EXPECT_EQ(refusal("<load file='none.csv'/>"), "case.xml:4: file of forces \"none.csv\" does not exist");
+  EXPECT_EQ(refusal("<load file='nan.csv'/>"), "nan.csv:2: column fy is 'nan', expected a finite number");
+  EXPECT_EQ(refusal("<load file='far.csv'/>"), "far.csv:1: 1 columns in this row, expected vertex,fx,fy,fz");
+}
+
+std::vector<Eigen::Vector3d> verticesOf(const std::string& obj) {
+  std::vector<Eigen::Vector3d> out;
+  std::istringstream lines(readFile(obj));
+  for (std::string line; std::getline(lines, line);) {
+    Eigen::Vector3d x;
+    if (std::sscanf(line.c_str(), "v %lf %lf %lf", &x[0], &x[1], &x[2]) == 3) out.push_back(x);
+  }
+  return out;
+}
+
+// m, of the vertex that has gone farthest between two surfaces.
+double farthest(const std::string& from, const std::string& to) {
+  const std::vector<Eigen::Vector3d> a = verticesOf(from), b = verticesOf(to);
+  EXPECT_EQ(a.size(), b.size());
+  double out = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) out = std::max(out, (a[k] - b[k]).norm());
+  return out;
+}
+
+TEST_F(LoadCase, ARunUntilRestEndsWhenNothingMoves) {
+  const std::string load = fmt::format("{}<load plane='0 1 0 -0.06' force='0 0 1e-2' to='0.5'/>", kHeld);
+  const std::string path = scene(load, "40"), end = folder / "end.obj", later = folder / "later.obj";
+  const ProgramResult run = runProgram(
+      {"replay", path, "--until-rest", "--surface-at", "end", end, "--surface-at", "39", later, "--log", folder / "l"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  ASSERT_TRUE(run.out.starts_with("rest_at ")) << run.out;
+  const double time = std::stod(run.out.substr(8));
+  EXPECT_GT(time, 0.6);
+  EXPECT_LT(time, 40);
+  EXPECT_EQ(readFile(end), readFile(later));
+  // Rest is where a run of twice the time ends, too.
+  const std::string longer = folder / "longer.obj", start = folder / "start.obj";
+  ASSERT_EQ(runProgram({"replay", path, "--set", fmt::format("clock.duration={}", 2 * time), "--surface-at", "end",
+                        longer, "--surface-at", "0", start})
+                .exitCode,
+            0);
+  EXPECT_GT(farthest(start, longer), 1e-3);
+  EXPECT_LT(farthest(end, longer), 0.01 * farthest(start, longer));
+}
+
+TEST_F(LoadCase, ARunThatFindsNoRestSaysSoAndKeepsNothing) {
+  const std::string load = fmt::format("{}<load plane='0 1 0 -0.06' force='0 0 1e-2' to='0'/>", kHeld);
+  const ProgramResult moving = runProgram({"replay", scene(load, "0.3"), "--until-rest", "--log", folder / "log.csv"});
+  EXPECT_EQ(moving.exitCode, 4);
+  EXPECT_EQ(moving.out, "");
+  EXPECT_TRUE(moving.err.starts_with("medulla: not at rest at 0.3 s: a node of body 'pear' moves at ")) << moving.err;
+  EXPECT_EQ(std::count(moving.err.begin(), moving.err.end(), '\n'), 1) << moving.err;
+  EXPECT_EQ(folder.contents(), std::vector<std::string>{"case.xml"});
+  // Still, but with a load to come.
+  const std::string later = fmt::format("{}<load plane='0 1 0 -0.06' force='0 0 1e-2' from='1' to='2'/>", kHeld);
+  EXPECT_EQ(runProgram({"replay", scene(later, "0.3"), "--until-rest"}).exitCode, 4);
+  EXPECT_EQ(runProgram({"replay", scene(kHeld, "0.3"), "--until-rest"}).exitCode, 0);
+}
+
+}  // namespace
+}  // namespace medulla
