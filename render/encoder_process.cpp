@@ -44,6 +44,8 @@ std::vector<std::string> arguments(const std::string& program, const std::string
   // Drawing has every core at work: more threads cost a fifth more time in all, and the file would depend on their
   // number.
   add({"-threads", "1"});
+  // The preset's finer search of motion saves 5 % of the file for a quarter of the time.
+  add({"-x264-params", "subme=1"});
   add(tags);
   add({"-movflags", "+faststart", "-f", "mp4", path});
   return a;
