@@ -83,10 +83,12 @@ PostProcess::PostProcess(int width, int height)
       height_(height),
       luma_(std::size_t(width) * height),
       edge_(width),
+      black_(4ul * width),
       cellsX_(width / kCell + 3),
       cellsY_(height / kCell + 3),
       glare_(std::size_t(cellsX_) * cellsY_),
       blurred_(glare_.size()) {
+  for (std::size_t k = 3; k < black_.size(); k += 4) black_[k] = 255;
   const float h = float(height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
@@ -95,11 +97,18 @@ PostProcess::PostProcess(int width, int height)
       if (r <= kRimInner) continue;
       // The fade is meant in light; pixels are gamma coded.
       const float share = std::pow(smoothStep(kRimOuter, kRimInner, r), 1 / 2.2f);
-      rim_.push_back({std::uint32_t(y * width + x), std::uint8_t(255 * share + kRound)});
+      const auto at = std::uint32_t(y * width + x);
+      if (const auto factor = std::uint8_t(255 * share + kRound); factor > 0)
+        rim_.push_back({at, factor});
+      else if (!outside_.empty() && outside_.back().first + outside_.back().count == at && x > 0)
+        ++outside_.back().count;
+      else
+        outside_.push_back({at, 1});
     }
 }
 
 void PostProcess::fadeRim(Image& image) const {
+  for (const Span& s : outside_) std::memcpy(&image.pixels[4ul * s.first], black_.data(), 4ul * s.count);
   for (const RimPixel& r : rim_) {
     std::uint8_t* p = &image.pixels[4ul * r.index];
     for (int c = 0; c < 3; ++c) p[c] = std::uint8_t(p[c] * r.factor / 255);

@@ -20,6 +20,9 @@ class PostProcess {
     std::uint32_t index;
     std::uint8_t factor;  // of 255
   };
+  struct Span {
+    std::uint32_t first, count;  // pixels of one row
+  };
   struct Smoothed {
     std::uint32_t index;
     std::uint8_t rgb[3];
@@ -31,8 +34,9 @@ class PostProcess {
   void smoothRow(const Image& image, int y);
 
   int width_, height_;
-  std::vector<RimPixel> rim_;
-  std::vector<std::uint8_t> luma_, edge_;
+  std::vector<RimPixel> rim_;                      // where the picture fades
+  std::vector<Span> outside_;                      // where it is black
+  std::vector<std::uint8_t> luma_, edge_, black_;  // black: a row of opaque pixels
   std::vector<Smoothed> smoothed_;
   int cellsX_, cellsY_;  // coarse grid of the halo, with a border of one empty cell
   std::vector<float> glare_, blurred_;
