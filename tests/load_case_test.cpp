@@ -40,7 +40,8 @@ TEST(VertexFile, VerticesOfTheMeshFileBecomeNodes) {
   whole.from = 0.5;
   whole.to = 2;
   for (const char* text :
-       {"vertex,fx,fy,fz\n4,1,2,3\n0,0,0,-1e-3\n1,0,0,-1e-3\n", "4,1,2,3\n0,0,0,-1e-3\n1,0,0,-1e-3"}) {
+       {"vertex,fx[N],fy[N],fz[N]\n4,1,2,3\n0,0,0,-1e-3\n1,0,0,-1e-3\n",
+        "vertex,fx,fy,fz\n4,1,2,3\n0,0,0,-1e-3\n1,0,0,-1e-3\n", "4,1,2,3\n0,0,0,-1e-3\n1,0,0,-1e-3"}) {
     const std::vector<DeadLoad> loads = parseVertexForces(text, "f.csv", model, whole);
     ASSERT_EQ(loads.size(), 3u);  // those of welded vertices add up
     EXPECT_EQ(loads[0].node, 1);
@@ -65,10 +66,10 @@ TEST(VertexFile, MistakesNameTheLine) {
   EXPECT_EQ(vertices("vertex\n\n2\n"), "v.csv:3: vertex 2 is none of the surface: repair dropped it from the mesh");
   EXPECT_EQ(vertices("vertex\n"), "v.csv: no rows, expected at least one of vertex");
   EXPECT_EQ(vertices(""), "v.csv: no rows, expected at least one of vertex");
-  EXPECT_EQ(forces("# x\n0,0,0,nan\n"), "f.csv:2: column fz is 'nan', expected a finite number");
-  EXPECT_EQ(forces("0,1e999,0,0\n"), "f.csv:1: column fx is '1e999', expected a finite number");
-  EXPECT_EQ(forces("vertex,fx,fy,fz\n0,0,0\n"), "f.csv:2: 3 columns in this row, expected vertex,fx,fy,fz");
-  EXPECT_EQ(forces("0,0,0,\n"), "f.csv:1: column fz is '', expected a finite number");
+  EXPECT_EQ(forces("# x\n0,0,0,nan\n"), "f.csv:2: column fz[N] is 'nan', expected a finite number");
+  EXPECT_EQ(forces("0,1e999,0,0\n"), "f.csv:1: column fx[N] is '1e999', expected a finite number");
+  EXPECT_EQ(forces("vertex,fx,fy,fz\n0,0,0\n"), "f.csv:2: 3 columns in this row, expected vertex,fx[N],fy[N],fz[N]");
+  EXPECT_EQ(forces("0,0,0,\n"), "f.csv:1: column fz[N] is '', expected a finite number");
   EXPECT_EQ(forces("7,0,0,0\n"), "f.csv:1: column vertex is '7', expected a whole number from 0 to 5");
 }
 
@@ -141,8 +142,8 @@ TEST_F(LoadCase, MistakesNameFileAndLine) {
   EXPECT_EQ(refusal("<load vertices='none.csv' force='1 0 0'/>"),
             "case.xml:4: list of vertices \"none.csv\" does not exist");
   EXPECT_EQ(refusal("<load file='none.csv'/>"), "case.xml:4: file of forces \"none.csv\" does not exist");
-  EXPECT_EQ(refusal("<load file='nan.csv'/>"), "nan.csv:2: column fy is 'nan', expected a finite number");
-  EXPECT_EQ(refusal("<load file='far.csv'/>"), "far.csv:1: 1 columns in this row, expected vertex,fx,fy,fz");
+  EXPECT_EQ(refusal("<load file='nan.csv'/>"), "nan.csv:2: column fy[N] is 'nan', expected a finite number");
+  EXPECT_EQ(refusal("<load file='far.csv'/>"), "far.csv:1: 1 columns in this row, expected vertex,fx[N],fy[N],fz[N]");
 }
 
 std::vector<Eigen::Vector3d> verticesOf(const std::string& obj) {

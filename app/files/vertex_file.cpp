@@ -15,12 +15,20 @@ namespace medulla {
 namespace {
 
 constexpr std::array<std::string_view, 1> kVertexColumns = {"vertex"};
-constexpr std::array<std::string_view, 4> kForceColumns = {"vertex", "fx", "fy", "fz"};
+constexpr std::array<std::string_view, 4> kForceColumns = {"vertex", "fx[N]", "fy[N]", "fz[N]"};
 
 std::string joined(std::span<const std::string_view> names) {
   std::string out;
   for (const std::string_view name : names) out.append(out.empty() ? "" : ",").append(name);
   return out;
+}
+
+// A header may leave the units away.
+bool isHeader(std::span<const std::string_view> cells, std::span<const std::string_view> columns) {
+  return std::equal(cells.begin(), cells.end(), columns.begin(), columns.end(),
+                    [](std::string_view cell, std::string_view column) {
+                      return cell == column || cell == column.substr(0, column.find('['));
+                    });
 }
 
 // Calls `row` for every row but a header, with the node of the vertex in its first column.
@@ -30,7 +38,7 @@ void forEachVertex(std::string_view text, const std::string& name, const SoftBod
   CsvRows rows(text, name);
   bool first = true, any = false;
   for (; rows.next(); first = false) {
-    if (first && std::equal(columns.begin(), columns.end(), rows.cells().begin(), rows.cells().end())) continue;
+    if (first && isHeader(rows.cells(), columns)) continue;
     if (rows.cells().size() != columns.size())
       rows.fail(fmt::format("{} columns in this row, expected {}", rows.cells().size(), joined(columns)));
     const int vertex = rows.index(0, columns[0], model.nodeOfInputVertex.size());

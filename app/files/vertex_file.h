@@ -16,7 +16,7 @@ namespace medulla {
 std::vector<int> readVertices(const std::string& path, const SoftBodyModel& model);
 std::vector<int> parseVertices(std::string_view text, const std::string& name, const SoftBodyModel& model);
 
-// vertex,fx,fy,fz per row (the header), N, world frame: a load like `whole` but for its node and force.
+// vertex,fx[N],fy[N],fz[N] per row (the header), world frame: a load like `whole` but for its node and force.
 std::vector<DeadLoad> readVertexForces(const std::string& path, const SoftBodyModel& model, const DeadLoad& whole);
 std::vector<DeadLoad> parseVertexForces(std::string_view text, const std::string& name, const SoftBodyModel& model,
                                         const DeadLoad& whole);
