@@ -346,6 +346,11 @@ Verb addChart(CLI::App& app) {
       ->type_name("MS,MS,...")
       ->delimiter(',')
       ->capture_default_str();
+  a.options.methods = chartMethodNames();
+  c->add_option("--methods", a.options.methods, "curves; the first method's finest run is the reference")
+      ->check(CLI::IsMember(chartMethodNames()))
+      ->delimiter(',')
+      ->capture_default_str();
   c->add_option("--models", a.options.models,
                 "models of the same mesh with other numbers of spheres, for curves of their own (repeatable)")
       ->type_name("[BODY=]FILE")

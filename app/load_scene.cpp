@@ -43,6 +43,13 @@ static void resolveFixes(const Scene& scene, const SoftBodyModel& model, SceneBo
     }
     body.fixedNodes.insert(body.fixedNodes.end(), nodes.begin(), nodes.end());
   }
+  // The nodes of a skin follow their spheres: where none is held, fixing them would do nothing.
+  if (body.surface == SurfaceMode::skin && !body.fixes.empty() && body.fixed.empty())
+    throw inputError(
+        scene.path, body.fixes[0].line,
+        fmt::format("nothing of body \"{}\" is held: its surface is a skin, and no filling sphere has half "
+                    "of its surface in here; expected more of it, or spheres by number",
+                    body.name));
 }
 
 static void resolveLoads(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {

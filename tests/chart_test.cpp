@@ -121,6 +121,7 @@ TEST_F(ChartCommand, BadInputIsRefusedInOneLineAndLeavesNoFolder) {
   refused(chart({"--steps", "nan"}), 2, "--steps nan");
   refused(chart({"--steps", "0"}), 2, "--steps 0");
   refused(chart({"--steps", "60"}), 2, "--steps 60");
+  refused(chart({"--methods", "full,peel"}), 2, "peel");
   refused(chart({"--models", folder / "none.xml"}), 1, "none.xml does not exist");
   refused(chart({"--models", std::string(MEDULLA_SOURCE_DIR) + "/assets/stomach/stomach.model.xml"}), 1,
           "is of another mesh");

@@ -137,6 +137,14 @@ TEST_F(LoadCase, MistakesNameFileAndLine) {
   EXPECT_EQ(refusal("<fix vertices='far.csv'/>"),
             "far.csv:3: column vertex is '235', expected a whole number from 0 to 234");
   EXPECT_EQ(refusal("<fix plane='0 1 0 -5'/>"), "case.xml:4: no surface node of body \"pear\" lies in here");
+  const std::string few = scene("<fix sphere='-0.05 -0.07 0.02 0.012'/>");
+  EXPECT_EQ(complaint([&] { loadScene(readScene(few)); }), "");
+  EXPECT_EQ(complaint([&] {
+              loadScene(readScene(few, {{"body.pear.surface", "skin"}}));
+            }),
+            few +
+                ":4: nothing of body \"pear\" is held: its surface is a skin, and no filling sphere has half of its "
+                "surface in here; expected more of it, or spheres by number");
   EXPECT_EQ(refusal("<load box='5 5 5 6 6 6' force='1 0 0'/>"),
             "case.xml:4: no surface node of body \"pear\" lies in here");
   EXPECT_EQ(refusal("<load vertices='none.csv' force='1 0 0'/>"),

@@ -19,8 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What is charted, a curve each: overrides of the scene, in which * stands for every body. The first is the
-// reference's.
+// What is charted, a curve each: overrides of the scene, in which * stands for every body.
 struct ChartMethod {
   std::string name;
   std::vector<SceneOverride> overrides;
@@ -102,16 +101,18 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
     run.step = 1 / (base.scene.dynamicsRate * count);
     runs.push_back(std::move(run));
   };
-  for (const ChartMethod& method : chartMethods()) {
+  for (const std::string& name : options.methods) {
+    const auto method = std::find_if(chartMethods().begin(), chartMethods().end(),
+                                     [&](const ChartMethod& m) { return m.name == name; });
     for (const std::vector<SceneOverride>& model : models) {
-      ChartRun run{method.name, options.run, 0, 0};
-      for (const auto& overrides : {expanded(method.overrides, base.scene), model})
+      ChartRun run{name, options.run, 0, 0};
+      for (const auto& overrides : {expanded(method->overrides, base.scene), model})
         run.options.overrides.insert(run.options.overrides.end(), overrides.begin(), overrides.end());
       const LoadedScene loaded = loadRun(run.options);
       requireSameMeshes(base, loaded);
       run.spheres = spheresOf(loaded);
       if (models.size() > 1) run.curve += fmt::format("_{}_spheres", run.spheres);
-      if (method.name == chartMethods()[0].name && run.spheres > reference.spheres) reference = run;
+      if (name == options.methods[0] && run.spheres > reference.spheres) reference = run;
       for (const int count : substeps) add(run, count);
     }
   }
@@ -255,6 +256,12 @@ void writeText(const std::string& path, const std::string& text) {
 }
 
 }  // namespace
+
+std::vector<std::string> chartMethodNames() {
+  std::vector<std::string> out;
+  for (const ChartMethod& method : chartMethods()) out.push_back(method.name);
+  return out;
+}
 
 int runChart(const ChartOptions& options) {
   const LoadedScene base = loadRun(options.run);

@@ -59,11 +59,13 @@ struct CompareOptions {
 int runCompare(const CompareOptions& options);
 
 struct ChartOptions {
-  RunOptions run;                   // scene, overrides and trajectories
-  std::string folder;               // for chart.csv, chart.gnuplot and chart.svg; made where missing
-  std::vector<double> steps;        // s, > 0; substeps are whole shares of a dynamics frame, the nearest to these
-  std::vector<std::string> models;  // [BODY=]FILE: of the scene's mesh with other numbers of spheres; empty: its own
+  RunOptions run;                    // scene, overrides and trajectories
+  std::string folder;                // for chart.csv, chart.gnuplot and chart.svg; made where missing
+  std::vector<double> steps;         // s, > 0; substeps are whole shares of a dynamics frame, the nearest to these
+  std::vector<std::string> methods;  // of chartMethodNames(), at least one; the first is the reference's
+  std::vector<std::string> models;   // [BODY=]FILE: of the scene's mesh with other numbers of spheres; empty: its own
 };
+std::vector<std::string> chartMethodNames();
 int runChart(const ChartOptions& options);
 
 int printVersion();
