@@ -345,11 +345,13 @@ Verb addChart(CLI::App& app) {
   c->add_option("--steps", a.steps, "substeps to run with, ms; the nearest whole shares of a dynamics frame are taken")
       ->type_name("MS,MS,...")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->capture_default_str();
   a.options.methods = chartMethodNames();
   c->add_option("--methods", a.options.methods, "curves; the first method's finest run is the reference")
       ->check(CLI::IsMember(chartMethodNames()))
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->capture_default_str();
   c->add_option("--models", a.options.models,
                 "models of the same mesh with other numbers of spheres, for curves of their own (repeatable)")
