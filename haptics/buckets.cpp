@@ -288,9 +288,8 @@ std::string embreeVersion() {
   const auto number = [&](RTCDeviceProperty property) {
     return std::to_string(rtcGetDeviceProperty(device, property));
   };
-  const std::string version = number(RTC_DEVICE_PROPERTY_VERSION_MAJOR) + "." +
-                              number(RTC_DEVICE_PROPERTY_VERSION_MINOR) + "." +
-                              number(RTC_DEVICE_PROPERTY_VERSION_PATCH);
+  std::string version = number(RTC_DEVICE_PROPERTY_VERSION_MAJOR) + "." + number(RTC_DEVICE_PROPERTY_VERSION_MINOR) +
+                        "." + number(RTC_DEVICE_PROPERTY_VERSION_PATCH);
   rtcReleaseDevice(device);
   return version;
 }

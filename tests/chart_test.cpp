@@ -29,6 +29,7 @@ TEST(Chart, TheFrontHoldsWhatNothingBeats) {
   points.back().failedAt = 0.5;
   markFront(points);
   std::vector<bool> front;
+  front.reserve(points.size());
   for (const ChartPoint& p : points) front.push_back(p.onFront);
   EXPECT_EQ(front, (std::vector<bool>{false, true, true, true, false, false, false}));
 }

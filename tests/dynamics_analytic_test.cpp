@@ -172,7 +172,7 @@ TEST(Analytic, FirstAxialFrequencyIsTheChains) {
 TEST(Analytic, FirstBendingFrequencyIsTheBeams) {
   const double beam = 1.875104 * 1.875104 / (2 * std::numbers::pi) * std::sqrt(kYoung * kMoment / (kDensity * kArea)) /
                       (kLength * kLength);
-  double error[2];
+  double error[2] = {1, 1};
   int n = 0;
   for (int links : {6, 12}) {
     BodyDescription body = bar(links, 0);

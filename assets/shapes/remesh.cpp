@@ -78,7 +78,7 @@ static bool split(Remeshing& r, int a, int b) {
   const EdgeSides sides = sidesOf(r.mesh, a, b);
   if (!sides.valid) return false;
   const Vector3d &p = r.mesh.positions[a], &q = r.mesh.positions[b];
-  const Vector3d middle = projectToSurface(r.sdf, 0.5 * (p + q), 0.5 * (p - q).norm());
+  Vector3d middle = projectToSurface(r.sdf, 0.5 * (p + q), 0.5 * (p - q).norm());
   splitEdge(r.mesh, sides, a, b, middle);
   r.relativeLength.push_back(0.5 * (r.relativeLength[a] + r.relativeLength[b]));
   r.onRim.push_back(r.onRim[a] && r.onRim[b]);
@@ -121,7 +121,7 @@ static double sweptVolume(const EditableMesh& mesh, int a, int b, const Vector3d
 // between itself and a flank wears away.
 static Vector3d collapsePosition(const Remeshing& r, int a, int b) {
   const Vector3d &p = r.mesh.positions[a], &q = r.mesh.positions[b];
-  const Vector3d middle = projectToSurface(r.sdf, 0.5 * (p + q), 0.5 * (p - q).norm());
+  Vector3d middle = projectToSurface(r.sdf, 0.5 * (p + q), 0.5 * (p - q).norm());
   if (!r.settings.keepRims) return middle;
   const double atP = sweptVolume(r.mesh, a, b, p), atQ = sweptVolume(r.mesh, a, b, q);
   if (sweptVolume(r.mesh, a, b, middle) < 1.2 * std::min(atP, atQ)) return middle;

@@ -52,6 +52,7 @@ static std::vector<Vector4d> centreLine() {
       {-54.7, -170.3, 48.6}, {-59.5, -168, 40.2},   {-62, -168.5, 30.4},   {-61.9, -170.5, 19.9}, {-58.9, -177.7, 13.2},
       {-58, -188, 12}};
   std::vector<Vector4d> controls;
+  controls.reserve(points.size());
   for (const Vector3d& p : points) controls.emplace_back(p.x(), p.y(), p.z(), radius);
   return controls;
 }
