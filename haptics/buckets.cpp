@@ -205,6 +205,11 @@ void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to) {
   }
 }
 
+static bool isNear(const Bucket& bucket, const Vector3d& centre, double distance) {
+  const double reach = bucket.radius + bucket.inflation + distance;
+  return (centre - bucket.centre).squaredNorm() <= reach * reach;
+}
+
 // Refits where a query gets as far as the bucket's triangles: in a large scene a tool is near a few of hundreds.
 static RTCScene currentScene(Bucket& bucket) {
   if (bucket.stale) {
@@ -213,6 +218,11 @@ static RTCScene currentScene(Bucket& bucket) {
     bucket.stale = false;
   }
   return bucket.scene;
+}
+
+void Buckets::refitNear(const Vector3d& centre, double distance) {
+  for (Bucket& bucket : data_->buckets)
+    if (isNear(bucket, centre, distance)) currentScene(bucket);
 }
 
 static bool isQueryable(const Vector3d& p) {
@@ -269,8 +279,7 @@ const std::vector<int>& Buckets::near(const Vector3d& centre, double distance) {
   std::vector<int>& found = data_->near;
   found.clear();
   for (Bucket& bucket : data_->buckets) {
-    const double reach = bucket.radius + bucket.inflation + distance;
-    if ((centre - bucket.centre).squaredNorm() > reach * reach) continue;
+    if (!isNear(bucket, centre, distance)) continue;
     RTCPointQuery point{float(centre.x()), float(centre.y()), float(centre.z()), 0,
                         float(distance * boundsFactor + boundsMargin)};
     RTCPointQueryContext context;

@@ -50,8 +50,10 @@ class Buckets {
   const BlendedSurface& surface() const;
 
   // The two frames to blend from now on. Bounding spheres are renewed around both; a bucket's triangles are refitted by
-  // the first query that reaches them.
+  // refitNear(), or else by the first query that reaches them.
   void commit(const DynamicsFrame& from, const DynamicsFrame& to);
+  // Those of the buckets within largestRadius + `distance` (m) of `centre`: so that queries need not.
+  void refitNear(const Eigen::Vector3d& centre, double distance);
 
   // First touch of a sphere that moves from `centre` to `centre + motion` while the surface stands at alpha; of equal
   // times the lowest triangle. Finite input within toolReach is asserted: Embree would abort the process on NaN.

@@ -188,9 +188,14 @@ static void startFrame(Tool& tool) {
 }
 
 void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to) {
+  constexpr double kTravel = 0.02;  // m that a tool moves in a frame at 1 m/s and 50 Hz
   data_->buckets.commit(from, to);
   data_->alpha = 0;
-  for (Tool& tool : data_->tools) startFrame(tool);
+  for (Tool& tool : data_->tools) {
+    startFrame(tool);
+    const Vector3d& centre = tool.proxy.centre;
+    data_->buckets.refitNear(centre, (tool.device.position - centre).norm() + kTravel);
+  }
 }
 
 namespace {

@@ -43,12 +43,14 @@ class Servo {
   Servo(Servo&&) noexcept;
   Servo& operator=(Servo&&) noexcept;
 
-  // Dynamics side, after each dynamics frame: the two frames to blend from now on, and the buckets refitted around
-  // both. Keeps references' contents by copy. `from` is the `to` of the last commit, and alpha had reached 1.
+  // Dynamics side, after each dynamics frame: the two frames to blend from now on. The triangle buckets near the
+  // tools are refitted around both. Keeps references' contents by copy. `from` is the `to` of the last commit, and
+  // alpha had reached 1.
   void commit(const DynamicsFrame& from, const DynamicsFrame& to);
 
-  // One servo tick at the blend alpha (0..1], not falling between commits, for one sample per tool. Never allocates,
-  // never locks. Throws std::runtime_error naming the tool whose device is not finite or beyond toolReach.
+  // One servo tick at the blend alpha (0..1], not falling between commits, for one sample per tool. Never allocates
+  // and never locks, unless a tool jumps to buckets that the last commit left alone: Embree then refits them here.
+  // Throws std::runtime_error naming the tool whose device is not finite or beyond toolReach.
   void tick(double alpha, const std::vector<ToolSample>& inputs);
 
   const std::vector<ToolState>& tools() const;

@@ -18,12 +18,6 @@ struct RigidMotion {
   Lanes centre, linear, angular;
 };
 
-Quad quadFrom(Lanes a) {
-  Quad q;
-  store(q, a);
-  return q;
-}
-
 // One pass: sums about the body's first sphere, moved to the centre of mass by Steiner's theorem.
 RigidMotion rigidMotionOf(const Spheres& s, const BodyRange& r) {
   const Lanes reference = load(s.position[r.firstSphere]), zero = splat(0);
@@ -52,8 +46,8 @@ RigidMotion rigidMotionOf(const Spheres& s, const BodyRange& r) {
   Matrix3d inertia;
   inertia << trace - moved[0], -q[0], -q[2], -q[0], trace - moved[1], -q[1], -q[2], -q[1], trace - moved[2];
   inertia.diagonal().array() += regular;
-  const Vector3d about = vectorOf(quadFrom(angularMomentum - crossProduct(centre, momentum)));
-  motion.angular = load(quadOf(inertia.ldlt().solve(about)));
+  const Lanes about = angularMomentum - crossProduct(centre, momentum);
+  motion.angular = load(quadOf(inertia.ldlt().solve(Vector3d(about[0], about[1], about[2]))));
   return motion;
 }
 
