@@ -35,6 +35,7 @@ struct SceneLoad {
 struct SceneBody {
   int line = 0;
   SurfaceMode surface = SurfaceMode::full;
+  LinkModel links = LinkModel::beam;
   std::string name, modelPath, look;
   Tissue tissue;
   LinkFactors factors;

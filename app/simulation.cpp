@@ -17,8 +17,8 @@ static World makeWorld(const LoadedScene& loaded) {
   std::vector<BodyDescription> bodies;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const SceneBody& body = scene.bodies[b];
-    bodies.push_back({body.name, loaded.models[b], body.tissue, body.factors, body.surface, body.worldFromModel,
-                      body.fixed, body.fixedNodes, body.driven, body.neighbours, body.deadLoads});
+    bodies.push_back({body.name, loaded.models[b], body.tissue, body.factors, body.surface, body.links,
+                      body.worldFromModel, body.fixed, body.fixedNodes, body.driven, body.neighbours, body.deadLoads});
   }
   std::vector<StaticShape> statics;
   for (std::size_t k = 0; k < scene.statics.size(); ++k) {

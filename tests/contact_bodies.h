@@ -23,7 +23,7 @@ inline std::shared_ptr<SoftBodyModel> ballModel(const std::vector<BallAndRadius>
   model->name = "balls";
   for (const BallAndRadius& b : balls) {
     FillingSphere s;
-    s.restBallCentre = s.restFrame = b.centre;
+    s.restBallCentre = s.restFrame = s.restLinkEnd = b.centre;
     s.radius = b.radius;
     s.volume = 4.0 / 3 * std::numbers::pi * b.radius * b.radius * b.radius;
     s.secondMoment = s.volume * b.radius * b.radius / 5 * Matrix3d::Identity();

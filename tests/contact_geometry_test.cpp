@@ -156,7 +156,7 @@ TriangleMesh groove() {
 }  // namespace
 
 TEST(StaticShapes, EachHoldsABallOnItsSurface) {
-  const double depth = 9.81 * 0.001 * 0.001 / (std::numbers::pi * std::numbers::pi / 4), r = 0.01 - depth;
+  const double depth = 9.81 * 0.001 * 0.001 / (std::numbers::pi * std::numbers::pi), r = 0.01 - depth;
   const auto check = [&](const StaticShape& shape, const Vector3d& above, double height, const char* name) {
     const Vector3d up = shape.worldFromShape.linear() * above.normalized();
     const Vector3d place = shape.worldFromShape * above;
@@ -184,7 +184,7 @@ TEST(StaticShapes, ABallInAGrooveRestsOnBothSides) {
   mesh.friction = 0;
   mesh.mesh = groove();
   const Vector3d rest = restingPlace(mesh, {0.01, 0.04, 0}, -Vector3d::UnitY());
-  const double depth = 9.81 * 1e-6 / (std::numbers::pi * std::numbers::pi / 4) / std::numbers::sqrt2;
+  const double depth = 9.81 * 1e-6 / (std::numbers::pi * std::numbers::pi) / std::numbers::sqrt2;
   EXPECT_NEAR(rest.x(), 0, 1e-6);
   EXPECT_NEAR(rest.y(), (0.01 - depth) * std::numbers::sqrt2, 1e-7);
 }

@@ -17,7 +17,7 @@ using synthetic::ballModel;
 namespace {
 
 constexpr double kRadius = 0.01, kGravity = 9.81;
-constexpr double kOmegaTimesStep = std::numbers::pi / 2;  // contact_solve.cpp
+constexpr double kOmegaTimesStep = std::numbers::pi;  // contact_solve.cpp
 
 WorldSettings settings(ContactMode mode, double step, Vector3d gravity = Vector3d::Zero()) {
   WorldSettings s;
@@ -338,6 +338,7 @@ TEST(Contact, AHeapInABowlComesToRest) {
       BodyDescription& b = bodies.emplace_back(synthetic::body(k % 3 == 2 ? lump : rod, 5e3));
       b.tissue.damping = 0.3;
       b.surface = SurfaceMode::skin;
+      b.links = LinkModel::springs;
       b.worldFromModel.translation() = Vector3d(-0.03, -0.05 + 0.06 * k, 0.02 * random.uniform());
       b.worldFromModel.linear() = Eigen::AngleAxisd(0.5 * random.uniform(), Vector3d::UnitY()).toRotationMatrix();
     }

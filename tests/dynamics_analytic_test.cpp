@@ -13,7 +13,7 @@ constexpr double kLength = 0.1, kRadius = 0.01, kYoung = 5e3, kDensity = 1000;
 const double kArea = std::numbers::pi * kRadius * kRadius, kMoment = kArea * kRadius * kRadius / 4;
 
 // A bar along x of `links` equal links, clamped at sphere 0, masses in the spheres, half cells at the ends.
-static BodyDescription bar(int links, double damping) {
+static BodyDescription bar(int links, double damping, LinkModel linkModel) {
   auto model = synthetic::chainModel(synthetic::straightTube(links + 1, kLength, kRadius, 4 * links, 8));
   for (FillingSphere* s : {&model->spheres.front(), &model->spheres.back()}) {
     s->volume /= 2;
@@ -21,6 +21,7 @@ static BodyDescription bar(int links, double damping) {
   }
   BodyDescription b = synthetic::body(model, kYoung, {{0, FixedFreedom::all}});
   b.surface = SurfaceMode::skin;
+  b.links = linkModel;
   b.tissue.density = kDensity;
   b.tissue.damping = damping;
   return b;
@@ -44,7 +45,7 @@ static void settle(World& world, double seconds) {
 TEST(Analytic, AHangingChainStretchesLinkByLink) {
   constexpr int links = 6;
   constexpr double g = 9.81;
-  World world(under({g, 0, 0}), {bar(links, 1)});
+  World world(under({g, 0, 0}), {bar(links, 1, LinkModel::springs)});
   settle(world, 4);
   const double k = kYoung * kArea / (kLength / links), cell = kDensity * kArea * kLength / links;
   double expected = 0;
@@ -59,7 +60,7 @@ TEST(Analytic, AHangingChainStretchesLinkByLink) {
 
 TEST(Analytic, AnEndLoadStretchesABarLinkByLink) {
   for (int links : {1, 3, 6}) {
-    BodyDescription body = bar(links, 1);
+    BodyDescription body = bar(links, 1, LinkModel::springs);
     // The last ring hangs on the last link, the pole on the last sphere. Each link is a spring EA / l; what hangs at
     // `along` of the last link loads its far end by that share.
     const int pole = static_cast<int>(body.model->restNodes.size()) - 1;
@@ -103,7 +104,7 @@ static double discreteTip(int links, const std::vector<double>& weight) {
 TEST(Analytic, ACantileverBendsLikeEulerBernoulli) {
   for (int links : {2, 4, 8}) {
     constexpr double g = 0.02;  // small: linear
-    BodyDescription body = bar(links, 1);
+    BodyDescription body = bar(links, 1, LinkModel::springs);
     World world(under({0, -g, 0}), {body});
     settle(world, 80);
     std::vector<double> weight, tipOnly(links + 1, 0);
@@ -119,9 +120,42 @@ TEST(Analytic, ACantileverBendsLikeEulerBernoulli) {
   }
 }
 
+// EA/3 (x - 1/x^2) = F on every link: neo-Hookean, incompressible.
+TEST(Analytic, AHangingBeamStretchesAsRubberDoes) {
+  constexpr int links = 6;
+  constexpr double g = 200;  // stretches of up to 1.9
+  World world(under({g, 0, 0}), {bar(links, 1, LinkModel::beam)});
+  settle(world, 4);
+  const double cell = kDensity * kArea * kLength / links;
+  double expected = 0;
+  for (int i = 0; i < links; ++i) {
+    const double pull = (links - i - 0.5) * cell * g / (kYoung * kArea);
+    double x = 1;
+    for (int k = 0; k < 50; ++k) x -= ((x - 1 / (x * x)) / 3 - pull) / ((1 + 2 / (x * x * x)) / 3);
+    expected += kLength / links * x;
+    EXPECT_NEAR(world.data().spheres.position[i + 1].v[0], expected, 1e-6 * expected) << "sphere " << i + 1;
+  }
+}
+
+// With coupled ends the chain is exact at its nodes: weights there bend it as they would the continuous beam.
+TEST(Analytic, ABeamOfCoupledLinksIsExactAtItsNodes) {
+  for (int links : {2, 4, 8}) {
+    constexpr double g = 0.02;  // small: linear
+    const BodyDescription body = bar(links, 1, LinkModel::beam);
+    World world(under({0, -g, 0}), {body});
+    settle(world, 80);
+    double expected = 0;
+    for (int i = 0; i <= links; ++i) {
+      const double x = i * kLength / links, weight = kDensity * body.model->spheres[i].volume * g;
+      expected += weight * x * x * (3 * kLength - x) / (6 * kYoung * kMoment);
+    }
+    EXPECT_NEAR(-tip(world).y(), expected, 1e-3 * expected) << links;
+  }
+}
+
 TEST(Analytic, ACoupleTwistsLinearlyThroughWholeTurns) {
   constexpr int links = 3;
-  BodyDescription body = bar(links, 0);
+  BodyDescription body = bar(links, 0, LinkModel::springs);
   World world(under(Vector3d::Zero()), {body});
   WorldData& d = world.data();
   const double perAngle = kYoung / (2 * (1 + body.tissue.poisson)) * 2 * kMoment / kLength;  // GJ/L
@@ -158,7 +192,7 @@ TEST(Analytic, FirstAxialFrequencyIsTheChains) {
   constexpr int links = 8;
   WorldSettings settings = under(Vector3d::Zero(), 10);
   settings.frameDuration = 0.002;
-  World world(settings, {bar(links, 0)});
+  World world(settings, {bar(links, 0, LinkModel::springs)});
   for (int i = 1; i <= links; ++i)  // its first mode
     world.data().spheres.velocity[i].v[0] = 0.01 * std::sin(std::numbers::pi * i / (2 * links));
   const double k = kYoung * kArea / (kLength / links), m = kDensity * kArea * kLength / links;
@@ -175,7 +209,7 @@ TEST(Analytic, FirstBendingFrequencyIsTheBeams) {
   double error[2] = {1, 1};
   int n = 0;
   for (int links : {6, 12}) {
-    BodyDescription body = bar(links, 0);
+    BodyDescription body = bar(links, 0, LinkModel::springs);
     error[n++] = lowestFrequency(body, bodyMechanics(body)) / (2 * std::numbers::pi) / beam - 1;
   }
   EXPECT_LT(std::abs(error[0]), 0.06);  // lumped masses and 2EI/L: -4 % at 6 links
@@ -185,7 +219,7 @@ TEST(Analytic, FirstBendingFrequencyIsTheBeams) {
 TEST(Analytic, TheLowestModeSwingsAndDecaysAsAsked) {
   constexpr int links = 4;
   constexpr double ratio = 0.05;
-  BodyDescription body = bar(links, ratio);
+  BodyDescription body = bar(links, ratio, LinkModel::springs);
   const double frequency = lowestFrequency(body, bodyMechanics(body)) / (2 * std::numbers::pi);
   World world(under({0, -0.02, 0}), {body});
   settle(world, 20);  // bends; then let go
@@ -218,7 +252,7 @@ TEST(Analytic, TheLowestModeSwingsAndDecaysAsAsked) {
 TEST(Analytic, AFixedPointSwingsLikeAPendulum) {
   // Translation alone fixed: a stiff bar swings about its first sphere, T = 2 pi sqrt(I / m g l) for small angles.
   constexpr int links = 2;
-  BodyDescription body = bar(links, 0);
+  BodyDescription body = bar(links, 0, LinkModel::springs);
   body.tissue.young = 1e5;
   body.fixed = {{0, FixedFreedom::translation}};
   World world(under({9.81, 0, 0}), {body});
@@ -239,7 +273,7 @@ TEST(Analytic, AFixedPointSwingsLikeAPendulum) {
 
 TEST(Analytic, TheStepConvergesAtFirstOrder) {
   const auto tipAfter = [](int substeps) {
-    BodyDescription body = bar(4, 0.1);
+    BodyDescription body = bar(4, 0.1, LinkModel::springs);
     body.surface = SurfaceMode::full;
     World world(under({0, -0.5, 0}, substeps), {body});
     settle(world, 0.2);

@@ -11,6 +11,8 @@ static World bareChain(int spheres, SurfaceMode surface, double damping) {
   // Unequal sections and factors: no symmetry hides a wrong axis.
   auto model = std::make_shared<SoftBodyModel>(*b.model);
   for (ElasticLink& l : model->links) l.bendingMomentV *= 1.7;
+  model->spheres.front().restLinkEnd += Vector3d(-0.004, 0.002, 0.001);  // links end off their frames
+  model->spheres.back().restLinkEnd += Vector3d(0.003, -0.001, 0.002);
   b.model = model;
   b.surface = surface;
   b.tissue.damping = damping;

@@ -87,7 +87,7 @@ TEST(LinkSections, StraightTubeGivesItsBeam) {
     EXPECT_NEAR(link.bendingMomentU / (pi * std::pow(radius, 4) / 4), 1, 0.03);
     EXPECT_NEAR(link.bendingMomentV / (pi * std::pow(radius, 4) / 4), 1, 0.03);
     EXPECT_NEAR(link.torsionConstant / (pi * std::pow(radius, 4) / 2), 1, 0.03);
-    const Vector3d line = model.spheres[link.sphere1].restFrame - model.spheres[link.sphere0].restFrame;
+    const Vector3d line = model.spheres[link.sphere1].restLinkEnd - model.spheres[link.sphere0].restLinkEnd;
     EXPECT_NEAR(link.restU.norm(), 1, 1e-12);
     EXPECT_NEAR(link.restU.dot(line.normalized()), 0, 1e-12);
   }
@@ -123,7 +123,7 @@ static void expectSound(const SoftBodyModel& model, const BuildReport& report) {
     EXPECT_GT(a.along, 0);
     EXPECT_LT(a.along, 1);
     const ElasticLink& link = model.links[a.host];
-    const Vector3d line = model.spheres[link.sphere1].restFrame - model.spheres[link.sphere0].restFrame;
+    const Vector3d line = model.spheres[link.sphere1].restLinkEnd - model.spheres[link.sphere0].restLinkEnd;
     EXPECT_NEAR(a.restOffset.dot(line.normalized()), 0, 1e-12);
   }
   for (const ElasticLink& link : model.links) {

@@ -22,8 +22,8 @@ SoftBodyModel smallModel() {
   m.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
   m.edges = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
   const Eigen::Matrix3d moment = Eigen::Vector3d(1e-11 / 3, 2e-11, 3e-11).asDiagonal();
-  m.spheres = {{{0.1, 0.1, 0.1}, 0.05, {0.1, 0.2, 0}, 1e-5 / 7, moment},
-               {{0.1, 0.1, 0.6}, 0.01, {0.1, 0.2, 0.5}, 2e-5, 2 * moment}};
+  m.spheres = {{{0.1, 0.1, 0.1}, 0.05, {0.1, 0.2, 0}, {0.1, 0.25, 0}, 1e-5 / 7, moment},
+               {{0.1, 0.1, 0.6}, 0.01, {0.1, 0.2, 0.5}, {0.1, 0.25, 1. / 3}, 2e-5, 2 * moment}};
   m.links = {{0, 1, 1e-4, 1e-9, 2e-9, 3e-9, Eigen::Vector3d(std::sqrt(0.5), std::sqrt(0.5), 0)}};
   m.attachments = {{false, 0, 0, {-0.1, -0.2, 0}, 1e-3, 1e-7},
                    {true, 0, 0.25, {0.2, -0.2, 0}, 1e-3, 0},
@@ -93,6 +93,7 @@ TEST_F(ModelFile, ReadingGivesTheSameBits) {
     EXPECT_TRUE(sameBits(a.spheres[k].restBallCentre, b.spheres[k].restBallCentre));
     EXPECT_TRUE(sameBits(a.spheres[k].radius, b.spheres[k].radius));
     EXPECT_TRUE(sameBits(a.spheres[k].restFrame, b.spheres[k].restFrame));
+    EXPECT_TRUE(sameBits(a.spheres[k].restLinkEnd, b.spheres[k].restLinkEnd));
     EXPECT_TRUE(sameBits(a.spheres[k].volume, b.spheres[k].volume));
     EXPECT_TRUE(sameBits(a.spheres[k].secondMoment, b.spheres[k].secondMoment));
   }
@@ -141,8 +142,8 @@ TEST_F(ModelFile, MistakesNameTheLineAndWhatIsWrong) {
   const struct {
     std::string from, to, complaint;
   } mistakes[] = {
-      {"version=\"2\"", "version=\"1\"",
-       R"(m.xml:2: <model> version="1": expected 2; make the model anew with medulla build)"},
+      {"version=\"3\"", "version=\"1\"",
+       R"(m.xml:2: <model> version="1": expected 3; make the model anew with medulla build)"},
       {"fedcba9876543210", "fedc", R"(m.xml:2: <model> mesh_hash="fedc": expected 16 hexadecimal digits)"},
       {"<edges", "<egdes", "m.xml:23: broken XML: an element is not closed where it was opened"},
       {" name=\"a", " nam=\"a", R"(m.xml:2: <model> has no attribute "nam"; did you mean "name"?)"},

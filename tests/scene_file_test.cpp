@@ -225,7 +225,7 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {"0.1 0.2 0.3", "0.1,0.2,0.3", R"(x.xml:10: <body> position="0.1,0.2,0.3": expected 3 numbers)"},
       {"0.707 0 0.707 0", "0.7 0 0.7 0",
        R"(x.xml:11: <body> orientation="0.7 0 0.7 0": expected a unit quaternion w x y z (length within 1e-3 of 1))"},
-      {"\"springs\"", "\"beam\"", R"(x.xml:11: <body> links="beam": unknown value; known: "springs")"},
+      {"\"springs\"", "\"ropes\"", R"(x.xml:11: <body> links="ropes": unknown value; known: "beam", "springs")"},
       {"\"skin\"", "\"contact\"", R"(x.xml:11: <body> surface="contact": unknown value; known: "full", "skin")"},
       {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4\"", R"(x.xml:16: <fix> box="0 1 2 3 4": expected 6 numbers)"},
       {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4 1\"",

@@ -142,7 +142,7 @@ inline std::shared_ptr<SoftBodyModel> chainModel(const Tube& tube, double surfac
     const Vector3d t = (after - before).normalized();
     const double length = (after - before).norm() * (i == 0 || i == n - 1 ? 1 : 0.5), r = tube.radius[i];
     FillingSphere s;
-    s.restBallCentre = s.restFrame = tube.centre[i];
+    s.restBallCentre = s.restFrame = s.restLinkEnd = tube.centre[i];
     s.radius = r;
     s.volume = std::numbers::pi * r * r * length;
     s.secondMoment =
@@ -183,7 +183,7 @@ inline std::shared_ptr<SoftBodyModel> slab() {
   for (int y = 0; y < rows; ++y) {
     for (int x = 0; x < columns; ++x) {
       FillingSphere s;
-      s.restBallCentre = s.restFrame = pitch * Vector3d(x, y, 0);
+      s.restBallCentre = s.restFrame = s.restLinkEnd = pitch * Vector3d(x, y, 0);
       s.radius = thickness;
       s.volume = pitch * pitch * 2 * thickness;
       s.secondMoment = s.volume / 12 *

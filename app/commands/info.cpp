@@ -63,6 +63,7 @@ void addBody(const SceneBody& body, const SoftBodyModel& model, std::vector<Resu
   add("young", text(body.tissue.young), "Pa");
   add("poisson", text(body.tissue.poisson), "");
   add("damping", text(body.tissue.damping), "");
+  add("link_model", body.links == LinkModel::beam ? "beam" : "springs", "");
   add("surface", body.surface == SurfaceMode::full ? "full" : "skin", "");
   add("look", body.look, "");
   add("fixed_spheres", text(body.fixed.size()), "");

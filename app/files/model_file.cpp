@@ -18,7 +18,7 @@ namespace medulla {
 
 namespace {
 
-constexpr int formatVersion = 2;
+constexpr int formatVersion = 3;
 
 const XmlRules& modelRules() {
   static const XmlRules rules = [] {
@@ -99,7 +99,7 @@ void putArray(std::string& out, const char* name, const std::vector<T>& values) 
 void putVolumeModel(std::string& out, const SoftBodyModel& model) {
   putRows(out, "spheres", model.spheres.size(), [&](std::size_t k) {
     const FillingSphere& s = model.spheres[k];
-    put(out, s.restBallCentre, s.radius, s.restFrame, s.volume, s.secondMoment);
+    put(out, s.restBallCentre, s.radius, s.restFrame, s.restLinkEnd, s.volume, s.secondMoment);
   });
   putRows(out, "links", model.links.size(), [&](std::size_t k) {
     const ElasticLink& l = model.links[k];
@@ -250,7 +250,7 @@ void readSpheres(const std::string& path, const XmlElement& root, SoftBodyModel&
   Rows rows(path, root, "spheres");
   rows.forEach([&] {
     FillingSphere& s = model.spheres.emplace_back();
-    rows.get(s.restBallCentre, s.radius, s.restFrame, s.volume, s.secondMoment);
+    rows.get(s.restBallCentre, s.radius, s.restFrame, s.restLinkEnd, s.volume, s.secondMoment);
     rows.require(s.radius > 0, "a radius that is not positive");
     rows.require(s.volume > 0, "a volume that is not positive");
     rows.require(s.secondMoment.isApprox(s.secondMoment.transpose(), 1e-9), "a second moment that is not symmetric");
@@ -266,7 +266,7 @@ void readLinks(const std::string& path, const XmlElement& root, SoftBodyModel& m
     l.sphere0 = rows.index(model.spheres.size());
     l.sphere1 = rows.index(model.spheres.size());
     rows.get(l.area, l.bendingMomentU, l.bendingMomentV, l.torsionConstant, l.restU);
-    const Eigen::Vector3d line = model.spheres[l.sphere1].restFrame - model.spheres[l.sphere0].restFrame;
+    const Eigen::Vector3d line = model.spheres[l.sphere1].restLinkEnd - model.spheres[l.sphere0].restLinkEnd;
     rows.require(line.norm() > 0, "a link without length");
     rows.require(l.area > 0, "an area that is not positive");
     rows.require(l.bendingMomentU > 0 && l.bendingMomentV > 0, "a bending moment that is not positive");

@@ -264,7 +264,7 @@ void readBodies(const XmlElement& root, Scene& scene) {
     body.modelPath = readPath(*e, "model", scene.path);
     body.look = readText(*e, "look");
     body.tissue = findTissue(*e, tissues);
-    readChoice(*e, "links", {"springs"}, 0);
+    body.links = readChoice(*e, "links", {"beam", "springs"}, 0) == 0 ? LinkModel::beam : LinkModel::springs;
     body.surface = readChoice(*e, "surface", {"full", "skin"}, 0) == 0 ? SurfaceMode::full : SurfaceMode::skin;
     body.worldFromModel = readPlacement(*e);
     readFixations(*e, scene.path, body);

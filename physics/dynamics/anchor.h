@@ -23,7 +23,7 @@ inline Lanes3 velocityAt(const Anchor& a, const Lanes3& lever) {
 // One link's frame, the same in all lanes.
 struct LinkHost {
   Lanes3 origin, line, originVelocity, lineVelocity, n, axisU, axisV, turning;
-  Lanes spin0, spinAlong, twist;
+  Lanes spin0, spinAlong, twist, thickness, thicknessRate;
 };
 
 inline LinkHost linkHost(const WorldData& d, int link) {
@@ -41,11 +41,13 @@ inline LinkHost linkHost(const WorldData& d, int link) {
   h.spin0 = splat(f.spin0[lane]);
   h.spinAlong = splat(f.spinAlong[lane]);
   h.twist = splat(f.twist[lane]);
+  h.thickness = splat(f.thickness[lane]);
+  h.thicknessRate = splat(f.thicknessRate[lane]);
   return h;
 }
 
 // The point at `along` of the centre line, slid with its stretch, plus the offset in the frame of sphere 0 carried onto
-// the line and twisted by along * twist: the torsion is shared along the link.
+// the line, twisted by along * twist (the torsion is shared along the link) and as much shorter as the link is thinner.
 inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   Lanes c, s;
   const Lanes angle = g.along * h.twist;
@@ -54,12 +56,14 @@ inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   } else {
     smallCosineSine(angle, c, s);
   }
+  c = c * h.thickness;
+  s = s * h.thickness;
   Anchor a;
   a.base = fma(g.along, h.line, h.origin);
-  a.baseVelocity = fma(g.along, h.lineVelocity, h.originVelocity);
   a.omega = fma(fma(g.along, h.spinAlong, h.spin0), h.n, h.turning);
   a.offset =
       fma(fnma(g.restOffset.z, s, g.restOffset.y * c), h.axisU, fma(g.restOffset.y, s, g.restOffset.z * c) * h.axisV);
+  a.baseVelocity = fma(h.thicknessRate, a.offset, fma(g.along, h.lineVelocity, h.originVelocity));
   return a;
 }
 

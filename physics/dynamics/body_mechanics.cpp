@@ -85,7 +85,7 @@ void checkDescription(const BodyDescription& body) {
 }
 
 Vector3d centreLine(const SoftBodyModel& m, const ElasticLink& l) {
-  return m.spheres[l.sphere1].restFrame - m.spheres[l.sphere0].restFrame;
+  return m.spheres[l.sphere1].restLinkEnd - m.spheres[l.sphere0].restLinkEnd;
 }
 
 std::vector<LinkStiffness> linkStiffness(const BodyDescription& body) {
@@ -97,9 +97,15 @@ std::vector<LinkStiffness> linkStiffness(const BodyDescription& body) {
             fmt::format("its model's spheres {} and {} are linked and lie in one point", l.sphere0, l.sphere1));
     LinkStiffness k;
     k.elongation = body.factors.elongation * e * l.area / length;
-    // 2EI/L per end: the springs of the two ends act in series and together bend like a beam of the link's length.
-    k.flexionU = body.factors.flexion * 2 * e * l.bendingMomentU / length;
-    k.flexionV = body.factors.flexion * 2 * e * l.bendingMomentV / length;
+    // Springs: 2EI/L per end, which act in series and together bend like a beam of the link's length. Beam: EI/L
+    // [[4, 2], [2, 4]] (Euler and Bernoulli), the same in pure bending, and right where the moment varies as well.
+    const bool beam = body.links == LinkModel::beam;
+    const double u = body.factors.flexion * e * l.bendingMomentU / length,
+                 v = body.factors.flexion * e * l.bendingMomentV / length;
+    k.flexionU = (beam ? 4 : 2) * u;
+    k.flexionV = (beam ? 4 : 2) * v;
+    k.coupleU = (beam ? 2 : 0) * u;
+    k.coupleV = (beam ? 2 : 0) * v;
     k.torsion = body.factors.torsion * shear * l.torsionConstant / length;
     out.push_back(k);
   }

@@ -10,7 +10,8 @@ namespace medulla {
 
 struct LinkStiffness {
   double elongation = 0;              // N/m
-  double flexionU = 0, flexionV = 0;  // N m/rad about U, about V, of the spring at either end
+  double flexionU = 0, flexionV = 0;  // N m/rad about U, about V: moment at an end per flexion there
+  double coupleU = 0, coupleV = 0;    // N m/rad: moment at an end per flexion at the other; 0 of springs
   double torsion = 0;                 // N m/rad
 };
 

@@ -13,9 +13,9 @@ namespace medulla {
 
 namespace {
 
-// As stiff as the substep resolves: a quarter of a period is one substep. What rests on a contact sinks in by
-// acceleration / omega^2, micrometres.
-constexpr double kOmegaTimesStep = 1.5707963267948966;
+// Half a period is one substep: implicit, so that any value is stable, and stiff because a light sphere may have to bear
+// a whole heap. What rests on a contact sinks in by acceleration / omega^2, micrometres.
+constexpr double kOmegaTimesStep = 3.141592653589793;
 // Critical. Restitution comes out as 0.05: tissue does not bounce off tissue.
 constexpr double kDampingRatio = 1;
 // m/s: bodies that overlap at the start part no faster than this.
@@ -123,7 +123,11 @@ bool prepare(const WorldData& d, Contact& c) {
     double inverseCells = 0;
     for (int e = 0; e < c.ends; ++e) inverseCells += c.weight[e] * c.weight[e] * d.contact.inverseCellMass[c.sphere[e]];
     c.softness = kGammaTimesMass * inverseCells;
-    c.bias = std::max(kBetaTimesStep / h * c.gap, -kPushOutSpeed);
+    c.bias = kBetaTimesStep / h * c.gap;
+    if (c.bias < -kPushOutSpeed) {  // the softness shrinks likewise: the load at which v = 0 stays the spring's, k g
+      c.softness *= -kPushOutSpeed / c.bias;
+      c.bias = -kPushOutSpeed;
+    }
   }
   c.mobility[0] = mobilityAlong(d, c, c.normal);
   c.normalMobility = dotProduct(c.mobility[0], c.normal);

@@ -51,10 +51,15 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
   const SoftBodyModel& m = *body.model;
   for (std::size_t i = 0; i < m.links.size(); ++i) {
     const int k = d.links.count++, lane = k % 4;
-    if (lane == 0) d.links.groups.emplace_back();
+    if (lane == 0) d.links.groups.push_back(LinkGroup{});
     LinkGroup& g = d.links.groups.back();
     const ElasticLink& link = m.links[i];
-    const Vector3d line = m.spheres[link.sphere1].restFrame - m.spheres[link.sphere0].restFrame;
+    const FillingSphere &s0 = m.spheres[link.sphere0], &s1 = m.spheres[link.sphere1];
+    const Vector3d line = s1.restLinkEnd - s0.restLinkEnd;
+    const Vector3d arm0 = s0.restLinkEnd - s0.restFrame, arm1 = s1.restLinkEnd - s1.restFrame;
+    const LinkStiffness& stiffness = mechanics.links[i];
+    const bool beam = body.links == LinkModel::beam;
+    g.hasArms = g.hasArms || !arm0.isZero(0) || !arm1.isZero(0);
     const double length = line.norm();
     const Vector3d t = line / length, u = (link.restU - t * t.dot(link.restU)).normalized();
     // The rest of the group becomes copies, overwritten by the links that follow.
@@ -64,11 +69,18 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
       setLane(g.restT, l, t);
       setLane(g.restU, l, u);
       g.restLength[l] = length;
+      g.inverseRestLength[l] = 1 / length;
       g.smallestLength[l] = kSmallestLength * length;
-      g.elongation[l] = mechanics.links[i].elongation;
-      g.flexionU[l] = mechanics.links[i].flexionU;
-      g.flexionV[l] = mechanics.links[i].flexionV;
-      g.torsion[l] = mechanics.links[i].torsion;
+      setLane(g.restArm0, l, arm0);
+      setLane(g.restArm1, l, arm1);
+      g.elongation[l] = stiffness.elongation;
+      g.flexionU[l] = stiffness.flexionU;
+      g.flexionV[l] = stiffness.flexionV;
+      g.torsion[l] = stiffness.torsion;
+      g.couple[l] = 0.5 * (stiffness.coupleV + stiffness.coupleU);
+      g.coupleDifference[l] = 0.5 * (stiffness.coupleV - stiffness.coupleU);
+      g.neoHookean[l] = beam ? 1 : 0;
+      g.thinning[l] = beam ? 2 * body.tissue.poisson : 0;
       g.relaxation[l] = mechanics.linkRelaxation;
     }
   }
@@ -129,6 +141,8 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   n.position.resize(n.count);
   n.velocity.resize(n.count);
   n.force.resize(n.count);
+  n.displaced.resize(n.count);
+  n.offset.resize(n.count / 4);
   n.mass.resize(n.count, 0);
   n.inverseMass.resize(n.count, 0);
   n.groups.resize(n.count / 4, NodeGroup{});
@@ -170,29 +184,17 @@ void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     const SoftBodyModel& m = *d.bodies[b].model;
     if (d.bodies[b].surface != SurfaceMode::full) continue;
-    SpringRange range{static_cast<int>(s.groups.size()), 0, mechanics[b].surfaceRelaxation};
-    int lane = 3;
     for (const std::size_t e : interleaved(m.edges.size())) {
-      lane = (lane + 1) % 4;
+      const int k = s.count++, lane = k % 4;
       if (lane == 0) s.groups.emplace_back();
       SpringGroup& g = s.groups.back();
       const int n0 = d.ranges[b].node[m.edges[e][0]], n1 = d.ranges[b].node[m.edges[e][1]];
-      const auto offset0 = static_cast<std::uint32_t>(n0 * sizeof(Quad)),
-                 offset1 = static_cast<std::uint32_t>(n1 * sizeof(Quad));
       for (int l = lane; l < 4; ++l) {
-        g.node0[l] = offset0;
-        g.node1[l] = offset1;
-        g.restLength[l] = (m.restNodes[m.edges[e][1]] - m.restNodes[m.edges[e][0]]).norm();
+        g.node0[l] = static_cast<std::uint32_t>(n0 * sizeof(Quad));
+        g.node1[l] = static_cast<std::uint32_t>(n1 * sizeof(Quad));
         g.stiffness[l] = l == lane ? mechanics[b].edgeStiffness[e] : 0;
       }
     }
-    if ((s.groups.size() - range.firstGroup) % 2 == 1) {
-      s.groups.push_back(s.groups.back());
-      s.groups.back().stiffness = splat(0);
-    }
-    s.count += static_cast<int>(m.edges.size());
-    range.endGroup = static_cast<int>(s.groups.size());
-    s.ranges.push_back(range);
   }
 }
 

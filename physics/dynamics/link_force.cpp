@@ -23,14 +23,17 @@ struct LinkMeasures {
   LinkEnd end0, end1;
   Lanes3 axisU, axisV;  // u, v of sphere 0 carried onto n
   Lanes twist;
+  Lanes cosine, sine;  // of the twist
 };
 
 struct SphereLanes {
-  Lanes3 position, velocity, angularVelocity;
+  Lanes3 position, velocity;  // of the link's end
+  Lanes3 angularVelocity, arm;
   Rotation rotation;
 };
 
-MEDULLA_INLINE SphereLanes gatherSpheres(const Spheres& s, const std::uint32_t* i) {
+MEDULLA_INLINE SphereLanes gatherSpheres(const Spheres& s, const std::uint32_t* i, const Lanes3& restArm,
+                                         bool hasArms) {
   SphereLanes out;
   out.position = gather(s.position[i[0]], s.position[i[1]], s.position[i[2]], s.position[i[3]]);
   out.velocity = gather(s.velocity[i[0]], s.velocity[i[1]], s.velocity[i[2]], s.velocity[i[3]]);
@@ -39,6 +42,12 @@ MEDULLA_INLINE SphereLanes gatherSpheres(const Spheres& s, const std::uint32_t* 
   Lanes w;
   const Lanes3 q = gather(s.orientation[i[0]], s.orientation[i[1]], s.orientation[i[2]], s.orientation[i[3]], w);
   out.rotation = rotationOf(q, w);
+  out.arm = restArm;
+  if (hasArms) {
+    out.arm = rotate(out.rotation, restArm);
+    out.position = out.position + out.arm;
+    out.velocity = out.velocity + cross(out.angularVelocity, out.arm);
+  }
   return out;
 }
 
@@ -75,27 +84,89 @@ MEDULLA_INLINE LinkMeasures measure(const LinkGroup& link, const SphereLanes& s0
   m.axisU = carry(m.end0, m.end0.u, m.end0.a);
   m.axisV = carry(m.end0, m.end0.v, m.end0.b);
   const Lanes3 far = carry(m.end1, m.end1.u, m.end1.a);
-  const Lanes wrapped = angleOf(dot(m.axisU, far), dot(m.axisV, far));
+  m.cosine = dot(m.axisU, far);
+  m.sine = dot(m.axisV, far);
+  const Lanes wrapped = angleOf(m.cosine, m.sine);
   m.twist = fma(nearest((unwoundTwist - wrapped) * splat(1 / kTurn)), splat(kTurn), wrapped);
   return m;
 }
 
-// Flexion: the rotation vector from t to n has components -f b on u and f a on v, f = theta / sin(theta). Their
-// gradients with respect to n are f v - b h t and f u - a h t (signs cancel in the energy), h = -df/dcos(theta).
-MEDULLA_INLINE Lanes3 flexionGradient(const LinkGroup& link, const LinkEnd& e, const Lanes3& nRate, const Lanes3& omega,
-                                      const Lanes3& n) {
-  const Lanes3 relative = nRate - cross(omega, n);  // n' as the sphere sees it
+// Flexion at an end: the rotation vector from t to n has components -b on u and a on v, a = f n.u, b = f n.v,
+// f = theta / sin(theta).
+struct Flexion {
+  Lanes a, b;
+};
+
+MEDULLA_INLINE Flexion flexionOf(const LinkEnd& e) {
+  return {e.angle.value * e.a, e.angle.value * e.b};
+}
+
+// Their rates are gradients f v - b h t and f u - a h t (signs cancel in the energy) with h = -df/dcos(theta), times n'
+// as the sphere sees it.
+MEDULLA_INLINE Flexion flexionRate(const LinkEnd& e, const Lanes3& nRate, const Lanes3& omega, const Lanes3& n) {
+  const Lanes3 relative = nRate - cross(omega, n);
   const Lanes alongT = e.angle.slope * dot(e.t, relative);
-  const Lanes rateA = e.angle.value * dot(e.u, relative) - e.a * alongT;
-  const Lanes rateB = e.angle.value * dot(e.v, relative) - e.b * alongT;
-  const Lanes momentA = link.flexionV * fma(link.relaxation, rateA, e.angle.value * e.a);
-  const Lanes momentB = link.flexionU * fma(link.relaxation, rateB, e.angle.value * e.b);
-  return fnma(e.angle.slope * fma(e.a, momentA, e.b * momentB), e.t,
-              fma(e.angle.value * momentA, e.u, (e.angle.value * momentB) * e.v));
+  return {e.angle.value * dot(e.u, relative) - e.a * alongT, e.angle.value * dot(e.v, relative) - e.b * alongT};
+}
+
+// Gradient with respect to n of what has the moments `m` as derivatives by a and b.
+MEDULLA_INLINE Lanes3 flexionGradient(const LinkEnd& e, const Flexion& m) {
+  return fnma(e.angle.slope * fma(e.a, m.a, e.b * m.b), e.t,
+              fma(e.angle.value * m.a, e.u, (e.angle.value * m.b) * e.v));
+}
+
+MEDULLA_INLINE Flexion damped(const Flexion& q, const Flexion& rate, Lanes relaxation) {
+  return {fma(relaxation, rate.a, q.a), fma(relaxation, rate.b, q.b)};
+}
+
+// The two ends' flexions as vectors across the line: their product in space is that of the components, end 1's turned
+// back by the twist. It couples the ends whatever the twist; of unequal stiffnesses about U and V half the difference
+// acts between components as they stand, for want of a plane that both ends share.
+//   energy = 1/2 sum k a^2 + ... + c (cos (a0 a1 + b0 b1) + sin (b0 a1 - a0 b1)) + d (a0 a1 - b0 b1)
+MEDULLA_INLINE Flexion momentsAt0(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1) {
+  const Lanes a = m.cosine * q1.a - m.sine * q1.b, b = fma(m.sine, q1.a, m.cosine * q1.b);
+  return {fma(l.flexionV, q0.a, fma(l.couple, a, l.coupleDifference * q1.a)),
+          fma(l.flexionU, q0.b, l.couple * b - l.coupleDifference * q1.b)};
+}
+MEDULLA_INLINE Flexion momentsAt1(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1) {
+  const Lanes a = fma(m.sine, q0.b, m.cosine * q0.a), b = m.cosine * q0.b - m.sine * q0.a;
+  return {fma(l.flexionV, q1.a, fma(l.couple, a, l.coupleDifference * q0.a)),
+          fma(l.flexionU, q1.b, l.couple * b - l.coupleDifference * q0.b)};
+}
+MEDULLA_INLINE Lanes couplingTorque(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1) {
+  return l.couple * (m.cosine * (q0.b * q1.a - q0.a * q1.b) - m.sine * fma(q0.a, q1.a, q0.b * q1.b));
+}
+
+// Neo-Hookean, incompressible: EA/3 (x - 1/x^2) at the stretch x, of stiffness EA at rest. Shorter than `kLinear` it
+// goes on straight: the law stiffens as 1/x^3 there, and no explicit step would follow.
+constexpr double kLinear = 0.75;
+
+MEDULLA_INLINE Lanes neoHookeanTension(Lanes stretch) {  // over EA
+  const Lanes x = larger(stretch, splat(kLinear)), inverse = splat(1) / x;
+  constexpr double kSlope = (1 + 2 / (kLinear * kLinear * kLinear)) / 3;
+  const Lanes below = splat(kSlope) * (stretch - x);
+  return fma(splat(1.0 / 3), fnma(inverse, inverse, x), below);
+}
+
+double neoHookeanEnergy(double stretch) {  // over EA L
+  const double x = std::max(stretch, kLinear), below = stretch - x;
+  const double tension = (x - 1 / (x * x)) / 3, slope = (1 + 2 / (x * x * x)) / 3;
+  return (x * x / 2 + 1 / x - 1.5) / 3 + tension * below + slope * below * below / 2;
+}
+
+// What hangs on the link thins so that the area across it goes by 1 / (1 + 2 nu (x - 1)) at the stretch x: Poisson's
+// ratio at rest, and constant volume at any stretch for nu = 1/2. x^-nu, which differs by 0.1 % of the thickness at 25
+// %, would need a logarithm and an exponential.
+MEDULLA_INLINE void thin(const LinkGroup& link, Lanes length, Lanes lengthRate, LinkFrame& f) {
+  const Lanes inverseArea = splat(1) / fma(link.thinning, fma(length, link.inverseRestLength, splat(-1)), splat(1));
+  f.thickness = squareRoot(inverseArea);
+  f.thicknessSlope = splat(-0.5) * link.thinning * link.inverseRestLength * inverseArea;
+  f.thicknessRate = f.thicknessSlope * lengthRate;
 }
 
 void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundTwist, LinkFrame& f) {
-  const SphereLanes s0 = gatherSpheres(spheres, link.sphere0), s1 = gatherSpheres(spheres, link.sphere1);
+  const SphereLanes s0 = gatherSpheres(spheres, link.sphere0, link.restArm0, link.hasArms),
+                    s1 = gatherSpheres(spheres, link.sphere1, link.restArm1, link.hasArms);
   const LinkMeasures m = measure(link, s0, s1, load(unwoundTwist));
   store(unwoundTwist, m.twist);
 
@@ -105,16 +176,26 @@ void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundT
   const Lanes spin0 = dot(m.end0.spinAxis, s0.angularVelocity) - dot(m.end0.lever, nRate);
   const Lanes spin1 = dot(m.end1.spinAxis, s1.angularVelocity) - dot(m.end1.lever, nRate);
 
-  const Lanes tension = link.elongation * fma(link.relaxation, lengthRate, m.length - link.restLength);
-  const Lanes3 bend0 = flexionGradient(link, m.end0, nRate, s0.angularVelocity, m.n);
-  const Lanes3 bend1 = flexionGradient(link, m.end1, nRate, s1.angularVelocity, m.n);
+  const Lanes linear = m.length - link.restLength;
+  const Lanes hyper = link.restLength * neoHookeanTension(m.length * link.inverseRestLength);
+  const Lanes tension =
+      link.elongation * fma(link.relaxation, lengthRate, fma(link.neoHookean, hyper - linear, linear));
+  const Flexion still0 = flexionOf(m.end0), still1 = flexionOf(m.end1);
+  const Flexion q0 = damped(still0, flexionRate(m.end0, nRate, s0.angularVelocity, m.n), link.relaxation);
+  const Flexion q1 = damped(still1, flexionRate(m.end1, nRate, s1.angularVelocity, m.n), link.relaxation);
+  const Lanes3 bend0 = flexionGradient(m.end0, momentsAt0(link, m, q0, q1));
+  const Lanes3 bend1 = flexionGradient(m.end1, momentsAt1(link, m, q0, q1));
   const Lanes3 bend = bend0 + bend1;
   const Lanes3 across = fnma(dot(bend, m.n), m.n, bend);
   f.force1 = (splat(0) - tension) * m.n - m.inverseLength * across;
   f.torque0 = cross(m.n, bend0);
   f.torque1 = cross(m.n, bend1);
-  f.twistMoment = link.torsion * fma(link.relaxation, spin1 - spin0, m.twist);
+  f.twistMoment =
+      fma(link.torsion, fma(link.relaxation, spin1 - spin0, m.twist), couplingTorque(link, m, still0, still1));
 
+  thin(link, m.length, lengthRate, f);
+  f.arm0 = s0.arm;
+  f.arm1 = s1.arm;
   f.origin = s0.position;
   f.line = m.line;
   f.originVelocity = s0.velocity;
@@ -133,7 +214,7 @@ void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundT
   f.spinLever1 = m.end1.lever;
   const Lanes zero = splat(0);
   f.loadSum = f.loadAlong = f.loadMoment = {zero, zero, zero};
-  f.loadTwist = zero;
+  f.loadTwist = f.loadThickness = zero;
 }
 
 void storeVectors(const Lanes3& v, Quad& q0, Quad& q1, Quad& q2, Quad& q3) {
@@ -161,11 +242,15 @@ void returnLinkForces(WorldData& d) {
     const Lanes moment0 = f.twistMoment - (twistOfNodes - f.loadTwist);
     const Lanes moment1 = splat(0) - f.twistMoment - f.loadTwist;
     const Lanes3 swing = cross(f.n, f.loadMoment) - moment0 * f.spinLever0 - moment1 * f.spinLever1;
-    const Lanes3 onBoth = fma(f.inverseLength, swing, f.force1);
+    const Lanes3 onBoth = fma(f.inverseLength, swing, fnma(f.thicknessSlope * f.loadThickness, f.n, f.force1));
     const Lanes3 force1 = onBoth - f.loadAlong;
     const Lanes3 force0 = f.loadAlong - f.loadSum - onBoth;
-    const Lanes3 torque0 = fma(moment0, f.spinAxis0, f.torque0);
-    const Lanes3 torque1 = fma(moment1, f.spinAxis1, f.torque1);
+    Lanes3 torque0 = fma(moment0, f.spinAxis0, f.torque0);
+    Lanes3 torque1 = fma(moment1, f.spinAxis1, f.torque1);
+    if (d.links.groups[g].hasArms) {
+      torque0 = torque0 + cross(f.arm0, force0);
+      torque1 = torque1 + cross(f.arm1, force1);
+    }
     Slot* s = &d.links.slots[8 * g];
     storeVectors(force0, s[0].force, s[2].force, s[4].force, s[6].force);
     storeVectors(torque0, s[0].torque, s[2].torque, s[4].torque, s[6].torque);
@@ -179,14 +264,16 @@ double linkEnergy(const WorldData& d) {
   for (int k = 0; k < d.links.count; ++k) {
     const LinkGroup& link = d.links.groups[k / 4];
     const int lane = k % 4;
-    const LinkMeasures m = measure(link, gatherSpheres(d.spheres, link.sphere0), gatherSpheres(d.spheres, link.sphere1),
-                                   load(d.links.unwoundTwist[k / 4]));
-    const Lanes stretch = m.length - link.restLength;
-    const auto squared = [](Lanes a) { return a * a; };
-    Lanes twice = link.elongation * squared(stretch) + link.torsion * squared(m.twist);
-    for (const LinkEnd* e : {&m.end0, &m.end1})
-      twice = twice + squared(e->angle.value) * (link.flexionV * squared(e->a) + link.flexionU * squared(e->b));
-    sum += 0.5 * twice[lane];
+    const LinkMeasures m =
+        measure(link, gatherSpheres(d.spheres, link.sphere0, link.restArm0, link.hasArms),
+                gatherSpheres(d.spheres, link.sphere1, link.restArm1, link.hasArms), load(d.links.unwoundTwist[k / 4]));
+    const Flexion q0 = flexionOf(m.end0), q1 = flexionOf(m.end1);
+    const Flexion m0 = momentsAt0(link, m, q0, q1), m1 = momentsAt1(link, m, q0, q1);
+    const Lanes twice = q0.a * m0.a + q0.b * m0.b + q1.a * m1.a + q1.b * m1.b + link.torsion * m.twist * m.twist;
+    const double rest = link.restLength[lane], length = m.length[lane],
+                 linear = 0.5 * (length - rest) * (length - rest);
+    sum += 0.5 * twice[lane] +
+           link.elongation[lane] * (link.neoHookean[lane] > 0 ? rest * rest * neoHookeanEnergy(length / rest) : linear);
   }
   return sum;
 }

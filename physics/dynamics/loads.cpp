@@ -49,7 +49,8 @@ void addImpulse(WorldData& d, int sphere, const Vector3d& linear, const Vector3d
 struct LinkPoint {
   int sphere0, sphere1;
   double s, inverseLength;
-  Vector3d offset, n, axis0, axis1, lever0, lever1;
+  double thicknessSlope;
+  Vector3d offset, n, axis0, axis1, lever0, lever1, arm0, arm1;
 };
 
 LinkPoint linkPoint(const WorldData& d, int link, int node) {
@@ -68,25 +69,31 @@ LinkPoint linkPoint(const WorldData& d, int link, int node) {
   p.axis1 = lane(f.spinAxis1, l);
   p.lever0 = lane(f.spinLever0, l);
   p.lever1 = lane(f.spinLever1, l);
+  p.thicknessSlope = f.thicknessSlope[l];
+  p.arm0 = lane(f.arm0, l);
+  p.arm1 = lane(f.arm1, l);
   return p;
 }
 
 Vector3d velocityOf(const WorldData& d, const LinkPoint& p) {
-  const Vector3d v0 = vectorOf(d.spheres.velocity[p.sphere0]);
-  const Vector3d line = vectorOf(d.spheres.velocity[p.sphere1]) - v0;
+  const Vector3d omega0 = angularVelocity(d, p.sphere0), omega1 = angularVelocity(d, p.sphere1);
+  const Vector3d v0 = vectorOf(d.spheres.velocity[p.sphere0]) + omega0.cross(p.arm0);
+  const Vector3d line = vectorOf(d.spheres.velocity[p.sphere1]) + omega1.cross(p.arm1) - v0;
   const Vector3d nRate = p.inverseLength * (line - p.n * p.n.dot(line));
-  const double spin0 = p.axis0.dot(angularVelocity(d, p.sphere0)) - p.lever0.dot(nRate);
-  const double spin1 = p.axis1.dot(angularVelocity(d, p.sphere1)) - p.lever1.dot(nRate);
+  const double spin0 = p.axis0.dot(omega0) - p.lever0.dot(nRate);
+  const double spin1 = p.axis1.dot(omega1) - p.lever1.dot(nRate);
   const Vector3d omega = p.n.cross(nRate) + ((1 - p.s) * spin0 + p.s * spin1) * p.n;
-  return v0 + p.s * line + omega.cross(p.offset);
+  return v0 + p.s * line + omega.cross(p.offset) + p.thicknessSlope * p.n.dot(line) * p.offset;
 }
 
 void addImpulse(WorldData& d, const LinkPoint& p, const Vector3d& impulse) {
   const Vector3d moment = p.offset.cross(impulse);
   const double twist0 = (1 - p.s) * p.n.dot(moment), twist1 = p.s * p.n.dot(moment);
-  const Vector3d swing = p.inverseLength * (moment.cross(p.n) - twist0 * p.lever0 - twist1 * p.lever1);
-  addImpulse(d, p.sphere0, (1 - p.s) * impulse - swing, twist0 * p.axis0);
-  addImpulse(d, p.sphere1, p.s * impulse + swing, twist1 * p.axis1);
+  const Vector3d along = p.thicknessSlope * p.offset.dot(impulse) * p.n;
+  const Vector3d swing = p.inverseLength * (moment.cross(p.n) - twist0 * p.lever0 - twist1 * p.lever1) + along;
+  const Vector3d at0 = (1 - p.s) * impulse - swing, at1 = p.s * impulse + swing;
+  addImpulse(d, p.sphere0, at0, twist0 * p.axis0 + p.arm0.cross(at0));
+  addImpulse(d, p.sphere1, at1, twist1 * p.axis1 + p.arm1.cross(at1));
 }
 
 bool isSkin(const WorldData& d, int node) {
@@ -139,7 +146,8 @@ double mobility(const WorldData& d, int node) {
   };
   if (!host.onLink) return ofSphere(host.host, sphereOffset(d, host.host, node).squaredNorm());
   const LinkPoint p = linkPoint(d, host.host, node);
-  const double lever2 = p.offset.squaredNorm();
+  const double lever2 = (p.offset.norm() + std::max(p.arm0.norm(), p.arm1.norm())) *
+                        (p.offset.norm() + std::max(p.arm0.norm(), p.arm1.norm()));
   const double lean = 1 + lever2 * p.inverseLength * p.inverseLength;
   return lean * (ofSphere(p.sphere0, lever2) + ofSphere(p.sphere1, lever2));
 }

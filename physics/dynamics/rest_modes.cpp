@@ -27,18 +27,21 @@ std::vector<MeasureRow> measureRows(const SoftBodyModel& m, const BodyMechanics&
   const Vector3d none = Vector3d::Zero();
   for (std::size_t k = 0; k < m.links.size(); ++k) {
     const ElasticLink& l = m.links[k];
-    const Vector3d d = m.spheres[l.sphere1].restFrame - m.spheres[l.sphere0].restFrame;
+    const FillingSphere &s0 = m.spheres[l.sphere0], &s1 = m.spheres[l.sphere1];
+    const Vector3d d = s1.restLinkEnd - s0.restLinkEnd;
+    const Vector3d arm0 = s0.restLinkEnd - s0.restFrame, arm1 = s1.restLinkEnd - s1.restFrame;
     const double length = d.norm();
     const Vector3d t = d / length, u = (l.restU - t * t.dot(l.restU)).normalized(), v = t.cross(u);
     const LinkStiffness& s = b.links[k];
     const auto add = [&](const Vector3d& line, const Vector3d& turn0, const Vector3d& turn1, double stiffness) {
-      rows.push_back({l.sphere0, l.sphere1, line, turn0, turn1, stiffness});
+      rows.push_back({l.sphere0, l.sphere1, line, turn0 - arm0.cross(line), turn1 + arm1.cross(line), stiffness});
     };
     add(t, none, none, s.elongation);
-    add(u / length, -v, none, s.flexionV);
-    add(u / length, none, -v, s.flexionV);
-    add(v / length, u, none, s.flexionU);
-    add(v / length, none, u, s.flexionU);
+    // [[k, c], [c, k]] has the sum and the difference of both ends as its own directions.
+    add(2 * u / length, -v, -v, 0.5 * (s.flexionV + s.coupleV));
+    add(none, -v, v, 0.5 * (s.flexionV - s.coupleV));
+    add(2 * v / length, u, u, 0.5 * (s.flexionU + s.coupleU));
+    add(none, u, -u, 0.5 * (s.flexionU - s.coupleU));
     add(none, -t, t, s.torsion);
   }
   return rows;
@@ -50,6 +53,7 @@ class RestModel {
       : model_(*body.model),
         mechanics_(mechanics),
         rows_(measureRows(*body.model, mechanics)),
+        thinning_(body.links == LinkModel::beam ? body.tissue.poisson : 0),
         spheres_(static_cast<int>(mechanics.sphereMass.size())),
         nodes_(body.surface == SurfaceMode::full ? static_cast<int>(mechanics.attachments.size()) : 0) {
     for (const Matrix3d& i : mechanics.sphereInertia) inverseInertia_.push_back(i.inverse());
@@ -71,13 +75,20 @@ class RestModel {
       y.segment<3>(i1 + 3) += f * r.turn1;
     }
     if (nodes_ == 0) return y;
-    for (int i = 0; i < nodes_; ++i) addAttachment(i, x, y, surface);
+    std::vector<Vector3d> displaced(nodes_), force(nodes_);
+    for (int i = 0; i < nodes_; ++i) {
+      displaced[i] = x.segment<3>(node(i)) - anchorRate(i, x);
+      force[i] = mechanics_.attachmentStiffness[i] * displaced[i];
+    }
     for (std::size_t e = 0; e < model_.edges.size(); ++e) {
-      const int a = node(model_.edges[e][0]), b = node(model_.edges[e][1]);
-      const Vector3d d = (model_.restNodes[model_.edges[e][1]] - model_.restNodes[model_.edges[e][0]]).normalized();
-      const Vector3d f = surface * mechanics_.edgeStiffness[e] * d.dot(x.segment<3>(b) - x.segment<3>(a)) * d;
-      y.segment<3>(b) += f;
-      y.segment<3>(a) -= f;
+      const auto& [a, b] = model_.edges[e];
+      const Vector3d f = mechanics_.edgeStiffness[e] * (displaced[b] - displaced[a]);
+      force[b] += f;
+      force[a] -= f;
+    }
+    for (int i = 0; i < nodes_; ++i) {
+      y.segment<3>(node(i)) += surface * force[i];
+      addAnchorLoad(i, -surface * force[i], y);
     }
     return y;
   }
@@ -110,32 +121,57 @@ class RestModel {
  private:
   int node(int i) const { return 6 * spheres_ + 3 * i; }
 
-  void addAttachment(int i, const VectorXd& x, VectorXd& y, double scale) const {
+  // An anchor on a link, at rest.
+  struct LinkAnchor {
+    int s0, s1;  // the spheres' places in the vector of freedoms
+    double along, length, thinning;
+    Vector3d n, arm0, arm1, offset;
+  };
+
+  LinkAnchor linkAnchor(const Attachment& a) const {
+    const ElasticLink& l = model_.links[a.host];
+    const FillingSphere &sphere0 = model_.spheres[l.sphere0], &sphere1 = model_.spheres[l.sphere1];
+    const Vector3d line = sphere1.restLinkEnd - sphere0.restLinkEnd;
+    const double length = line.norm();
+    return {6 * l.sphere0,
+            6 * l.sphere1,
+            a.along,
+            length,
+            thinning_ / length,
+            line / length,
+            sphere0.restLinkEnd - sphere0.restFrame,
+            sphere1.restLinkEnd - sphere1.restFrame,
+            a.restOffset};
+  }
+
+  // Where freedoms' rates x carry the anchor of node i.
+  Vector3d anchorRate(int i, const VectorXd& x) const {
     const Attachment& a = mechanics_.attachments[i];
-    const double k = scale * mechanics_.attachmentStiffness[i];
-    const Vector3d& r = a.restOffset;
+    if (!a.onLink) return x.segment<3>(6 * a.host) + x.segment<3>(6 * a.host + 3).cross(a.restOffset);
+    const LinkAnchor p = linkAnchor(a);
+    const Vector3d w0 = x.segment<3>(p.s0 + 3), w1 = x.segment<3>(p.s1 + 3);
+    const Vector3d v0 = x.segment<3>(p.s0) + w0.cross(p.arm0), dv = x.segment<3>(p.s1) + w1.cross(p.arm1) - v0;
+    const double spin = p.n.dot((1 - p.along) * w0 + p.along * w1);
+    const Vector3d omega = p.n.cross(dv) / p.length + spin * p.n;
+    return v0 + p.along * dv + omega.cross(p.offset) - p.thinning * p.n.dot(dv) * p.offset;
+  }
+
+  // The transpose: y += what a force f on the anchor of node i does to its spheres.
+  void addAnchorLoad(int i, const Vector3d& f, VectorXd& y) const {
+    const Attachment& a = mechanics_.attachments[i];
     if (!a.onLink) {
-      const int s = 6 * a.host;
-      const Vector3d f = k * (x.segment<3>(s) + x.segment<3>(s + 3).cross(r) - x.segment<3>(node(i)));
-      y.segment<3>(s) += f;
-      y.segment<3>(s + 3) += r.cross(f);
-      y.segment<3>(node(i)) -= f;
+      y.segment<3>(6 * a.host) += f;
+      y.segment<3>(6 * a.host + 3) += a.restOffset.cross(f);
       return;
     }
-    const ElasticLink& l = model_.links[a.host];
-    const int s0 = 6 * l.sphere0, s1 = 6 * l.sphere1;
-    const Vector3d d = model_.spheres[l.sphere1].restFrame - model_.spheres[l.sphere0].restFrame;
-    const double length = d.norm();
-    const Vector3d n = d / length, dv = x.segment<3>(s1) - x.segment<3>(s0);
-    const double spin = n.dot((1 - a.along) * x.segment<3>(s0 + 3) + a.along * x.segment<3>(s1 + 3));
-    const Vector3d omega = n.cross(dv) / length + spin * n;
-    const Vector3d f = k * (x.segment<3>(s0) + a.along * dv + omega.cross(r) - x.segment<3>(node(i)));
-    const Vector3d moment = r.cross(f), swing = moment.cross(n) / length;
-    y.segment<3>(s0) += (1 - a.along) * f - swing;
-    y.segment<3>(s1) += a.along * f + swing;
-    y.segment<3>(s0 + 3) += (1 - a.along) * n.dot(moment) * n;
-    y.segment<3>(s1 + 3) += a.along * n.dot(moment) * n;
-    y.segment<3>(node(i)) -= f;
+    const LinkAnchor p = linkAnchor(a);
+    const Vector3d moment = p.offset.cross(f);
+    const Vector3d swing = moment.cross(p.n) / p.length - p.thinning * p.offset.dot(f) * p.n;
+    const Vector3d f0 = (1 - p.along) * f - swing, f1 = p.along * f + swing;
+    y.segment<3>(p.s0) += f0;
+    y.segment<3>(p.s1) += f1;
+    y.segment<3>(p.s0 + 3) += (1 - p.along) * p.n.dot(moment) * p.n + p.arm0.cross(f0);
+    y.segment<3>(p.s1 + 3) += p.along * p.n.dot(moment) * p.n + p.arm1.cross(f1);
   }
 
   VectorXd timesMass(const VectorXd& x) const {
@@ -163,6 +199,7 @@ class RestModel {
   const BodyMechanics& mechanics_;
   std::vector<MeasureRow> rows_;
   std::vector<Matrix3d> inverseInertia_;
+  double thinning_;  // relative, of what hangs on a link, per relative stretch
   int spheres_, nodes_;
 };
 

@@ -7,8 +7,9 @@
 namespace medulla {
 
 void evaluateLinks(WorldData&);        // link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
-void evaluateAttachments(WorldData&);  // surface.cpp: weight and host's pull of every node; pulls' sums per host
+void evaluateAttachments(WorldData&);  // surface.cpp: where every node would be, and the pull on it
 void addEdgeSprings(WorldData&);       // to the nodes' forces
+void returnNodeForces(WorldData&);     // from the anchors to their hosts
 void returnLinkForces(WorldData&);     // link_force.cpp: links and what hangs on them, to their two spheres
 void sumSphereForces(WorldData&);      // spheres.cpp
 // Before the forces' share of the velocities, which tools and contacts balance in a body at rest.
@@ -32,6 +33,7 @@ inline void evaluateForces(WorldData& d) {
   evaluateLinks(d);
   evaluateAttachments(d);
   addEdgeSprings(d);
+  returnNodeForces(d);
   returnLinkForces(d);
   sumSphereForces(d);
 }

@@ -1,4 +1,5 @@
 #include <cstddef>
+#include <vector>
 
 #include "physics/dynamics/anchor.h"
 #include "physics/dynamics/stages.h"
@@ -15,8 +16,6 @@ Quad& at(Quad* quads, std::uint32_t byteOffset) {
   return *reinterpret_cast<Quad*>(reinterpret_cast<char*>(quads) + byteOffset);
 }
 
-constexpr double kSmallestSquaredLength = 1e-30;  // m2; a spring whose ends coincide has no direction and pulls nowhere
-
 Lanes3 gatherNodes(const std::vector<Quad>& q, int i) {
   return gather(q[i], q[i + 1], q[i + 2], q[i + 3]);
 }
@@ -30,61 +29,91 @@ void storeNodes(const Lanes3& v, std::vector<Quad>& q, int i) {
   store(q[i + 3], d);
 }
 
-// Pull of the anchors on the four nodes of group g; it begins the sum of their forces. The spring
-// pulls along the stretch, so that its moment is the same whether it acts on the host at the anchor or at the node. The
-// damper does not: it acts between the node and the point of the carrying frame where the node *is*, or the pair would
-// exert a couple on a free body.
-MEDULLA_INLINE void pullNodes(Nodes& n, Lanes relaxation, const NodeGroup& group, const Anchor& anchor, int g,
-                              Lanes3& force, Lanes3& moment) {
+// Pull of the anchors on the four nodes of group g: the springs' along the stretch, the dampers' against the point of
+// the carrying frame where the node *is*; against the anchor the pair would exert a couple on a free body. The host
+// bears all forces on its nodes at the anchors (returnNodeForces()); `moment` is what the dampers' lever adds to that.
+MEDULLA_INLINE Lanes3 pullNodes(Nodes& n, Lanes relaxation, const NodeGroup& group, const Anchor& anchor, int g) {
   const Lanes3 lever = gatherNodes(n.position, 4 * g) - anchor.base;
   const Lanes3 rate = velocityAt(anchor, lever) - gatherNodes(n.velocity, 4 * g);
-  force = group.stiffness * fma(relaxation, rate, anchor.offset - lever);
-  storeNodes(force, n.force, 4 * g);
-  moment = cross(lever, force);
+  const Lanes3 displaced = lever - anchor.offset, damper = (group.stiffness * relaxation) * rate;
+  storeNodes(fnma(group.stiffness, displaced, damper), n.force, 4 * g);
+  storeNodes(displaced, n.displaced, 4 * g);
+  n.offset[g] = anchor.offset;
+  return cross(displaced, damper);
 }
 
-void evaluateOnLink(WorldData& d, const HostRange& range) {
+// Adds sums over a link's nodes to its frame.
+void addLoads(LinkFrame& f, int lane, Lanes sumAndTwist, Lanes alongAndThickness, Lanes moment) {
+  const auto add = [lane](Lanes3& to, Lanes from) {
+    to.x[lane] += from[0];
+    to.y[lane] += from[1];
+    to.z[lane] += from[2];
+  };
+  add(f.loadSum, sumAndTwist);
+  add(f.loadAlong, alongAndThickness);
+  add(f.loadMoment, moment);
+  f.loadTwist[lane] += sumAndTwist[3];
+  f.loadThickness[lane] += alongAndThickness[3];
+}
+
+void pullOnLink(WorldData& d, const HostRange& range) {
   const LinkHost host = linkHost(d, range.host);
   const Lanes zero = splat(0), relaxation = splat(range.relaxation);
-  Lanes3 sum{zero, zero, zero}, along = sum, moment = sum;
+  Lanes3 moment{zero, zero, zero};
   Lanes twist = zero;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
-    Lanes3 pull, turn;
-    pullNodes(d.nodes, relaxation, group, anchorOnLink(host, group), g, pull, turn);
-    sum = sum + pull;
-    along = fma(group.along, pull, along);
+    const Lanes3 turn = pullNodes(d.nodes, relaxation, group, anchorOnLink(host, group), g);
     moment = moment + turn;
     twist = fma(group.along, dot(host.n, turn), twist);
   }
-  LinkFrame& f = d.links.frames[range.host / 4];
-  const int lane = range.host % 4;
-  const Lanes total = sumOfLanes(sum, twist), totalAlong = sumOfLanes(along, zero),
-              totalMoment = sumOfLanes(moment, zero);
-  const auto put = [lane](Lanes3& to, Lanes from) {
-    to.x[lane] = from[0];
-    to.y[lane] = from[1];
-    to.z[lane] = from[2];
-  };
-  put(f.loadSum, total);
-  put(f.loadAlong, totalAlong);
-  put(f.loadMoment, totalMoment);
-  f.loadTwist[lane] = total[3];
+  const Lanes total = sumOfLanes(moment, twist);
+  addLoads(d.links.frames[range.host / 4], range.host % 4, Lanes{0, 0, 0, total[3]}, zero, total);
 }
 
-void evaluateOnSphere(WorldData& d, const HostRange& range) {
+void pullOnSphere(WorldData& d, const HostRange& range) {
   const SphereHost host = sphereHost(d, range.host);
   const Lanes zero = splat(0), relaxation = splat(range.relaxation);
-  Lanes3 sum{zero, zero, zero}, moment = sum;
+  Lanes3 moment{zero, zero, zero};
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
-    Lanes3 pull, turn;
-    pullNodes(d.nodes, relaxation, group, anchorOnSphere(host, group), g, pull, turn);
-    sum = sum + pull;
-    moment = moment + turn;
+    moment = moment + pullNodes(d.nodes, relaxation, group, anchorOnSphere(host, group), g);
   }
-  store(d.spheres.force[range.host], zero - sumOfLanes(sum, zero));
   store(d.spheres.torque[range.host], zero - sumOfLanes(moment, zero));
+}
+
+void returnToLink(WorldData& d, const HostRange& range) {
+  LinkFrame& f = d.links.frames[range.host / 4];
+  const int lane = range.host % 4;
+  const Lanes3 n = splatLane(f.n, lane);
+  const Lanes zero = splat(0);
+  Lanes3 sum{zero, zero, zero}, along = sum, moment = sum;
+  Lanes twist = zero, thickness = zero;
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const Lanes s = d.nodes.groups[g].along;
+    const Lanes3& offset = d.nodes.offset[g];
+    const Lanes3 force = gatherNodes(d.nodes.force, 4 * g);
+    const Lanes3 turn = cross(offset, force);
+    sum = sum + force;
+    along = fma(s, force, along);
+    moment = moment + turn;
+    twist = fma(s, dot(n, turn), twist);
+    thickness = thickness + dot(offset, force);
+  }
+  addLoads(f, lane, sumOfLanes(sum, twist), sumOfLanes(along, thickness), sumOfLanes(moment, zero));
+}
+
+void returnToSphere(WorldData& d, const HostRange& range) {
+  const Lanes zero = splat(0);
+  Lanes3 sum{zero, zero, zero}, moment = sum;
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const Lanes3 force = gatherNodes(d.nodes.force, 4 * g);
+    sum = sum + force;
+    moment = moment + cross(d.nodes.offset[g], force);
+  }
+  Quad& torque = d.spheres.torque[range.host];
+  store(d.spheres.force[range.host], zero - sumOfLanes(sum, zero));
+  store(torque, load(torque) - sumOfLanes(moment, zero));
 }
 
 }  // namespace
@@ -95,66 +124,30 @@ void evaluateAttachments(WorldData& d) {
     store(d.spheres.force[i], zero);
     store(d.spheres.torque[i], zero);
   }
-  for (const HostRange& range : d.nodes.onLinks) evaluateOnLink(d, range);
-  for (const HostRange& range : d.nodes.onSpheres) evaluateOnSphere(d, range);
+  for (const HostRange& range : d.nodes.onLinks) pullOnLink(d, range);
+  for (const HostRange& range : d.nodes.onSpheres) pullOnSphere(d, range);
 }
 
-namespace {
-
-// Lines of a group's springs, and their tensions over length.
-MEDULLA_INLINE Lanes pullOfSprings(const SpringGroup& s, Lanes relaxation, const Quad* x, const Quad* v,
-                                   Lanes (&line)[4]) {
-  Lanes rate[4];
-  for (int k = 0; k < 4; ++k) {
-    line[k] = load(at(x, s.node1[k])) - load(at(x, s.node0[k]));
-    rate[k] = (load(at(v, s.node1[k])) - load(at(v, s.node0[k]))) * line[k];
-  }
-  const Lanes squared = larger(dotOfFour(line[0] * line[0], line[1] * line[1], line[2] * line[2], line[3] * line[3]),
-                               splat(kSmallestSquaredLength));
-  const Lanes lengthRate = dotOfFour(rate[0], rate[1], rate[2], rate[3]);  // times length
-  const Lanes length = squareRoot(squared);
-  const Lanes scale = s.stiffness / squared;  // does not wait for the root
-  return scale * fma(length - s.restLength, length, relaxation * lengthRate);
-}
-
-MEDULLA_INLINE void pullEnds(const SpringGroup& s, Lanes pull, const Lanes (&line)[4], Quad* force) {
-  std::uint32_t node0[4], node1[4];  // copies: the stores below could change the group's for all the compiler knows
-  for (int k = 0; k < 4; ++k) {
-    node0[k] = s.node0[k];
-    node1[k] = s.node1[k];
-  }
-  const auto apply = [&](int k, Lanes pullOfOne) {
-    Quad &end0 = at(force, node0[k]), &end1 = at(force, node1[k]);
-    store(end0, fma(pullOfOne, line[k], load(end0)));
-    store(end1, fnma(pullOfOne, line[k], load(end1)));
-  };
-  apply(0, splatLane<0>(pull));
-  apply(1, splatLane<1>(pull));
-  apply(2, splatLane<2>(pull));
-  apply(3, splatLane<3>(pull));
-}
-
-}  // namespace
-
-// One pass over the springs, each added to its two nodes while its direction is in registers. Rejected: one number per
-// spring first and a sum per node after, which reads every position again and costs half as many instructions more.
-// Two groups at a time: from ends to pull is one long chain, in which a single group leaves the processor waiting.
+// The edges' springs answer to what their two nodes are displaced from their anchors one against the other, in all
+// directions. Springs on the edges' lengths have no stiffness of first order across a flat surface, so that a dent
+// would end at the touched nodes, and they would stiffen the whole body: a bar of 10 mm radius by a fifth.
 void addEdgeSprings(WorldData& d) {
-  const Quad* x = d.nodes.position.data();
-  const Quad* v = d.nodes.velocity.data();
+  const Quad* displaced = d.nodes.displaced.data();
   Quad* force = d.nodes.force.data();
-  for (const SpringRange& range : d.springs.ranges) {
-    const Lanes relaxation = splat(range.relaxation);
-    for (int g = range.firstGroup; g < range.endGroup; g += 2) {
-      const SpringGroup& s0 = d.springs.groups[g];
-      const SpringGroup& s1 = d.springs.groups[g + 1];
-      Lanes line0[4], line1[4];
-      const Lanes pull0 = pullOfSprings(s0, relaxation, x, v, line0),
-                  pull1 = pullOfSprings(s1, relaxation, x, v, line1);
-      pullEnds(s0, pull0, line0, force);
-      pullEnds(s1, pull1, line1, force);
+  for (const SpringGroup& s : d.springs.groups) {
+    for (int k = 0; k < 4; ++k) {
+      const std::uint32_t node0 = s.node0[k], node1 = s.node1[k];
+      const Lanes pull = splat(s.stiffness[k]) * (load(at(displaced, node1)) - load(at(displaced, node0)));
+      Quad &end0 = at(force, node0), &end1 = at(force, node1);
+      store(end0, load(end0) + pull);
+      store(end1, load(end1) - pull);
     }
   }
+}
+
+void returnNodeForces(WorldData& d) {
+  for (const HostRange& range : d.nodes.onLinks) returnToLink(d, range);
+  for (const HostRange& range : d.nodes.onSpheres) returnToSphere(d, range);
 }
 
 void placeSkin(WorldData& d) {
@@ -174,17 +167,11 @@ void placeSkin(WorldData& d) {
 
 double surfaceEnergy(const WorldData& d) {
   double sum = 0;
-  for (const SpringGroup& s : d.springs.groups) {
-    for (int k = 0; k < 4; ++k) {
-      const Eigen::Vector3d line =
-          vectorOf(at(d.nodes.position.data(), s.node1[k])) - vectorOf(at(d.nodes.position.data(), s.node0[k]));
-      const double stretch = line.norm() - s.restLength[k];
-      sum += 0.5 * s.stiffness[k] * stretch * stretch;
-    }
-  }
+  std::vector<Eigen::Vector3d> displaced(d.nodes.position.size());
   const auto add = [&](const Anchor& anchor, int g) {
-    const Lanes3 stretch = positionOf(anchor) - gatherNodes(d.nodes.position, 4 * g);
+    const Lanes3 stretch = gatherNodes(d.nodes.position, 4 * g) - positionOf(anchor);
     sum += 0.5 * sumOfLanes(d.nodes.groups[g].stiffness * dot(stretch, stretch));
+    for (int k = 0; k < 4; ++k) displaced[4 * g + k] = vectorOf(stretch, k);
   };
   for (const HostRange& range : d.nodes.onLinks) {
     const LinkHost host = linkHost(d, range.host);
@@ -194,6 +181,10 @@ double surfaceEnergy(const WorldData& d) {
     const SphereHost host = sphereHost(d, range.host);
     for (int g = range.firstGroup; g < range.endGroup; ++g) add(anchorOnSphere(host, d.nodes.groups[g]), g);
   }
+  for (const SpringGroup& s : d.springs.groups)
+    for (int k = 0; k < 4; ++k)
+      sum += 0.5 * s.stiffness[k] *
+             (displaced[s.node1[k] / sizeof(Quad)] - displaced[s.node0[k] / sizeof(Quad)]).squaredNorm();
   return sum;
 }
 

@@ -41,11 +41,7 @@ void checkLoads(const WorldData& d, const Loads& loads) {
 }
 
 void step(WorldData& d, const Loads& loads, double remaining, FrameReport& report) {
-  evaluateLinks(d);
-  evaluateAttachments(d);
-  addEdgeSprings(d);
-  returnLinkForces(d);
-  sumSphereForces(d);
+  evaluateForces(d);
   dampBodies(d);
   dragVelocities(d);
   stepVelocities(d);

@@ -28,6 +28,10 @@ struct LinkFactors {
   double elongation = 1, flexion = 1, torsion = 1;  // > 0
 };
 
+// How a link answers. springs: six independent damped springs (paper 2.2). beam: the flexion angles of its two ends are
+// coupled as in a beam, elongation is neo-Hookean, and what hangs on it grows thinner with its stretch.
+enum class LinkModel { springs, beam };
+
 enum class SurfaceMode {
   full,  // every node is a mass of its own (paper 2.3)
   skin,  // nodes follow the skeleton without mass: tools then load the skeleton through the attachments
@@ -57,6 +61,7 @@ struct BodyDescription {
   Tissue tissue;
   LinkFactors factors;
   SurfaceMode surface = SurfaceMode::full;
+  LinkModel links = LinkModel::beam;
   Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
   std::vector<FixedSphere> fixed;
   std::vector<int> fixedNodes;  // of the full surface; without effect on a skin, which follows its spheres

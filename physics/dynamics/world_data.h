@@ -41,24 +41,35 @@ struct Spheres {
 struct LinkGroup {  // constants of four links
   std::uint32_t sphere0[4], sphere1[4];
   Lanes3 restT, restU, restV;                     // centre line and section axes at rest, in both spheres' frames
-  Lanes restLength, smallestLength;               // m; forces divide by no less than the second
+  Lanes restLength, inverseRestLength;            // m, 1/m
+  Lanes smallestLength;                           // m; forces divide by no less
+  Lanes3 restArm0, restArm1;                      // m, sphere frames: from the frame to where the link ends
+  bool hasArms;                                   // some arm of the four is not zero
   Lanes elongation, flexionU, flexionV, torsion;  // N/m, N m/rad about U, about V (each at either end), N m/rad
-  Lanes relaxation;                               // s, damping over stiffness (Rayleigh's beta)
+  Lanes couple, coupleDifference;                 // N m/rad between the ends: mean over U and V, and half of V less U
+  Lanes neoHookean;                               // 1, or 0: elongation is linear
+  Lanes thinning;    // twice the Poisson's ratio that what hangs on the link follows; 0: none
+  Lanes relaxation;  // s, damping over stiffness (Rayleigh's beta)
 };
 
 // The four links as the surface sees them, and what the surface gives back.
 struct LinkFrame {
-  Lanes3 origin, line, originVelocity, lineVelocity;  // sphere 0; sphere 1 minus sphere 0
+  Lanes3 origin, line, originVelocity, lineVelocity;  // link end at sphere 0; that at sphere 1 minus it
+  Lanes3 arm0, arm1;                                  // m, world: from the spheres' frames to the link's ends
   Lanes3 n, axisU, axisV;  // unit centre line; U, V of sphere 0 carried onto it by the smallest rotation
   Lanes3 turning;          // rad/s, n x n'
   Lanes spin0, spinAlong;  // rad/s about n at sphere 0, and its increase to sphere 1
   Lanes twist;             // rad, from sphere 0 to sphere 1
   Lanes inverseLength;     // 1/m
+  Lanes thickness;         // of what hangs on the link, over that at rest
+  Lanes thicknessRate;     // 1/s, of its logarithm
+  Lanes thicknessSlope;    // 1/m, of its logarithm per length
   Lanes3 spinAxis0, spinAxis1, spinLever0, spinLever1;  // spin_i = spinAxis_i . omega_i - spinLever_i . n'
   Lanes3 force1, torque0, torque1;        // N on sphere 1 (and minus it on sphere 0), N m: elongation and flexion
   Lanes twistMoment;                      // N m, of torsion
   Lanes3 loadSum, loadAlong, loadMoment;  // sums over the nodes of force, along * force, offset x force (on the nodes)
   Lanes loadTwist;                        // sum of along * n . (offset x force)
+  Lanes loadThickness;                    // N m, sum of offset . force
 };
 
 struct Slot {
@@ -96,6 +107,8 @@ struct Nodes {
   int count = 0;                          // with pads
   std::vector<Quad> position, velocity;   // m, m/s
   std::vector<Quad> force;                // N, of the current substep, weight apart; dynamic nodes only
+  std::vector<Lanes3> offset;             // m, per group: from the anchors' bases to them; of the current substep
+  std::vector<Quad> displaced;            // m, from where the host would carry the node; of the current substep
   std::vector<double> mass, inverseMass;  // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
   std::vector<NodeGroup> groups;
   std::vector<GroupHost> groupHosts;
@@ -104,23 +117,16 @@ struct Nodes {
   int dynamicEnd = 0;                                 // nodes [0, dynamicEnd) are dynamic
 };
 
-// ---- Edge springs between dynamic nodes; every body's are filled up with copies that have no stiffness to an even
-// number of groups.
+// ---- Edge springs between dynamic nodes; the last group is filled up with copies that have no stiffness.
 
 struct SpringGroup {
-  std::uint32_t node0[4], node1[4];  // byte offsets into Nodes::position
-  Lanes restLength, stiffness;       // m, N/m
-};
-
-struct SpringRange {  // a body's
-  int firstGroup, endGroup;
-  double relaxation;  // s, damping over stiffness
+  std::uint32_t node0[4], node1[4];  // byte offsets into Nodes::displaced
+  Lanes stiffness;                   // N/m
 };
 
 struct Springs {
-  int count = 0;  // without the fillings
+  int count = 0;
   std::vector<SpringGroup> groups;
-  std::vector<SpringRange> ranges;
 };
 
 // ---- A body's share of the arrays.

@@ -17,8 +17,14 @@ struct Anchor {
 };
 
 double footOnLink(const Vector3d& node, const ElasticLink& link, const std::vector<FillingSphere>& spheres) {
-  const Vector3d start = spheres[link.sphere0].restFrame, line = spheres[link.sphere1].restFrame - start;
+  const Vector3d start = spheres[link.sphere0].restLinkEnd, line = spheres[link.sphere1].restLinkEnd - start;
   return (node - start).dot(line) / line.squaredNorm();
+}
+
+// A node at a link's very end moves with the sphere there.
+bool isInside(double along) {
+  constexpr double kEnd = 1e-3;
+  return along > kEnd && along < 1 - kEnd;
 }
 
 // Every sphere, and every link whose interior holds the foot of the perpendicular, nearest first.
@@ -33,7 +39,7 @@ std::vector<Anchor> anchorsOf(const Vector3d& node, const std::vector<FillingSph
   }
   for (std::size_t i = 0; i < links.size(); ++i) {
     const double along = footOnLink(node, links[i], spheres);
-    if (!(along > 0 && along < 1)) continue;
+    if (!isInside(along)) continue;
     Attachment a;
     a.onLink = true;
     a.host = static_cast<int>(i);
@@ -72,9 +78,9 @@ void reprojectAttachments(const TriangleMesh& mesh, const std::vector<FillingSph
     if (a.onLink) {
       const ElasticLink& link = links[a.host];
       a.along = footOnLink(mesh.vertices[n], link, spheres);
-      if (a.along <= 0 || a.along >= 1) {
+      if (!isInside(a.along)) {
         a.onLink = false;
-        a.host = a.along <= 0 ? link.sphere0 : link.sphere1;
+        a.host = a.along < 0.5 ? link.sphere0 : link.sphere1;
         a.along = 0;
       }
     }
@@ -84,8 +90,9 @@ void reprojectAttachments(const TriangleMesh& mesh, const std::vector<FillingSph
 
 Vector3d restAnchor(const Attachment& a, const std::vector<FillingSphere>& spheres,
                     const std::vector<ElasticLink>& links) {
-  const HostShares hosts = hostShares(a, links);
-  return hosts.share[0] * spheres[hosts.sphere[0]].restFrame + hosts.share[1] * spheres[hosts.sphere[1]].restFrame;
+  if (!a.onLink) return spheres[a.host].restFrame;
+  const ElasticLink& link = links[a.host];
+  return (1 - a.along) * spheres[link.sphere0].restLinkEnd + a.along * spheres[link.sphere1].restLinkEnd;
 }
 
 double attachmentDepth(const Attachment& a) {

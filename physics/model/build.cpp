@@ -12,6 +12,7 @@
 #include "physics/model/ball_choice.h"
 #include "physics/model/build_report.h"
 #include "physics/model/edge_collapse_skeleton.h"
+#include "physics/model/link_ends.h"
 #include "physics/model/link_graph.h"
 #include "physics/model/link_sections.h"
 #include "physics/model/mass_properties.h"
@@ -110,13 +111,15 @@ void hangNodesAndShareMass(const BodyShape& shape, const SpheresAndLinks& s, dou
   constexpr int choosingRounds = 3, slidingRounds = 8;
   for (std::size_t i = 0; i < s.balls.size(); ++i) {
     const MassProperties& cell = s.cells.cells[i];
-    model.spheres.push_back({s.balls[i].centre, s.balls[i].radius, cell.centroid, cell.volume, cell.secondMoment});
+    model.spheres.push_back(
+        {s.balls[i].centre, s.balls[i].radius, cell.centroid, cell.centroid, cell.volume, cell.secondMoment});
   }
   for (const std::array<int, 2>& pair : s.links) {
     model.links.emplace_back();
     model.links.back().sphere0 = pair[0];
     model.links.back().sphere1 = pair[1];
   }
+  placeLinkEnds(shape.mesh, shape.tree, s.cells.sites, model.links, model.spheres);
   for (int round = 0; round < choosingRounds + slidingRounds; ++round) {
     if (round < choosingRounds) {
       model.attachments = attachNodes(shape.mesh, shape.tree, model.spheres, model.links);
@@ -124,6 +127,7 @@ void hangNodesAndShareMass(const BodyShape& shape, const SpheresAndLinks& s, dou
       reprojectAttachments(shape.mesh, model.spheres, model.links, model.attachments);
     }
     shareOutMass(model.restNodes, s.cells, massFraction, model.attachments, model.spheres);
+    placeLinkEnds(shape.mesh, shape.tree, s.cells.sites, model.links, model.spheres);
   }
   reprojectAttachments(shape.mesh, model.spheres, model.links, model.attachments);
 }

@@ -8,6 +8,8 @@
 
 namespace medulla {
 
+using Eigen::Vector3d;
+
 static constexpr int stations = 9;
 static constexpr double pi = 3.141592653589793;
 
@@ -25,8 +27,7 @@ static SectionMoments disc(double radius) {
 }
 
 static std::vector<SectionMoments> sectionsAlong(const TriangleMesh& mesh, const PowerSites& sites,
-                                                 const Eigen::Vector3d& start, const Eigen::Vector3d& end,
-                                                 const Plane& across) {
+                                                 const Vector3d& start, const Vector3d& end, const Plane& across) {
   std::vector<SectionMoments> sections;
   double largest = 0;
   for (int k = 0; k < stations; ++k) {
@@ -41,9 +42,10 @@ static std::vector<SectionMoments> sectionsAlong(const TriangleMesh& mesh, const
 static void measureLink(const TriangleMesh& mesh, const PowerSites& sites, const std::vector<FillingSphere>& spheres,
                         ElasticLink& link) {
   const FillingSphere &s0 = spheres[link.sphere0], &s1 = spheres[link.sphere1];
-  const Plane across = planeAcross(s0.restFrame, (s1.restFrame - s0.restFrame).normalized());
+  const Vector3d line = s1.restLinkEnd - s0.restLinkEnd;
+  const Plane across = planeAcross(s0.restLinkEnd, line.normalized());
   const PowerSites around = sitesAround(sites, {link.sphere0, link.sphere1});
-  std::vector<SectionMoments> sections = sectionsAlong(mesh, around, s0.restFrame, s1.restFrame, across);
+  std::vector<SectionMoments> sections = sectionsAlong(mesh, around, s0.restLinkEnd, s1.restLinkEnd, across);
   if (sections.empty()) sections.push_back(disc(std::min(s0.radius, s1.radius)));
 
   double stretch = 0, twist = 0;

@@ -15,14 +15,16 @@ namespace medulla {
 struct FillingSphere {
   Eigen::Vector3d restBallCentre = Eigen::Vector3d::Zero();  // m; inscribed in the mesh: contact and buckets use it
   double radius = 0;                                         // m
-  // m; link ends sit here, and so does the mass: centroid of the power cell less the shares of its surface nodes
-  // (node_volumes.h), of the whole cell where nodes carry no mass.
+  // m; the mass sits here: centroid of the power cell less the shares of its surface nodes (node_volumes.h), of the
+  // whole cell where nodes carry no mass.
   Eigen::Vector3d restFrame = Eigen::Vector3d::Zero();
+  // m; the links end here: at the frame, or, where a chain ends in the sphere, farther out (link_ends.h).
+  Eigen::Vector3d restLinkEnd = Eigen::Vector3d::Zero();
   double volume = 0;  // m3 of the power cell, the share of its surface nodes included
   Eigen::Matrix3d secondMoment = Eigen::Matrix3d::Zero();  // m5, integral of r r^T over that cell about restFrame
 };
 
-// An elastic link (paper 2.2, figure 3) between the frames of two spheres. The section is that of an equivalent
+// An elastic link (paper 2.2, figure 3) between the link ends of two spheres. The section is that of an equivalent
 // uniform beam: bending and torsion of the tapered body averaged as compliances along the link.
 struct ElasticLink {
   int sphere0 = 0, sphere1 = 0;
