@@ -13,8 +13,8 @@ namespace medulla {
 
 namespace {
 
-// Half a period is one substep: implicit, so that any value is stable, and stiff because a light sphere may have to bear
-// a whole heap. What rests on a contact sinks in by acceleration / omega^2, micrometres.
+// Half a period is one substep: implicit, so that any value is stable, and stiff because a light sphere may have to
+// bear a whole heap. What rests on a contact sinks in by acceleration / omega^2, micrometres.
 constexpr double kOmegaTimesStep = 3.141592653589793;
 // Critical. Restitution comes out as 0.05: tissue does not bounce off tissue.
 constexpr double kDampingRatio = 1;
