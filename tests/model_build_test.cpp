@@ -83,10 +83,12 @@ TEST(LinkSections, StraightTubeGivesItsBeam) {
   const SoftBodyModel model = build(cylinderMesh(0.1, radius, 48, 60), settings, report);
   const double polygon = 48 / (2 * pi) * std::sin(2 * pi / 48);  // area of the 48-gon over that of the circle
   for (const ElasticLink& link : model.links) {
-    EXPECT_NEAR(link.area / (polygon * pi * radius * radius), 1, 0.01);
-    EXPECT_NEAR(link.bendingMomentU / (pi * std::pow(radius, 4) / 4), 1, 0.03);
-    EXPECT_NEAR(link.bendingMomentV / (pi * std::pow(radius, 4) / 4), 1, 0.03);
-    EXPECT_NEAR(link.torsionConstant / (pi * std::pow(radius, 4) / 2), 1, 0.03);
+    for (const LinkSection& s : link.sections) {
+      EXPECT_NEAR(s.area / (polygon * pi * radius * radius), 1, 0.01);
+      EXPECT_NEAR(s.bendingMomentU / (pi * std::pow(radius, 4) / 4), 1, 0.03);
+      EXPECT_NEAR(s.bendingMomentV / (pi * std::pow(radius, 4) / 4), 1, 0.03);
+      EXPECT_NEAR(s.torsionConstant / (pi * std::pow(radius, 4) / 2), 1, 0.03);
+    }
     const Vector3d line = model.spheres[link.sphere1].restLinkEnd - model.spheres[link.sphere0].restLinkEnd;
     EXPECT_NEAR(link.restU.norm(), 1, 1e-12);
     EXPECT_NEAR(link.restU.dot(line.normalized()), 0, 1e-12);
@@ -128,7 +130,8 @@ static void expectSound(const SoftBodyModel& model, const BuildReport& report) {
   }
   for (const ElasticLink& link : model.links) {
     EXPECT_LT(link.sphere0, link.sphere1);
-    EXPECT_GT(std::min({link.area, link.bendingMomentU, link.bendingMomentV, link.torsionConstant}), 0);
+    for (const LinkSection& s : link.sections)
+      EXPECT_GT(std::min({s.area, s.bendingMomentU, s.bendingMomentV, s.torsionConstant}), 0);
   }
   for (const MassProperties& s : remainingSpheres(model.restNodes, model.spheres, model.attachments)) {
     EXPECT_GT(s.volume, 0);
@@ -310,10 +313,12 @@ TEST(ModelBuild, TwoBuildsAreEqualToTheByte) {
   for (std::size_t k = 0; k < a.links.size(); ++k) {  // field by field: padding bytes are nobody's
     EXPECT_EQ(a.links[k].sphere0, b.links[k].sphere0);
     EXPECT_EQ(a.links[k].sphere1, b.links[k].sphere1);
-    EXPECT_EQ(a.links[k].area, b.links[k].area);
-    EXPECT_EQ(a.links[k].bendingMomentU, b.links[k].bendingMomentU);
-    EXPECT_EQ(a.links[k].bendingMomentV, b.links[k].bendingMomentV);
-    EXPECT_EQ(a.links[k].torsionConstant, b.links[k].torsionConstant);
+    for (int s = 0; s < ElasticLink::kSections; ++s) {
+      EXPECT_EQ(a.links[k].sections[s].area, b.links[k].sections[s].area);
+      EXPECT_EQ(a.links[k].sections[s].bendingMomentU, b.links[k].sections[s].bendingMomentU);
+      EXPECT_EQ(a.links[k].sections[s].bendingMomentV, b.links[k].sections[s].bendingMomentV);
+      EXPECT_EQ(a.links[k].sections[s].torsionConstant, b.links[k].sections[s].torsionConstant);
+    }
     EXPECT_EQ(a.links[k].restU, b.links[k].restU);
   }
   ASSERT_EQ(a.attachments.size(), b.attachments.size());

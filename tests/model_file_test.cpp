@@ -24,7 +24,10 @@ SoftBodyModel smallModel() {
   const Eigen::Matrix3d moment = Eigen::Vector3d(1e-11 / 3, 2e-11, 3e-11).asDiagonal();
   m.spheres = {{{0.1, 0.1, 0.1}, 0.05, {0.1, 0.2, 0}, {0.1, 0.25, 0}, 1e-5 / 7, moment},
                {{0.1, 0.1, 0.6}, 0.01, {0.1, 0.2, 0.5}, {0.1, 0.25, 1. / 3}, 2e-5, 2 * moment}};
-  m.links = {{0, 1, 1e-4, 1e-9, 2e-9, 3e-9, Eigen::Vector3d(std::sqrt(0.5), std::sqrt(0.5), 0)}};
+  m.links = {{0, 1, {}, Eigen::Vector3d(std::sqrt(0.5), std::sqrt(0.5), 0)}};
+  m.links[0].sections.fill({1e-4 / 3, 2e-9, 4e-9, 3e-9});
+  m.links[0].sections.front().area = 1e-4;
+  m.links[0].sections[1].bendingMomentU = 1e-9;
   m.attachments = {{false, 0, 0, {-0.1, -0.2, 0}, 1e-3, 1e-7},
                    {true, 0, 0.25, {0.2, -0.2, 0}, 1e-3, 0},
                    {true, 0, 1, {0, 0.1, 0}, 1e-3, 1e-7},
@@ -101,8 +104,11 @@ TEST_F(ModelFile, ReadingGivesTheSameBits) {
   const ElasticLink &l = a.links[0], &m = b.links[0];
   EXPECT_EQ(l.sphere0, m.sphere0);
   EXPECT_EQ(l.sphere1, m.sphere1);
-  EXPECT_TRUE(sameBits(l.area, m.area) && sameBits(l.torsionConstant, m.torsionConstant));
-  EXPECT_TRUE(sameBits(l.bendingMomentU, m.bendingMomentU) && sameBits(l.bendingMomentV, m.bendingMomentV));
+  for (int k = 0; k < ElasticLink::kSections; ++k) {
+    const LinkSection &s = l.sections[k], &t = m.sections[k];
+    EXPECT_TRUE(sameBits(s.area, t.area) && sameBits(s.torsionConstant, t.torsionConstant));
+    EXPECT_TRUE(sameBits(s.bendingMomentU, t.bendingMomentU) && sameBits(s.bendingMomentV, t.bendingMomentV));
+  }
   EXPECT_TRUE(sameBits(l.restU, m.restU));
   ASSERT_EQ(a.attachments.size(), b.attachments.size());
   for (std::size_t k = 0; k < a.attachments.size(); ++k) {
@@ -142,8 +148,8 @@ TEST_F(ModelFile, MistakesNameTheLineAndWhatIsWrong) {
   const struct {
     std::string from, to, complaint;
   } mistakes[] = {
-      {"version=\"3\"", "version=\"1\"",
-       R"(m.xml:2: <model> version="1": expected 3; make the model anew with medulla build)"},
+      {"version=\"4\"", "version=\"1\"",
+       R"(m.xml:2: <model> version="1": expected 4; make the model anew with medulla build)"},
       {"fedcba9876543210", "fedc", R"(m.xml:2: <model> mesh_hash="fedc": expected 16 hexadecimal digits)"},
       {"<edges", "<egdes", "m.xml:23: broken XML: an element is not closed where it was opened"},
       {" name=\"a", " nam=\"a", R"(m.xml:2: <model> has no attribute "nam"; did you mean "name"?)"},

@@ -81,7 +81,12 @@ inline void addLink(SoftBodyModel& m, int a, int b, double radius, double share 
   const Vector3d t = (m.spheres[b].restFrame - m.spheres[a].restFrame).normalized();
   const double area = share * std::numbers::pi * radius * radius, moment = area * radius * radius / 4;
   const Vector3d other = std::abs(t.x()) > 0.9 ? Vector3d::UnitY() : Vector3d::UnitX();
-  m.links.push_back({a, b, area, moment, moment, 2 * moment, t.cross(other).normalized()});
+  ElasticLink link;
+  link.sphere0 = a;
+  link.sphere1 = b;
+  link.sections.fill({area, moment, moment, 2 * moment});
+  link.restU = t.cross(other).normalized();
+  m.links.push_back(link);
 }
 
 // Every node to its nearest link, or sphere where no link lies beside it (paper 2.3); `surfaceShare` of the volume.

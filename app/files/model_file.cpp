@@ -18,7 +18,7 @@ namespace medulla {
 
 namespace {
 
-constexpr int formatVersion = 3;
+constexpr int formatVersion = 4;
 
 const XmlRules& modelRules() {
   static const XmlRules rules = [] {
@@ -103,7 +103,9 @@ void putVolumeModel(std::string& out, const SoftBodyModel& model) {
   });
   putRows(out, "links", model.links.size(), [&](std::size_t k) {
     const ElasticLink& l = model.links[k];
-    put(out, l.sphere0, l.sphere1, l.area, l.bendingMomentU, l.bendingMomentV, l.torsionConstant, l.restU);
+    put(out, l.sphere0, l.sphere1);
+    for (const LinkSection& s : l.sections) put(out, s.area, s.bendingMomentU, s.bendingMomentV, s.torsionConstant);
+    put(out, l.restU);
   });
   putRows(out, "attachments", model.attachments.size(), [&](std::size_t k) {
     const Attachment& a = model.attachments[k];
@@ -265,12 +267,15 @@ void readLinks(const std::string& path, const XmlElement& root, SoftBodyModel& m
     ElasticLink& l = model.links.emplace_back();
     l.sphere0 = rows.index(model.spheres.size());
     l.sphere1 = rows.index(model.spheres.size());
-    rows.get(l.area, l.bendingMomentU, l.bendingMomentV, l.torsionConstant, l.restU);
     const Eigen::Vector3d line = model.spheres[l.sphere1].restLinkEnd - model.spheres[l.sphere0].restLinkEnd;
     rows.require(line.norm() > 0, "a link without length");
-    rows.require(l.area > 0, "an area that is not positive");
-    rows.require(l.bendingMomentU > 0 && l.bendingMomentV > 0, "a bending moment that is not positive");
-    rows.require(l.torsionConstant > 0, "a torsion constant that is not positive");
+    for (LinkSection& s : l.sections) {
+      rows.get(s.area, s.bendingMomentU, s.bendingMomentV, s.torsionConstant);
+      rows.require(s.area > 0, "an area that is not positive");
+      rows.require(s.bendingMomentU > 0 && s.bendingMomentV > 0, "a bending moment that is not positive");
+      rows.require(s.torsionConstant > 0, "a torsion constant that is not positive");
+    }
+    rows.get(l.restU);
     // Computed in double and written exactly, so only rounding separates them from the ideal.
     rows.require(std::abs(l.restU.norm() - 1) <= 1e-9, "a restU that is not a unit vector");
     rows.require(std::abs(l.restU.dot(line)) <= 1e-6 * line.norm(), "a restU that is not perpendicular to its link");

@@ -47,10 +47,10 @@ inline LinkHost linkHost(const WorldData& d, int link) {
 }
 
 // The point at `along` of the centre line, slid with its stretch, plus the offset in the frame of sphere 0 carried onto
-// the line, twisted by along * twist (the torsion is shared along the link) and as much shorter as the link is thinner.
+// the line, twisted by its share of the torsion and as much shorter as the link is thinner.
 inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   Lanes c, s;
-  const Lanes angle = g.along * h.twist;
+  const Lanes angle = g.twistShare * h.twist;
   if (any(isLess(splat(kSmallAngle), magnitude(angle)))) {
     cosineSine(angle, c, s);
   } else {
@@ -60,7 +60,7 @@ inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   s = s * h.thickness;
   Anchor a;
   a.base = fma(g.along, h.line, h.origin);
-  a.omega = fma(fma(g.along, h.spinAlong, h.spin0), h.n, h.turning);
+  a.omega = fma(fma(g.twistShare, h.spinAlong, h.spin0), h.n, h.turning);
   a.offset =
       fma(fnma(g.restOffset.z, s, g.restOffset.y * c), h.axisU, fma(g.restOffset.y, s, g.restOffset.z * c) * h.axisV);
   a.baseVelocity = fma(h.thicknessRate, a.offset, fma(g.along, h.lineVelocity, h.originVelocity));

@@ -8,19 +8,34 @@
 // A body's masses, stiffnesses and dampings from its tissue and its model's geometry (physics/README.md). Model frame.
 namespace medulla {
 
+// Where a link ends (model frame), and which part of the model's link lies between: not all of it where the surface
+// around one end is held.
+struct LinkSpan {
+  Eigen::Vector3d end0, end1;  // m
+  double from = 0, to = 1;
+  bool clamped0 = false, clamped1 = false;  // the surface around the held sphere there is fixed; one of them at most
+};
+
+// N m/rad about one section axis: moment at an end per flexion there, and at the other.
+struct FlexionStiffness {
+  double end0 = 0, end1 = 0;
+  double couple = 0;  // 0 of springs
+};
+
 struct LinkStiffness {
-  double elongation = 0;              // N/m
-  double flexionU = 0, flexionV = 0;  // N m/rad about U, about V: moment at an end per flexion there
-  double coupleU = 0, coupleV = 0;    // N m/rad: moment at an end per flexion at the other; 0 of springs
-  double torsion = 0;                 // N m/rad
+  double elongation = 0;  // N/m
+  FlexionStiffness flexionU, flexionV;
+  double torsion = 0;  // N m/rad
 };
 
 struct BodyMechanics {
   std::vector<double> sphereMass;              // kg, without what the nodes carry
   std::vector<Eigen::Matrix3d> sphereInertia;  // kg m2 about the frame, likewise
   std::vector<bool> moves, turns;              // per sphere: what is not fixed
+  std::vector<LinkSpan> spans;                 // per link
   std::vector<LinkStiffness> links;
-  std::vector<Attachment> attachments;      // of the model, with restOffset made exactly perpendicular to links
+  std::vector<Attachment> attachments;      // to the spans of links, with restOffset made exactly perpendicular to them
+  std::vector<double> twistShare;           // per node on a link: of its torsion, what lies between end0 and the node
   std::vector<double> attachmentStiffness;  // N/m per node; of the full surface
   std::vector<double> edgeStiffness;        // N/m per edge; of the full surface
   std::vector<double> nodeMass;             // kg; 0 on skin

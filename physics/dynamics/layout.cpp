@@ -54,9 +54,10 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
     if (lane == 0) d.links.groups.push_back(LinkGroup{});
     LinkGroup& g = d.links.groups.back();
     const ElasticLink& link = m.links[i];
-    const FillingSphere &s0 = m.spheres[link.sphere0], &s1 = m.spheres[link.sphere1];
-    const Vector3d line = s1.restLinkEnd - s0.restLinkEnd;
-    const Vector3d arm0 = s0.restLinkEnd - s0.restFrame, arm1 = s1.restLinkEnd - s1.restFrame;
+    const LinkSpan& span = mechanics.spans[i];
+    const Vector3d line = span.end1 - span.end0;
+    const Vector3d arm0 = span.end0 - m.spheres[link.sphere0].restFrame,
+                   arm1 = span.end1 - m.spheres[link.sphere1].restFrame;
     const LinkStiffness& stiffness = mechanics.links[i];
     const bool beam = body.links == LinkModel::beam;
     g.hasArms = g.hasArms || !arm0.isZero(0) || !arm1.isZero(0);
@@ -74,11 +75,13 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
       setLane(g.restArm0, l, arm0);
       setLane(g.restArm1, l, arm1);
       g.elongation[l] = stiffness.elongation;
-      g.flexionU[l] = stiffness.flexionU;
-      g.flexionV[l] = stiffness.flexionV;
+      g.flexionU0[l] = stiffness.flexionU.end0;
+      g.flexionV0[l] = stiffness.flexionV.end0;
+      g.flexionU1[l] = stiffness.flexionU.end1;
+      g.flexionV1[l] = stiffness.flexionV.end1;
       g.torsion[l] = stiffness.torsion;
-      g.couple[l] = 0.5 * (stiffness.coupleV + stiffness.coupleU);
-      g.coupleDifference[l] = 0.5 * (stiffness.coupleV - stiffness.coupleU);
+      g.couple[l] = 0.5 * (stiffness.flexionV.couple + stiffness.flexionU.couple);
+      g.coupleDifference[l] = 0.5 * (stiffness.flexionV.couple - stiffness.flexionU.couple);
       g.neoHookean[l] = beam ? 1 : 0;
       g.thinning[l] = beam ? 2 * body.tissue.poisson : 0;
       g.relaxation[l] = mechanics.linkRelaxation;
@@ -164,6 +167,7 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
     const int link = d.ranges[b].firstLink + a.host, l = link % 4;
     const Vector3d t = vectorOf(d.links.groups[link / 4].restT, l), u = vectorOf(d.links.groups[link / 4].restU, l);
     g.along[lane] = a.along;
+    g.twistShare[lane] = mechanics[b].twistShare[k];
     setLane(g.restOffset, lane, {0, a.restOffset.dot(u), a.restOffset.dot(t.cross(u))});
   }
 }

@@ -125,13 +125,13 @@ MEDULLA_INLINE Flexion damped(const Flexion& q, const Flexion& rate, Lanes relax
 //   energy = 1/2 sum k a^2 + ... + c (cos (a0 a1 + b0 b1) + sin (b0 a1 - a0 b1)) + d (a0 a1 - b0 b1)
 MEDULLA_INLINE Flexion momentsAt0(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1) {
   const Lanes a = m.cosine * q1.a - m.sine * q1.b, b = fma(m.sine, q1.a, m.cosine * q1.b);
-  return {fma(l.flexionV, q0.a, fma(l.couple, a, l.coupleDifference * q1.a)),
-          fma(l.flexionU, q0.b, l.couple * b - l.coupleDifference * q1.b)};
+  return {fma(l.flexionV0, q0.a, fma(l.couple, a, l.coupleDifference * q1.a)),
+          fma(l.flexionU0, q0.b, l.couple * b - l.coupleDifference * q1.b)};
 }
 MEDULLA_INLINE Flexion momentsAt1(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1) {
   const Lanes a = fma(m.sine, q0.b, m.cosine * q0.a), b = m.cosine * q0.b - m.sine * q0.a;
-  return {fma(l.flexionV, q1.a, fma(l.couple, a, l.coupleDifference * q0.a)),
-          fma(l.flexionU, q1.b, l.couple * b - l.coupleDifference * q0.b)};
+  return {fma(l.flexionV1, q1.a, fma(l.couple, a, l.coupleDifference * q0.a)),
+          fma(l.flexionU1, q1.b, l.couple * b - l.coupleDifference * q0.b)};
 }
 MEDULLA_INLINE Lanes couplingTorque(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1) {
   return l.couple * (m.cosine * (q0.b * q1.a - q0.a * q1.b) - m.sine * fma(q0.a, q1.a, q0.b * q1.b));

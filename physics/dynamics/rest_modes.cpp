@@ -27,9 +27,9 @@ std::vector<MeasureRow> measureRows(const SoftBodyModel& m, const BodyMechanics&
   const Vector3d none = Vector3d::Zero();
   for (std::size_t k = 0; k < m.links.size(); ++k) {
     const ElasticLink& l = m.links[k];
-    const FillingSphere &s0 = m.spheres[l.sphere0], &s1 = m.spheres[l.sphere1];
-    const Vector3d d = s1.restLinkEnd - s0.restLinkEnd;
-    const Vector3d arm0 = s0.restLinkEnd - s0.restFrame, arm1 = s1.restLinkEnd - s1.restFrame;
+    const Vector3d d = b.spans[k].end1 - b.spans[k].end0;
+    const Vector3d arm0 = b.spans[k].end0 - m.spheres[l.sphere0].restFrame,
+                   arm1 = b.spans[k].end1 - m.spheres[l.sphere1].restFrame;
     const double length = d.norm();
     const Vector3d t = d / length, u = (l.restU - t * t.dot(l.restU)).normalized(), v = t.cross(u);
     const LinkStiffness& s = b.links[k];
@@ -37,11 +37,14 @@ std::vector<MeasureRow> measureRows(const SoftBodyModel& m, const BodyMechanics&
       rows.push_back({l.sphere0, l.sphere1, line, turn0 - arm0.cross(line), turn1 + arm1.cross(line), stiffness});
     };
     add(t, none, none, s.elongation);
-    // [[k, c], [c, k]] has the sum and the difference of both ends as its own directions.
-    add(2 * u / length, -v, -v, 0.5 * (s.flexionV + s.coupleV));
-    add(none, -v, v, 0.5 * (s.flexionV - s.coupleV));
-    add(2 * v / length, u, u, 0.5 * (s.flexionU + s.coupleU));
-    add(none, u, -u, 0.5 * (s.flexionU - s.coupleU));
+    // k0 a0^2 + 2 c a0 a1 + k1 a1^2 as squares: k0 (a0 + c/k0 a1)^2 + (k1 - c^2/k0) a1^2
+    const auto addFlexion = [&](const Vector3d& across, const Vector3d& turn, const FlexionStiffness& f) {
+      const double ratio = f.couple / f.end0;
+      add((1 + ratio) / length * across, turn, ratio * turn, f.end0);
+      add(across / length, none, turn, f.end1 - ratio * f.couple);
+    };
+    addFlexion(u, -v, s.flexionV);
+    addFlexion(v, u, s.flexionU);
     add(none, -t, t, s.torsion);
   }
   return rows;
@@ -124,23 +127,25 @@ class RestModel {
   // An anchor on a link, at rest.
   struct LinkAnchor {
     int s0, s1;  // the spheres' places in the vector of freedoms
-    double along, length, thinning;
+    double along, twistShare, length, thinning;
     Vector3d n, arm0, arm1, offset;
   };
 
-  LinkAnchor linkAnchor(const Attachment& a) const {
+  LinkAnchor linkAnchor(int i) const {
+    const Attachment& a = mechanics_.attachments[i];
     const ElasticLink& l = model_.links[a.host];
-    const FillingSphere &sphere0 = model_.spheres[l.sphere0], &sphere1 = model_.spheres[l.sphere1];
-    const Vector3d line = sphere1.restLinkEnd - sphere0.restLinkEnd;
+    const LinkSpan& span = mechanics_.spans[a.host];
+    const Vector3d line = span.end1 - span.end0;
     const double length = line.norm();
     return {6 * l.sphere0,
             6 * l.sphere1,
             a.along,
+            mechanics_.twistShare[i],
             length,
             thinning_ / length,
             line / length,
-            sphere0.restLinkEnd - sphere0.restFrame,
-            sphere1.restLinkEnd - sphere1.restFrame,
+            span.end0 - model_.spheres[l.sphere0].restFrame,
+            span.end1 - model_.spheres[l.sphere1].restFrame,
             a.restOffset};
   }
 
@@ -148,10 +153,10 @@ class RestModel {
   Vector3d anchorRate(int i, const VectorXd& x) const {
     const Attachment& a = mechanics_.attachments[i];
     if (!a.onLink) return x.segment<3>(6 * a.host) + x.segment<3>(6 * a.host + 3).cross(a.restOffset);
-    const LinkAnchor p = linkAnchor(a);
+    const LinkAnchor p = linkAnchor(i);
     const Vector3d w0 = x.segment<3>(p.s0 + 3), w1 = x.segment<3>(p.s1 + 3);
     const Vector3d v0 = x.segment<3>(p.s0) + w0.cross(p.arm0), dv = x.segment<3>(p.s1) + w1.cross(p.arm1) - v0;
-    const double spin = p.n.dot((1 - p.along) * w0 + p.along * w1);
+    const double spin = p.n.dot((1 - p.twistShare) * w0 + p.twistShare * w1);
     const Vector3d omega = p.n.cross(dv) / p.length + spin * p.n;
     return v0 + p.along * dv + omega.cross(p.offset) - p.thinning * p.n.dot(dv) * p.offset;
   }
@@ -164,14 +169,14 @@ class RestModel {
       y.segment<3>(6 * a.host + 3) += a.restOffset.cross(f);
       return;
     }
-    const LinkAnchor p = linkAnchor(a);
+    const LinkAnchor p = linkAnchor(i);
     const Vector3d moment = p.offset.cross(f);
     const Vector3d swing = moment.cross(p.n) / p.length - p.thinning * p.offset.dot(f) * p.n;
     const Vector3d f0 = (1 - p.along) * f - swing, f1 = p.along * f + swing;
     y.segment<3>(p.s0) += f0;
     y.segment<3>(p.s1) += f1;
-    y.segment<3>(p.s0 + 3) += (1 - p.along) * p.n.dot(moment) * p.n + p.arm0.cross(f0);
-    y.segment<3>(p.s1 + 3) += p.along * p.n.dot(moment) * p.n + p.arm1.cross(f1);
+    y.segment<3>(p.s0 + 3) += (1 - p.twistShare) * p.n.dot(moment) * p.n + p.arm0.cross(f0);
+    y.segment<3>(p.s1 + 3) += p.twistShare * p.n.dot(moment) * p.n + p.arm1.cross(f1);
   }
 
   VectorXd timesMass(const VectorXd& x) const {

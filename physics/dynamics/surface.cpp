@@ -65,7 +65,7 @@ void pullOnLink(WorldData& d, const HostRange& range) {
     const NodeGroup& group = d.nodes.groups[g];
     const Lanes3 turn = pullNodes(d.nodes, relaxation, group, anchorOnLink(host, group), g);
     moment = moment + turn;
-    twist = fma(group.along, dot(host.n, turn), twist);
+    twist = fma(group.twistShare, dot(host.n, turn), twist);
   }
   const Lanes total = sumOfLanes(moment, twist);
   addLoads(d.links.frames[range.host / 4], range.host % 4, Lanes{0, 0, 0, total[3]}, zero, total);
@@ -97,7 +97,7 @@ void returnToLink(WorldData& d, const HostRange& range) {
     sum = sum + force;
     along = fma(s, force, along);
     moment = moment + turn;
-    twist = fma(s, dot(n, turn), twist);
+    twist = fma(d.nodes.groups[g].twistShare, dot(n, turn), twist);
     thickness = thickness + dot(offset, force);
   }
   addLoads(f, lane, sumOfLanes(sum, twist), sumOfLanes(along, thickness), sumOfLanes(moment, zero));

@@ -40,16 +40,18 @@ struct Spheres {
 
 struct LinkGroup {  // constants of four links
   std::uint32_t sphere0[4], sphere1[4];
-  Lanes3 restT, restU, restV;                     // centre line and section axes at rest, in both spheres' frames
-  Lanes restLength, inverseRestLength;            // m, 1/m
-  Lanes smallestLength;                           // m; forces divide by no less
-  Lanes3 restArm0, restArm1;                      // m, sphere frames: from the frame to where the link ends
-  bool hasArms;                                   // some arm of the four is not zero
-  Lanes elongation, flexionU, flexionV, torsion;  // N/m, N m/rad about U, about V (each at either end), N m/rad
-  Lanes couple, coupleDifference;                 // N m/rad between the ends: mean over U and V, and half of V less U
-  Lanes neoHookean;                               // 1, or 0: elongation is linear
-  Lanes thinning;    // twice the Poisson's ratio that what hangs on the link follows; 0: none
-  Lanes relaxation;  // s, damping over stiffness (Rayleigh's beta)
+  Lanes3 restT, restU, restV;           // centre line and section axes at rest, in both spheres' frames
+  Lanes restLength, inverseRestLength;  // m, 1/m
+  Lanes smallestLength;                 // m; forces divide by no less
+  Lanes3 restArm0, restArm1;            // m, sphere frames: from the frame to where the link ends
+  bool hasArms;                         // some arm of the four is not zero
+  Lanes elongation, torsion;            // N/m, N m/rad
+  Lanes flexionU0, flexionV0;           // N m/rad about U, about V, at the end on sphere 0
+  Lanes flexionU1, flexionV1;           // on sphere 1
+  Lanes couple, coupleDifference;       // N m/rad between the ends: mean over U and V, and half of V less U
+  Lanes neoHookean;                     // 1, or 0: elongation is linear
+  Lanes thinning;                       // twice the Poisson's ratio that what hangs on the link follows; 0: none
+  Lanes relaxation;                     // s, damping over stiffness (Rayleigh's beta)
 };
 
 // The four links as the surface sees them, and what the surface gives back.
@@ -68,7 +70,7 @@ struct LinkFrame {
   Lanes3 force1, torque0, torque1;        // N on sphere 1 (and minus it on sphere 0), N m: elongation and flexion
   Lanes twistMoment;                      // N m, of torsion
   Lanes3 loadSum, loadAlong, loadMoment;  // sums over the nodes of force, along * force, offset x force (on the nodes)
-  Lanes loadTwist;                        // sum of along * n . (offset x force)
+  Lanes loadTwist;                        // sum of twistShare * n . (offset x force)
   Lanes loadThickness;                    // N m, sum of offset . force
 };
 
@@ -88,6 +90,7 @@ struct Links {
 
 struct NodeGroup {    // constants of four nodes
   Lanes along;        // 0..1 on a link
+  Lanes twistShare;   // 0..1 of the link's twist
   Lanes3 restOffset;  // m; on a link (0, component on U, component on V), on a sphere in its frame
   Lanes stiffness;    // N/m of the attachment; 0 on pads
 };

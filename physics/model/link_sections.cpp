@@ -3,6 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "physics/model/plane_section.h"
 
@@ -10,7 +12,6 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-static constexpr int stations = 9;
 static constexpr double pi = 3.141592653589793;
 
 static double torsionConstant(const SectionMoments& s) {
@@ -26,17 +27,42 @@ static SectionMoments disc(double radius) {
   return s;
 }
 
-static std::vector<SectionMoments> sectionsAlong(const TriangleMesh& mesh, const PowerSites& sites,
-                                                 const Vector3d& start, const Vector3d& end, const Plane& across) {
-  std::vector<SectionMoments> sections;
+using Sections = std::array<SectionMoments, ElasticLink::kSections>;
+
+// Stations that the plane misses get the nearest other's section, the one before of two.
+static void fillGaps(Sections& sections, double radius) {
   double largest = 0;
-  for (int k = 0; k < stations; ++k) {
-    const Plane plane{start + (k + 0.5) / stations * (end - start), across.u, across.v};
-    sections.push_back(planeSection(mesh, plane, &sites, {0, 1}));
-    largest = std::max(largest, sections.back().area);
+  for (const SectionMoments& s : sections) largest = std::max(largest, s.area);
+  if (largest <= 0) sections.fill(disc(radius));
+  const Sections measured = sections;
+  const auto isGap = [&](int k) { return measured[k].area <= 0.01 * largest; };
+  for (int k = 0; k < ElasticLink::kSections; ++k) {
+    for (int away = 1; isGap(k) && away < ElasticLink::kSections; ++away) {
+      const int before = k - away, after = k + away;
+      const int found = before >= 0 && !isGap(before) ? before : after;
+      if (found >= ElasticLink::kSections || isGap(found)) continue;
+      sections[k] = measured[found];
+      break;
+    }
   }
-  std::erase_if(sections, [&](const SectionMoments& s) { return s.area <= 0.01 * largest; });
-  return sections;
+}
+
+// Where the body widens, tension cannot follow to the rim at once: in a cone it is the same on spheres about the cone's
+// tip, whose part inside has the rim of a flat section farther back, cos(slope) times as wide. Torsion is borne near
+// the rim anyway; taking it so made the gallbladder of finite elements a fifth too soft. What widens faster than
+// `kSteepest`, as where an arm joins, is no cone.
+static std::array<double, ElasticLink::kSections> taperCosines(const Sections& sections, double length) {
+  constexpr int last = ElasticLink::kSections - 1;
+  constexpr double kSteepest = 0.5;
+  std::array<double, ElasticLink::kSections> out;
+  const auto radius = [&](int k) { return std::sqrt(sections[k].area / pi); };
+  for (int k = 0; k <= last; ++k) {
+    const int before = std::max(k - 1, 0), after = std::min(k + 1, last);
+    const double step = (after - before) * length / ElasticLink::kSections;
+    const double slope = std::min(std::abs(radius(after) - radius(before)) / step, kSteepest);
+    out[k] = 1 / std::hypot(1, slope);
+  }
+  return out;
 }
 
 static void measureLink(const TriangleMesh& mesh, const PowerSites& sites, const std::vector<FillingSphere>& spheres,
@@ -45,25 +71,28 @@ static void measureLink(const TriangleMesh& mesh, const PowerSites& sites, const
   const Vector3d line = s1.restLinkEnd - s0.restLinkEnd;
   const Plane across = planeAcross(s0.restLinkEnd, line.normalized());
   const PowerSites around = sitesAround(sites, {link.sphere0, link.sphere1});
-  std::vector<SectionMoments> sections = sectionsAlong(mesh, around, s0.restLinkEnd, s1.restLinkEnd, across);
-  if (sections.empty()) sections.push_back(disc(std::min(s0.radius, s1.radius)));
-
-  double stretch = 0, twist = 0;
-  Eigen::Matrix2d bend = Eigen::Matrix2d::Zero();
-  for (const SectionMoments& s : sections) {
-    stretch += 1 / s.area;
-    twist += 1 / torsionConstant(s);
-    bend += s.secondMoment.inverse();
+  Sections sections;
+  for (int k = 0; k < ElasticLink::kSections; ++k) {
+    const Plane plane{s0.restLinkEnd + (k + 0.5) / ElasticLink::kSections * line, across.u, across.v};
+    sections[k] = planeSection(mesh, plane, &around, {0, 1});
   }
-  const auto count = static_cast<double>(sections.size());
-  link.area = count / stretch;
-  link.torsionConstant = count / twist;
-  // Principal axes of the mean tensor. Bending about an axis is resisted by the extent across it.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> principal((count * bend.inverse()).eval());
-  const Eigen::Vector2d axis = principal.eigenvectors().col(0);
-  link.restU = (axis.x() * across.u + axis.y() * across.v).normalized();
-  link.bendingMomentU = principal.eigenvalues()[1];
-  link.bendingMomentV = principal.eigenvalues()[0];
+  fillGaps(sections, std::min(s0.radius, s1.radius));
+
+  const std::array<double, ElasticLink::kSections> taper = taperCosines(sections, line.norm());
+
+  // Principal axes of the mean tensor, as compliances add up. Bending about an axis is resisted by the extent across
+  // it.
+  Eigen::Matrix2d bend = Eigen::Matrix2d::Zero();
+  for (const SectionMoments& s : sections) bend += s.secondMoment.inverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> principal(bend.inverse().eval());
+  const Eigen::Vector2d u = principal.eigenvectors().col(0), v = principal.eigenvectors().col(1);
+  link.restU = (u.x() * across.u + u.y() * across.v).normalized();
+  for (int k = 0; k < ElasticLink::kSections; ++k) {
+    const Eigen::Matrix2d compliance = sections[k].secondMoment.inverse();
+    const double two = taper[k] * taper[k], four = two * two;
+    link.sections[k] = {two * sections[k].area, four / v.dot(compliance * v), four / u.dot(compliance * u),
+                        torsionConstant(sections[k])};
+  }
 }
 
 void measureLinks(const TriangleMesh& mesh, const PowerSites& sites, const std::vector<FillingSphere>& spheres,

@@ -24,16 +24,21 @@ struct FillingSphere {
   Eigen::Matrix3d secondMoment = Eigen::Matrix3d::Zero();  // m5, integral of r r^T over that cell about restFrame
 };
 
-// An elastic link (paper 2.2, figure 3) between the link ends of two spheres. The section is that of an equivalent
-// uniform beam: bending and torsion of the tapered body averaged as compliances along the link.
+// The body's section across a link.
+struct LinkSection {
+  double area = 0;             // m2
+  double bendingMomentU = 0;   // m4, second moment of area that resists bending about restU
+  double bendingMomentV = 0;   // m4, the same about restV
+  double torsionConstant = 0;  // m4, Saint-Venant
+};
+
+// An elastic link (paper 2.2, figure 3) between the link ends of two spheres.
 struct ElasticLink {
+  static constexpr int kSections = 9;  // of equal lengths of the link, each measured in its middle, from sphere0 on
   int sphere0 = 0, sphere1 = 0;
-  double area = 0;                                  // m2
-  double bendingMomentU = 0;                        // m4, second moment of area that resists bending about restU
-  double bendingMomentV = 0;                        // m4, the same about restV
-  double torsionConstant = 0;                       // m4, Saint-Venant
+  std::array<LinkSection, kSections> sections;
   Eigen::Vector3d restU = Eigen::Vector3d::Zero();  // unit, perpendicular to the centre line; V = (centre line) x U;
-                                                    // principal axes of the section
+                                                    // principal axes of the mean section
 };
 
 // How a surface node hangs on the skeleton (paper 2.3).
