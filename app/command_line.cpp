@@ -321,14 +321,25 @@ struct ChartArguments {
   std::vector<std::string> steps = {"0.1", "0.2", "0.5", "1", "2", "5", "10", "20"};
 };
 
+std::vector<double> numbersOf(const std::string& option, const std::vector<std::string>& words, double low, double high,
+                              double unit, const std::string& expected) {
+  std::vector<double> out;
+  for (const std::string& word : words) {
+    const auto value = parseNumber<double>(word);
+    if (!value || *value < low || *value > high) usageError(option, word, expected);
+    out.push_back(unit * *value);
+  }
+  return out;
+}
+
+std::vector<double> stepsOf(const std::string& option, const std::vector<std::string>& words) {
+  return numbersOf(option, words, 1e-3, 50, 1e-3, "milliseconds from 0.001 to 50");
+}
+
 ChartOptions chartOptions(const ChartArguments& a) {
   ChartOptions options = a.options;
   options.run = runOptions(a.run);
-  for (const std::string& step : a.steps) {
-    const auto ms = parseNumber<double>(step);
-    if (!ms || *ms < 1e-3 || *ms > 50) usageError("--steps", step, "milliseconds from 0.001 to 50");
-    options.steps.push_back(1e-3 * *ms);
-  }
+  options.steps = stepsOf("--steps", a.steps);
   return options;
 }
 
@@ -360,6 +371,41 @@ Verb addChart(CLI::App& app) {
   return {c, [arguments] { return runChart(chartOptions(*arguments)); }};
 }
 
+struct StabilityArguments {
+  RunArguments run;
+  StabilityOptions options;
+  std::vector<std::string> steps = {"0.1", "0.5", "2", "10", "50"}, trialSteps = {"1", "10", "50"},
+                           young = {"1e2", "1e3", "1e4", "1e5", "1e6", "1e7", "1e8", "1e9"};
+};
+
+StabilityOptions stabilityOptions(const StabilityArguments& a) {
+  StabilityOptions options = a.options;
+  options.run = runOptions(a.run);
+  options.steps = stepsOf("--steps", a.steps);
+  options.trialSteps = stepsOf("--trial-steps", a.trialSteps);
+  options.young = numbersOf("--young", a.young, 1e-3, 1e12, 1, "Pa from 0.001 to 1e12");
+  return options;
+}
+
+Verb addStability(CLI::App& app) {
+  const auto arguments = std::make_shared<StabilityArguments>();
+  StabilityArguments& a = *arguments;
+  CLI::App* c =
+      app.add_subcommand("stability", "torture a scene's first body by every method and step, and draw what survives");
+  addSceneOptions(*c, a.run);
+  c->add_option("-o,--output", a.options.folder,
+                "folder for map.csv, trials.csv, stability.gnuplot and stability.svg; made where missing")
+      ->type_name("DIR")
+      ->required();
+  const auto addList = [&](const char* name, std::vector<std::string>& values, const char* help, const char* type) {
+    c->add_option(name, values, help)->type_name(type)->delimiter(',')->allow_extra_args(false)->capture_default_str();
+  };
+  addList("--steps", a.steps, "steps of the map, ms", "MS,MS,...");
+  addList("--young", a.young, "stiffnesses of the map, Pa", "PA,PA,...");
+  addList("--trial-steps", a.trialSteps, "steps of the trials, ms", "MS,MS,...");
+  return {c, [arguments] { return runStability(stabilityOptions(*arguments)); }};
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App app(kIntroduction, "medulla");
   app.footer(kExitCodes);
@@ -368,7 +414,8 @@ int dispatch(int argc, char** argv) {
   bool version = false;
   app.add_flag("--version", version, "version, and those of Mesa, Embree and the compiler");
   std::vector<Verb> verbs;
-  for (const auto add : {addRender, addReplay, addCheck, addInfo, addBuild, addNew, addGolden, addCompare, addChart})
+  for (const auto add :
+       {addRender, addReplay, addCheck, addInfo, addBuild, addNew, addGolden, addCompare, addChart, addStability})
     verbs.push_back(add(app));
   try {
     app.parse(argc, argv);

@@ -78,6 +78,8 @@ struct Scene {
   Eigen::Vector3d gravity{0, -9.81, 0};        // m/s2
   double ambientDrag = 0;                      // 1/s, >= 0
   int substeps = 0;                            // per dynamics frame; 0: as many as the stability estimate asks for
+  Integrator integrator = Integrator::explicitEuler;
+  int order = 1;  // 1, or 2 of the implicit integrator
   ContactMode contact = ContactMode::balls;
   std::vector<SceneBody> bodies;
   std::vector<SceneStatic> statics;

@@ -12,6 +12,8 @@ static World makeWorld(const LoadedScene& loaded) {
   settings.gravity = scene.gravity;
   settings.ambientDrag = scene.ambientDrag;
   settings.frameDuration = 1 / scene.dynamicsRate;
+  settings.integrator = scene.integrator;
+  settings.order = scene.order;
   settings.substeps = scene.substeps;
   settings.contact = scene.contact;
   std::vector<BodyDescription> bodies;

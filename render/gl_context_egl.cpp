@@ -25,7 +25,7 @@ class EglContext : public GlContext {
     if (eglBindAPI(EGL_OPENGL_API))
       context_ = eglCreateContext(display_, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, attributes);
     if (context_ == EGL_NO_CONTEXT) throw std::runtime_error("EGL could not make an OpenGL 3.3 core context");
-    makeCurrent();
+    EglContext::makeCurrent();  // by name: virtual dispatch does not reach further in a constructor
   }
   // The display is shared by the process and stays open: eglTerminate would pull it from under other contexts.
   ~EglContext() override {

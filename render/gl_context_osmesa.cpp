@@ -27,7 +27,7 @@ class OsmesaContext : public GlContext {
                               0};
     context_ = OSMesaCreateContextAttribs(attributes, nullptr);
     if (!context_) throw std::runtime_error("OSMesa could not make an OpenGL 3.3 core context");
-    makeCurrent();
+    OsmesaContext::makeCurrent();  // by name: virtual dispatch does not reach further in a constructor
   }
   ~OsmesaContext() override { OSMesaDestroyContext(context_); }
   void makeCurrent() override {

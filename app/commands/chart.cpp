@@ -28,6 +28,9 @@ const std::vector<ChartMethod>& chartMethods() {
   static const std::vector<ChartMethod> methods = {
       {"full", {{"body.*.surface", "full"}}},
       {"skin", {{"body.*.surface", "skin"}}},
+      {"springs", {{"body.*.links", "springs"}}},
+      {"implicit", {{"dynamics.integrator", "implicit"}}},
+      {"implicit_2", {{"dynamics.integrator", "implicit"}, {"dynamics.order", "2"}}},
   };
   return methods;
 }

@@ -68,6 +68,14 @@ struct ChartOptions {
 std::vector<std::string> chartMethodNames();
 int runChart(const ChartOptions& options);
 
+struct StabilityOptions {
+  RunOptions run;                         // of its scene, the first body
+  std::string folder;                     // for map.csv, trials.csv, stability.gnuplot and stability.svg
+  std::vector<double> steps, trialSteps;  // s, of the map and of the trials
+  std::vector<double> young;              // Pa, of the map
+};
+int runStability(const StabilityOptions& options);
+
 int printVersion();
 
 }  // namespace medulla

@@ -85,8 +85,11 @@ void readClock(const XmlElement& clock, Scene& scene) {
 }
 
 void readDynamics(const XmlElement& dynamics, Scene& scene) {
-  readChoice(dynamics, "integrator", {"explicit"}, 0);
-  readChoice(dynamics, "order", {"1"}, 0);
+  constexpr Integrator integrators[] = {Integrator::explicitEuler, Integrator::implicit};
+  scene.integrator = integrators[readChoice(dynamics, "integrator", {"explicit", "implicit"}, 0)];
+  scene.order = 1 + readChoice(dynamics, "order", {"1", "2"}, 0);
+  if (scene.order == 2 && scene.integrator != Integrator::implicit)
+    refuse(dynamics, "order", "expected 1 with integrator=\"explicit\": order 2 needs integrator=\"implicit\"");
   scene.gravity = readVector(dynamics, "gravity", scene.gravity);
   scene.ambientDrag = readNumber(dynamics, "ambient_drag", scene.ambientDrag, notNegative);
   scene.substeps = readInteger(dynamics, "substeps", scene.substeps, {0, 100000});

@@ -14,13 +14,18 @@ inline Lanes arcSineRemainder(Lanes x) {
 }
 
 struct AngleOverSine {
-  Lanes value;  // f = theta / sin(theta)
-  Lanes slope;  // h = -df/dcos(theta) = (1 - f cos(theta)) / sin(theta)^2
+  Lanes value;                         // f = theta / sin(theta)
+  Lanes slope;                         // h = -df/dcos(theta) = (1 - f cos(theta)) / sin(theta)^2
+  Lanes folded = _mm256_setzero_pd();  // all bits where theta is beyond kFoldAngle
 };
 
-// Beyond 170 degrees the sine is floored: f grows without bound towards 180 and no explicit step would survive it.
-// There alone the measure is no longer exact.
-constexpr double kSmallestSine = 0.17;
+// Beyond this angle, 116 degrees, where f sin(theta) has slope 1 and f slope 0 on either side, tan(theta) = -theta, f
+// stays what it is: f sin(theta) falls back then as it rose. f itself grows without bound towards 180 degrees, where a
+// flexion has no direction, and no explicit step would follow. link_force.cpp turns the energy's sign there, so that it
+// rises on to 180.
+constexpr double kFoldAngle = 2.028757838110434;
+constexpr double kFoldCosine = -0.4421205929549983;
+constexpr double kFoldValue = 2.261826334114652;  // -1 / kFoldCosine
 
 // From cos(theta), theta in 0..180 degrees. With x = sin^2(theta/2), w = cos(theta/2): f = asin(sqrt x) / (sqrt x w),
 // and h without cancellation where theta is small: (2 - 1/(1+w) - r (1-2x)) / (4 w^3). Lanes do not influence each
@@ -43,10 +48,13 @@ inline AngleOverSine angleOverSine(Lanes cosine) {
   const Lanes root = squareRoot(x);
   const Lanes y = larger(select(isLarge, half * (one - root), zero), zero);
   const Lanes arc = fnma(two * squareRoot(y), fma(y, arcSineRemainder(y), one), splat(1.57079632679489661923));
-  const Lanes sine = larger(two * root * w, splat(kSmallestSine));
+  const Lanes sine = larger(two * root * w, splat(0.5));  // folded ones are selected away below
   const Lanes value = two * arc / sine;
   out.value = select(isLarge, value, out.value);
   out.slope = select(isLarge, fnma(value, cosine, one) / (sine * sine), out.slope);
+  out.folded = isLess(cosine, splat(kFoldCosine));
+  out.value = select(out.folded, splat(kFoldValue), out.value);
+  out.slope = select(out.folded, zero, out.slope);
   return out;
 }
 

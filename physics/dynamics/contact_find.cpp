@@ -70,9 +70,8 @@ void findPairContacts(WorldData& d, double moved) {
   }
 }
 
-void resolveContacts(WorldData& d) {
+void findContacts(WorldData& d) {
   ContactData& c = d.contact;
-  if (c.mode == ContactMode::none) return;
   placeBalls(d);
   double moved = farthestMove(c);
   if (!(moved <= c.freeMove)) {
@@ -82,6 +81,11 @@ void resolveContacts(WorldData& d) {
   c.contacts.clear();
   findPairContacts(d, moved);
   findStaticContacts(d, moved);
+}
+
+void resolveContacts(WorldData& d) {
+  if (d.contact.mode == ContactMode::none) return;
+  findContacts(d);
   solveContacts(d);
 }
 

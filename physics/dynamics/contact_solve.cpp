@@ -114,21 +114,10 @@ void chooseTangents(Contact& c) {
 // False where nothing can move, or where the two part or are too slow to meet within the substep.
 bool prepare(const WorldData& d, Contact& c) {
   const double h = d.substep;
-  if (c.gap > 0) {  // until they touch: they may come as close as the gap allows
-    if (c.gap + h * dotProduct(relativeVelocity(d, c), c.normal) > 0) return false;
-    c.bias = c.gap / h;
-  } else {
-    // The spring's mass is that of whole cells. On a full surface most of it sits in nodes that hang elastically on the
-    // spheres: the spheres' own would make contacts ten times softer, and what lies on them is the whole.
-    double inverseCells = 0;
-    for (int e = 0; e < c.ends; ++e) inverseCells += c.weight[e] * c.weight[e] * d.contact.inverseCellMass[c.sphere[e]];
-    c.softness = kGammaTimesMass * inverseCells;
-    c.bias = kBetaTimesStep / h * c.gap;
-    if (c.bias < -kPushOutSpeed) {  // the softness shrinks likewise: the load at which v = 0 stays the spring's, k g
-      c.softness *= -kPushOutSpeed / c.bias;
-      c.bias = -kPushOutSpeed;
-    }
-  }
+  if (c.gap > 0 && c.gap + h * dotProduct(relativeVelocity(d, c), c.normal) > 0) return false;
+  const ContactLaw law = contactLaw(d, c, h);
+  c.bias = law.bias;
+  if (!(c.gap > 0)) c.softness = law.softness;  // until they touch: no further than that, and hard
   c.mobility[0] = mobilityAlong(d, c, c.normal);
   c.normalMobility = dotProduct(c.mobility[0], c.normal);
   if (!(c.normalMobility > 0)) return false;
@@ -204,14 +193,29 @@ double settle(WorldData& d, Contact& c) {
   return size;
 }
 
-void report(ContactData& c) {
+}  // namespace
+
+ContactLaw contactLaw(const WorldData& d, const Contact& c, double duration) {
+  // The spring's mass is that of whole cells. On a full surface most of it sits in nodes that hang elastically on the
+  // spheres: the spheres' own would make contacts ten times softer, and what lies on them is the whole.
+  double inverseCells = 0;
+  for (int e = 0; e < c.ends; ++e) inverseCells += c.weight[e] * c.weight[e] * d.contact.inverseCellMass[c.sphere[e]];
+  const double softness = kGammaTimesMass * inverseCells;
+  if (c.gap > 0) return {c.gap / duration, softness};  // they may come as close as the gap allows
+  ContactLaw law{kBetaTimesStep / duration * c.gap, softness};
+  if (law.bias < -kPushOutSpeed) {  // the softness shrinks likewise: the load at which v = 0 stays the spring's, k g
+    law.softness *= -kPushOutSpeed / law.bias;
+    law.bias = -kPushOutSpeed;
+  }
+  return law;
+}
+
+void notePenetration(ContactData& c) {
   for (const Contact& contact : c.contacts) {
     double& largest = contact.key >> 63 ? c.penetration.statics : c.penetration.bodies;
     largest = std::max(largest, -100 * contact.gap / contact.smallerRadius);
   }
 }
-
-}  // namespace
 
 void solveContacts(WorldData& d) {
   ContactData& c = d.contact;
@@ -221,7 +225,7 @@ void solveContacts(WorldData& d) {
   }
   prepareSpheres(d);
   std::erase_if(c.contacts, [&](Contact& contact) { return !prepare(d, contact); });
-  report(c);
+  notePenetration(c);
   startFrom(d, c.carried);
   for (int pass = 0; pass < kPasses; ++pass) {
     double change = 0, largest = 0;

@@ -23,6 +23,16 @@ void listStaticNeighbours(ContactData& c);  // contact_static.cpp: the part of i
 void findPairContacts(WorldData& d, double moved);    // contact_find.cpp
 void findStaticContacts(WorldData& d, double moved);  // contact_static.cpp
 
+void findContacts(WorldData& d);  // contact_find.cpp: ContactData::contacts at the present state
+
+// A contact's damped elastic spring, taken implicitly: v + bias + softness * impulse = 0 along the normal at the end of
+// a step of this duration (s), where the impulse is not negative. m/s, 1/kg.
+struct ContactLaw {
+  double bias, softness;
+};
+ContactLaw contactLaw(const WorldData& d, const Contact& c, double duration);
+void notePenetration(ContactData& c);  // of ContactData::contacts
+
 void solveContacts(WorldData& d);  // contact_solve.cpp: impulses on spheres
 
 // Gaps of a group's four pairs, at ContactData::ball; s and t are 0 on balls.

@@ -60,8 +60,8 @@ MEDULLA_INLINE LinkEnd measureEnd(const LinkGroup& link, const Rotation& rotatio
   e.b = dot(n, e.v);
   const Lanes cosine = dot(n, e.t);
   e.angle = angleOverSine(cosine);
-  // Floored where the link is folded back on itself beyond 170 degrees, like the flexion angle.
-  const Lanes inverse = splat(1) / larger(splat(1) + cosine, splat(0.5 * kSmallestSine * kSmallestSine));
+  // Floored where the link is folded back on itself beyond 170 degrees: no smallest rotation is left at 180.
+  const Lanes inverse = splat(1) / larger(splat(1) + cosine, splat(0.015));
   e.lever = inverse * cross(e.t, n);
   e.spinAxis = inverse * (n + e.t);
   return e;
@@ -79,6 +79,9 @@ MEDULLA_INLINE LinkMeasures measure(const LinkGroup& link, const SphereLanes& s0
   m.length = squareRoot(dot(m.line, m.line));
   m.inverseLength = splat(1) / larger(m.length, link.smallestLength);
   m.n = m.inverseLength * m.line;
+  // Ends that all but meet know no direction; the one that sphere 0 carries takes over, and parts them again.
+  if (any(isLess(m.length, link.smallestLength)))
+    m.n = fma(larger(fnma(m.length, m.inverseLength, splat(1)), splat(0)), rotate(s0.rotation, link.restT), m.n);
   m.end0 = measureEnd(link, s0.rotation, m.n);
   m.end1 = measureEnd(link, s1.rotation, m.n);
   m.axisU = carry(m.end0, m.end0.u, m.end0.a);
@@ -133,23 +136,35 @@ MEDULLA_INLINE Flexion momentsAt1(const LinkGroup& l, const LinkMeasures& m, con
   return {fma(l.flexionV1, q1.a, fma(l.couple, a, l.coupleDifference * q0.a)),
           fma(l.flexionU1, q1.b, l.couple * b - l.coupleDifference * q0.b)};
 }
+// Beyond kFoldAngle the mean of the two stiffnesses acts on what is left to 180 degrees instead of on the flexion:
+// energy k (g^2 - (a^2 + b^2) / 2) with g = kFoldAngle, in value and slope the same there, k g^2 at 180. The difference
+// of the stiffnesses and the coupling are left as they are.
+MEDULLA_INLINE void fold(const LinkEnd& e, const Flexion& still, Lanes stiffnesses, Flexion& moments) {
+  const Lanes both = _mm256_and_pd(e.angle.folded, stiffnesses);
+  moments.a = fnma(both, still.a, moments.a);
+  moments.b = fnma(both, still.b, moments.b);
+}
+double foldEnergy(const LinkEnd& e, const Flexion& still, Lanes stiffnesses, int lane) {
+  const double squared = still.a[lane] * still.a[lane] + still.b[lane] * still.b[lane];
+  const Lanes both = _mm256_and_pd(e.angle.folded, stiffnesses);
+  return 0.5 * both[lane] * (kFoldAngle * kFoldAngle - squared);
+}
+
 MEDULLA_INLINE Lanes couplingTorque(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1) {
   return l.couple * (m.cosine * (q0.b * q1.a - q0.a * q1.b) - m.sine * fma(q0.a, q1.a, q0.b * q1.b));
 }
 
-// Neo-Hookean, incompressible: EA/3 (x - 1/x^2) at the stretch x, of stiffness EA at rest. Shorter than `kLinear` it
-// goes on straight: the law stiffens as 1/x^3 there, and no explicit step would follow.
-constexpr double kLinear = 0.75;
-
+// Neo-Hookean, incompressible: EA/3 (x - 1/x^2) at the stretch x, of stiffness EA at rest. Shorter than
+// `kStraightBelow` it goes on straight: the law stiffens as 1/x^3 there, and no explicit step would follow.
 MEDULLA_INLINE Lanes neoHookeanTension(Lanes stretch) {  // over EA
-  const Lanes x = larger(stretch, splat(kLinear)), inverse = splat(1) / x;
-  constexpr double kSlope = (1 + 2 / (kLinear * kLinear * kLinear)) / 3;
+  const Lanes x = larger(stretch, splat(kStraightBelow)), inverse = splat(1) / x;
+  constexpr double kSlope = (1 + 2 / (kStraightBelow * kStraightBelow * kStraightBelow)) / 3;
   const Lanes below = splat(kSlope) * (stretch - x);
   return fma(splat(1.0 / 3), fnma(inverse, inverse, x), below);
 }
 
 double neoHookeanEnergy(double stretch) {  // over EA L
-  const double x = std::max(stretch, kLinear), below = stretch - x;
+  const double x = std::max(stretch, kStraightBelow), below = stretch - x;
   const double tension = (x - 1 / (x * x)) / 3, slope = (1 + 2 / (x * x * x)) / 3;
   return (x * x / 2 + 1 / x - 1.5) / 3 + tension * below + slope * below * below / 2;
 }
@@ -183,8 +198,10 @@ void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundT
   const Flexion still0 = flexionOf(m.end0), still1 = flexionOf(m.end1);
   const Flexion q0 = damped(still0, flexionRate(m.end0, nRate, s0.angularVelocity, m.n), link.relaxation);
   const Flexion q1 = damped(still1, flexionRate(m.end1, nRate, s1.angularVelocity, m.n), link.relaxation);
-  const Lanes3 bend0 = flexionGradient(m.end0, momentsAt0(link, m, q0, q1));
-  const Lanes3 bend1 = flexionGradient(m.end1, momentsAt1(link, m, q0, q1));
+  Flexion moments0 = momentsAt0(link, m, q0, q1), moments1 = momentsAt1(link, m, q0, q1);
+  fold(m.end0, still0, link.flexionU0 + link.flexionV0, moments0);
+  fold(m.end1, still1, link.flexionU1 + link.flexionV1, moments1);
+  const Lanes3 bend0 = flexionGradient(m.end0, moments0), bend1 = flexionGradient(m.end1, moments1);
   const Lanes3 bend = bend0 + bend1;
   const Lanes3 across = fnma(dot(bend, m.n), m.n, bend);
   f.force1 = (splat(0) - tension) * m.n - m.inverseLength * across;
@@ -272,7 +289,8 @@ double linkEnergy(const WorldData& d) {
     const Lanes twice = q0.a * m0.a + q0.b * m0.b + q1.a * m1.a + q1.b * m1.b + link.torsion * m.twist * m.twist;
     const double rest = link.restLength[lane], length = m.length[lane],
                  linear = 0.5 * (length - rest) * (length - rest);
-    sum += 0.5 * twice[lane] +
+    sum += 0.5 * twice[lane] + foldEnergy(m.end0, q0, link.flexionU0 + link.flexionV0, lane) +
+           foldEnergy(m.end1, q1, link.flexionU1 + link.flexionV1, lane) +
            link.elongation[lane] * (link.neoHookean[lane] > 0 ? rest * rest * neoHookeanEnergy(length / rest) : linear);
   }
   return sum;

@@ -8,6 +8,8 @@
 #include <stdexcept>
 
 #include "physics/dynamics/anchor.h"
+#include "physics/dynamics/node_motion.h"
+#include "physics/dynamics/point_spring.h"
 #include "physics/dynamics/stages.h"
 
 // Springs between tools and surface nodes. A node weighs tens of milligrams and a virtual coupling has hundreds of N/m
@@ -21,9 +23,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-Vector3d lane(const Lanes3& a, int l) {
-  return vectorOf(a, l);
-}
 void add(Quad& q, const Vector3d& a) {
   for (int k = 0; k < 3; ++k) q.v[k] += a[k];
 }
@@ -45,80 +44,19 @@ void addImpulse(WorldData& d, int sphere, const Vector3d& linear, const Vector3d
   add(d.spheres.angularMomentum[sphere], g.freeToTurn[sphere % 4] * angular);
 }
 
-// A skin node on a link: the anchor's velocity as a linear map of the two spheres' velocities, and its transpose.
-struct LinkPoint {
-  int sphere0, sphere1;
-  double s, inverseLength;
-  double thicknessSlope;
-  Vector3d offset, n, axis0, axis1, lever0, lever1, arm0, arm1;
-};
-
-LinkPoint linkPoint(const WorldData& d, int link, int node) {
-  const LinkFrame& f = d.links.frames[link / 4];
-  const LinkGroup& g = d.links.groups[link / 4];
-  const NodeGroup& group = d.nodes.groups[node / 4];
-  const int l = link % 4;
-  LinkPoint p;
-  p.sphere0 = static_cast<int>(g.sphere0[l]);
-  p.sphere1 = static_cast<int>(g.sphere1[l]);
-  p.s = group.along[node % 4];
-  p.inverseLength = f.inverseLength[l];
-  p.offset = lane(anchorOnLink(linkHost(d, link), group).offset, node % 4);
-  p.n = lane(f.n, l);
-  p.axis0 = lane(f.spinAxis0, l);
-  p.axis1 = lane(f.spinAxis1, l);
-  p.lever0 = lane(f.spinLever0, l);
-  p.lever1 = lane(f.spinLever1, l);
-  p.thicknessSlope = f.thicknessSlope[l];
-  p.arm0 = lane(f.arm0, l);
-  p.arm1 = lane(f.arm1, l);
-  return p;
-}
-
-Vector3d velocityOf(const WorldData& d, const LinkPoint& p) {
-  const Vector3d omega0 = angularVelocity(d, p.sphere0), omega1 = angularVelocity(d, p.sphere1);
-  const Vector3d v0 = vectorOf(d.spheres.velocity[p.sphere0]) + omega0.cross(p.arm0);
-  const Vector3d line = vectorOf(d.spheres.velocity[p.sphere1]) + omega1.cross(p.arm1) - v0;
-  const Vector3d nRate = p.inverseLength * (line - p.n * p.n.dot(line));
-  const double spin0 = p.axis0.dot(omega0) - p.lever0.dot(nRate);
-  const double spin1 = p.axis1.dot(omega1) - p.lever1.dot(nRate);
-  const Vector3d omega = p.n.cross(nRate) + ((1 - p.s) * spin0 + p.s * spin1) * p.n;
-  return v0 + p.s * line + omega.cross(p.offset) + p.thicknessSlope * p.n.dot(line) * p.offset;
-}
-
-void addImpulse(WorldData& d, const LinkPoint& p, const Vector3d& impulse) {
-  const Vector3d moment = p.offset.cross(impulse);
-  const double twist0 = (1 - p.s) * p.n.dot(moment), twist1 = p.s * p.n.dot(moment);
-  const Vector3d along = p.thicknessSlope * p.offset.dot(impulse) * p.n;
-  const Vector3d swing = p.inverseLength * (moment.cross(p.n) - twist0 * p.lever0 - twist1 * p.lever1) + along;
-  const Vector3d at0 = (1 - p.s) * impulse - swing, at1 = p.s * impulse + swing;
-  addImpulse(d, p.sphere0, at0, twist0 * p.axis0 + p.arm0.cross(at0));
-  addImpulse(d, p.sphere1, at1, twist1 * p.axis1 + p.arm1.cross(at1));
-}
-
-bool isSkin(const WorldData& d, int node) {
-  return node >= d.nodes.dynamicEnd;
-}
-
-Vector3d sphereOffset(const WorldData& d, int sphere, int node) {
-  return lane(anchorOnSphere(sphereHost(d, sphere), d.nodes.groups[node / 4]).offset, node % 4);
+SphereMotion motionOf(const WorldData& d, int sphere) {
+  return {vectorOf(d.spheres.velocity[sphere]), angularVelocity(d, sphere)};
 }
 
 Vector3d nodeVelocity(const WorldData& d, int node) {
   if (!isSkin(d, node)) return vectorOf(d.nodes.velocity[node]);
   const GroupHost host = d.nodes.groupHosts[node / 4];
-  if (host.onLink) return velocityOf(d, linkPoint(d, host.host, node));
+  if (host.onLink) {
+    const LinkPoint p = linkPoint(d, host.host, node);
+    return velocityOf(p, motionOf(d, p.sphere0), motionOf(d, p.sphere1));
+  }
   return vectorOf(d.spheres.velocity[host.host]) +
          angularVelocity(d, host.host).cross(sphereOffset(d, host.host, node));
-}
-
-Vector3d nodePosition(const WorldData& d, int node) {
-  if (!isSkin(d, node)) return vectorOf(d.nodes.position[node]);
-  const GroupHost host = d.nodes.groupHosts[node / 4];
-  const NodeGroup& group = d.nodes.groups[node / 4];
-  const Anchor anchor =
-      host.onLink ? anchorOnLink(linkHost(d, host.host), group) : anchorOnSphere(sphereHost(d, host.host), group);
-  return lane(positionOf(anchor), node % 4);
 }
 
 void addNodeImpulse(WorldData& d, int node, const Vector3d& impulse) {
@@ -128,7 +66,10 @@ void addNodeImpulse(WorldData& d, int node, const Vector3d& impulse) {
   }
   const GroupHost host = d.nodes.groupHosts[node / 4];
   if (host.onLink) {
-    addImpulse(d, linkPoint(d, host.host, node), impulse);
+    const LinkPoint p = linkPoint(d, host.host, node);
+    const auto [at0, at1] = loadsOf(p, impulse);
+    addImpulse(d, p.sphere0, at0.linear, at0.angular);
+    addImpulse(d, p.sphere1, at1.linear, at1.angular);
   } else {
     addImpulse(d, host.host, impulse, sphereOffset(d, host.host, node).cross(impulse));
   }
@@ -150,41 +91,6 @@ double mobility(const WorldData& d, int node) {
                         (p.offset.norm() + std::max(p.arm0.norm(), p.arm1.norm()));
   const double lean = 1 + lever2 * p.inverseLength * p.inverseLength;
   return lean * (ofSphere(p.sphere0, lever2) + ofSphere(p.sphere1, lever2));
-}
-
-// The common form of both kinds of load.
-struct PointSpring {
-  int count;
-  std::array<int, 3> nodes;  // indices in Nodes
-  std::array<double, 3> weights;
-  Vector3d anchor, anchorVelocity;  // at the substep's end
-  const Vector3d* outward;          // null: pulls and pushes
-  double stiffness, damping;
-};
-
-PointSpring pointSpring(const WorldData& d, const Loads& loads, std::size_t k, double remaining) {
-  PointSpring p{};
-  if (k < loads.toolSprings.size()) {
-    const ToolSpring& t = loads.toolSprings[k];
-    p.count = 3;
-    for (int i = 0; i < 3; ++i) p.nodes[i] = d.ranges[t.body].node[t.nodes[i]];
-    p.weights = t.weights;
-    p.anchor = t.anchor - remaining * t.anchorVelocity;
-    p.anchorVelocity = t.anchorVelocity;
-    p.outward = &t.outward;
-    p.stiffness = t.stiffness;
-    p.damping = t.damping;
-  } else {
-    const HeldNode& held = loads.heldNodes[k - loads.toolSprings.size()];
-    p.count = 1;
-    p.nodes[0] = d.ranges[held.body].node[held.node];
-    p.weights[0] = 1;
-    p.anchor = held.anchor - remaining * held.anchorVelocity;
-    p.anchorVelocity = held.anchorVelocity;
-    p.stiffness = held.stiffness;
-    p.damping = held.damping;
-  }
-  return p;
 }
 
 // One pass of Gauss-Seidel at one load: its force goes to what the spring asks for now. Returns the change's size.
@@ -214,6 +120,33 @@ double settle(WorldData& d, const PointSpring& p, Vector3d& force) {
 }
 
 }  // namespace
+
+PointSpring pointSpring(const WorldData& d, const Loads& loads, std::size_t k, double remaining) {
+  PointSpring p{};
+  if (k < loads.toolSprings.size()) {
+    const ToolSpring& t = loads.toolSprings[k];
+    p.count = 3;
+    p.tool = t.tool;
+    for (int i = 0; i < 3; ++i) p.nodes[i] = d.ranges[t.body].node[t.nodes[i]];
+    p.weights = t.weights;
+    p.anchor = t.anchor - remaining * t.anchorVelocity;
+    p.anchorVelocity = t.anchorVelocity;
+    p.outward = &t.outward;
+    p.stiffness = t.stiffness;
+    p.damping = t.damping;
+  } else {
+    const HeldNode& held = loads.heldNodes[k - loads.toolSprings.size()];
+    p.count = 1;
+    p.tool = held.tool;
+    p.nodes[0] = d.ranges[held.body].node[held.node];
+    p.weights[0] = 1;
+    p.anchor = held.anchor - remaining * held.anchorVelocity;
+    p.anchorVelocity = held.anchorVelocity;
+    p.stiffness = held.stiffness;
+    p.damping = held.damping;
+  }
+  return p;
+}
 
 std::vector<DeadLoad> spreadLoad(const SoftBodyModel& model, const std::vector<int>& nodes, const DeadLoad& whole) {
   double area = 0;
@@ -260,7 +193,7 @@ void applyLoads(WorldData& d, const Loads& loads, double remaining, std::vector<
   // better per pass, and the rest is taken up in the next substep.
   constexpr int kPasses = 20;
   constexpr double kSettled = 1e-12;  // of the largest force
-  const std::size_t springs = loads.toolSprings.size(), count = springs + loads.heldNodes.size();
+  const std::size_t count = loads.toolSprings.size() + loads.heldNodes.size();
   assert(d.loadForces.size() == count);
   // From the forces of the substep before: in a body at rest they are the answer already, and what few passes leave
   // open settles over the substeps.
@@ -277,8 +210,7 @@ void applyLoads(WorldData& d, const Loads& loads, double remaining, std::vector<
     if (!(change > kSettled * largest)) break;
   }
   for (std::size_t k = 0; k < count; ++k)
-    toolImpulse[k < springs ? loads.toolSprings[k].tool : loads.heldNodes[k - springs].tool] +=
-        d.substep * d.loadForces[k];
+    toolImpulse[pointSpring(d, loads, k, remaining).tool] += d.substep * d.loadForces[k];
 }
 
 }  // namespace medulla

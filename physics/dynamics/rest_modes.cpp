@@ -307,7 +307,7 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
   return std::sqrt(std::max(0.0, x.dot(k * x)));
 }
 
-double dampBody(const BodyDescription& body, BodyMechanics& mechanics) {
+double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrator integrator) {
   // Damping at the old velocity costs step: h^2 K + 2 h C <= 4 (largest eigenvalues over mass).
   const auto stableStep = [](double stiffness, double damping) {
     if (!(stiffness > 0)) return std::numeric_limits<double>::infinity();
@@ -331,7 +331,9 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics) {
   const double shortest = stableStep(all, 0) / kLargestCost;
   const double largestDamping = (4 / shortest - shortest * all) / 2;
   const double bound = links > 0 ? (largestDamping - mechanics.surfaceRelaxation * surface) / links : asked;
-  mechanics.linkRelaxation = std::min(asked, std::max(0.0, bound));
+  // An implicit step has no limit to keep.
+  if (integrator == Integrator::implicit) mechanics.surfaceRelaxation = asked;
+  mechanics.linkRelaxation = integrator == Integrator::implicit ? asked : std::min(asked, std::max(0.0, bound));
   mechanics.massDamping = (asked - mechanics.linkRelaxation) * lowest * lowest;
   // Both matrices are sums of the links' and the surface's, and the modes that are stiffest are not those damped most:
   // the step is searched for where the largest eigenvalue of h^2 K + 2 h C itself reaches 4.

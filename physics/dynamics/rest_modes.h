@@ -8,7 +8,7 @@ namespace medulla {
 
 // Sets both relaxations of `mechanics` from the tissue's damping ratio and returns the largest stable substep (s) of
 // the body under semi-implicit Euler with damping taken at the old velocity.
-double dampBody(const BodyDescription& body, BodyMechanics& mechanics);
+double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrator integrator);
 
 // rad/s: the lowest mode of spheres and links that deforms the body, the surface's mass riding along; 0 where none
 // exists (a single sphere, everything fixed).

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "physics/dynamics/contact_stages.h"
+#include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/layout.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/dynamics/stages.h"
@@ -19,6 +20,8 @@ namespace {
 
 // The estimate is of the body at rest; bending, folding and compression stiffen it. The step is this share of it.
 constexpr double kStepSafety = 0.7;
+// s: what an implicit substep is unless the scene says otherwise; a bending mode of 5 Hz is damped by 8 % then.
+constexpr double kImplicitStep = 0.005;
 
 void checkSettings(const WorldSettings& s) {
   if (!(s.frameDuration > 0) || !std::isfinite(s.frameDuration))
@@ -41,6 +44,11 @@ void checkLoads(const WorldData& d, const Loads& loads) {
 }
 
 void step(WorldData& d, const Loads& loads, double remaining, FrameReport& report) {
+  if (d.settings.integrator == Integrator::implicit) {
+    dragVelocities(d);
+    stepImplicitly(d, loads, remaining, report.toolImpulse);
+    return;
+  }
   evaluateForces(d);
   dampBodies(d);
   dragVelocities(d);
@@ -123,20 +131,23 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
     } catch (const std::runtime_error& e) {
       throw std::runtime_error(fmt::format("body '{}' cannot be simulated: {}", body.name, e.what()));
     }
-    stable = std::min(stable, dampBody(body, mechanics.back()));
+    stable = std::min(stable, dampBody(body, mechanics.back(), settings.integrator));
   }
   data_ = layOut(settings, std::move(bodies), mechanics);
   data_->stableSubstep = stable;
   // Below this a second of simulation takes over an hour: a wrong unit rather than a stiff tissue.
   constexpr double kLeastSubstep = 1e-8;
-  if (settings.substeps == 0 && kStepSafety * stable < kLeastSubstep)
+  if (settings.integrator == Integrator::explicitEuler && settings.substeps == 0 &&
+      kStepSafety * stable < kLeastSubstep)
     throw std::runtime_error(
         fmt::format("the stable substep is {:.3g} s: expected at least {:.0e} s; lower Young's "
                     "modulus or raise the density",
                     stable, kLeastSubstep));
   data_->substeps = settings.substeps;
+  const bool implicit = settings.integrator == Integrator::implicit;
   if (settings.substeps == 0)
-    data_->substeps = std::max(1, static_cast<int>(std::ceil(settings.frameDuration / (kStepSafety * stable))));
+    data_->substeps = std::max(
+        1, static_cast<int>(std::ceil(settings.frameDuration / (implicit ? kImplicitStep : kStepSafety * stable))));
   data_->substep = settings.frameDuration / data_->substeps;
   layOutDeadLoads(*data_);
   layOutContact(*data_, statics);

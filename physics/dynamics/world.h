@@ -70,11 +70,17 @@ struct BodyDescription {
   std::vector<DeadLoad> deadLoads;             // several on one node add up
 };
 
+// explicitEuler: semi-implicit Euler in substeps below the stability limit. implicit: backward Euler (order 1) or
+// SDIRK2 (order 2), stable at any substep.
+enum class Integrator { explicitEuler, implicit };
+
 struct WorldSettings {
   Eigen::Vector3d gravity{0, -9.81, 0};  // m/s2
   double ambientDrag = 0;                // 1/s, >= 0: everything loses this share of its speed; 0 but under water
   double frameDuration = 0.02;           // s, one dynamics frame
-  int substeps = 0;                      // per dynamics frame; 0: as many as the stability estimate asks for
+  Integrator integrator = Integrator::explicitEuler;
+  int order = 1;     // of the implicit integrator, 1 or 2
+  int substeps = 0;  // per dynamics frame; 0: as many as the stability estimate asks for, implicit: of 5 ms at most
   ContactMode contact = ContactMode::none;
 };
 

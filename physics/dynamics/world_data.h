@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "physics/dynamics/contact_data.h"
@@ -37,6 +38,9 @@ struct Spheres {
 };
 
 // ---- Links: four at a time; the last group is filled up with copies whose slots nobody reads.
+
+// Stretch under which the neo-Hookean tension goes on straight.
+constexpr double kStraightBelow = 0.75;
 
 struct LinkGroup {  // constants of four links
   std::uint32_t sphere0[4], sphere1[4];
@@ -157,6 +161,8 @@ struct NodeForce {
   double from = 0, to = 0;                          // s
 };
 
+struct ImplicitData;  // implicit_data.h
+
 struct WorldData {
   WorldSettings settings;
   std::vector<BodyDescription> bodies;
@@ -169,6 +175,7 @@ struct WorldData {
   std::vector<SphereDrive> drives;
   std::vector<NodeForce> deadLoads;  // body after body, as described
   ContactData contact;
+  std::vector<std::shared_ptr<ImplicitData>> implicit;  // per halving of the step; made when it is first needed
 
   // Force of each tool load in the current substep, tool springs first, then held nodes; zero at the frame's start.
   std::vector<Eigen::Vector3d> loadForces;

@@ -1,0 +1,113 @@
+#include "app/files/stability_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "app/files/output_file.h"
+
+namespace medulla {
+
+namespace {
+
+template <class T, class Of>
+std::vector<T> distinct(const std::vector<StabilityPoint>& points, const Of& of) {
+  std::vector<T> out;
+  for (const StabilityPoint& p : points)
+    if (std::find(out.begin(), out.end(), of(p)) == out.end()) out.push_back(of(p));
+  return out;
+}
+
+// Recovered, survived, failed.
+int gradeOf(const StabilityPoint& p) {
+  return !p.survived ? 2 : p.recoveredAt ? 0 : 1;
+}
+
+// Points of a method and a grade as a here-document of step in ms and a height.
+template <class Height>
+std::string block(const std::string& name, const std::vector<StabilityPoint>& points, const std::string& method,
+                  int grade, const Height& height) {
+  std::string out = fmt::format("${} << EOD\n", name);
+  for (const StabilityPoint& p : points)
+    if (p.method == method && gradeOf(p) == grade) out += fmt::format("{:.6g} {:.6g}\n", 1e3 * p.step, height(p));
+  return out + "EOD\n";
+}
+
+std::string plotOf(const std::string& name, double size) {
+  // Okabe and Ito (2008): told apart by all kinds of eyes.
+  return fmt::format(
+      "  ${0}0 using 1:2 with points pt 5 ps {1} lc '#009e73' title 'back at rest within 1 %', \\\n"
+      "  ${0}1 using 1:2 with points pt 5 ps {1} lc '#e69f00' title 'survived', \\\n"
+      "  ${0}2 using 1:2 with points pt 2 ps {1} lw 2 lc '#d55e00' title 'failed'",
+      name, size);
+}
+
+std::string spaced(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+}  // namespace
+
+void writeStability(const std::string& path, const std::vector<StabilityPoint>& points) {
+  OutputFile file(path);
+  file.write("method,trial,young[Pa],step[s],survived,recovered_at[s],largest_energy[of start]\n");
+  for (const StabilityPoint& p : points)
+    file.write(fmt::format("{},{},{:.6g},{:.6g},{:d},{},{:.4g}\n", p.method, p.trial, p.young, p.step, p.survived,
+                           p.recoveredAt ? fmt::format("{:.4g}", *p.recoveredAt) : "", p.energyRatio));
+  file.commit();
+}
+
+std::string stabilityScript(const std::string& title, const std::vector<StabilityPoint>& map,
+                            const std::vector<StabilityPoint>& torture, const std::vector<StableStep>& limit) {
+  const auto methods = distinct<std::string>(map, [](const StabilityPoint& p) { return p.method; });
+  const auto trials = distinct<std::string>(torture, [](const StabilityPoint& p) { return p.trial; });
+  const auto rowOf = [&](const StabilityPoint& p) {
+    return static_cast<double>(std::find(trials.begin(), trials.end(), p.trial) - trials.begin());
+  };
+  std::string out =
+      "set terminal svg size 1100,1000 dynamic noenhanced font 'Helvetica,13' background 'white'\n"
+      "set border 3 lc '#555555'\nset tics nomirror out\nset logscale x\n"
+      "set grid lc '#e4e4e4' lt 1 lw 1\nset xlabel 'step, ms'\nset key off\n";
+  out += "$limit << EOD\n";
+  for (const StableStep& s : limit) out += fmt::format("{:.6g} {:.6g}\n", 1e3 * s.step, s.young);
+  out += "EOD\n";
+  for (std::size_t m = 0; m < methods.size(); ++m)
+    for (int grade = 0; grade < 3; ++grade) {
+      out += block(fmt::format("map{}_{}", m, grade), map, methods[m], grade,
+                   [](const StabilityPoint& p) { return p.young; });
+      out += block(fmt::format("trial{}_{}", m, grade), torture, methods[m], grade, rowOf);
+    }
+  const auto [low, high] = std::minmax_element(
+      map.begin(), map.end(), [](const StabilityPoint& a, const StabilityPoint& b) { return a.step < b.step; });
+  out +=
+      fmt::format("set xrange [{:.6g}:{:.6g}]\nset multiplot title '{}'\n", 500 * low->step, 2000 * high->step, title);
+  const double width = 0.86 / static_cast<double>(methods.size());
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    const double left = 0.13 + width * static_cast<double>(m);
+    const char* y =
+        m == 0 ? "set ylabel \"Young's modulus, Pa\"\nset format y '10^%T'\n" : "unset ylabel\nset format y ''\n";
+    out += fmt::format(
+        "set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen 0.92\nset bmargin at screen "
+        "0.57\nset logscale y\nset autoscale y\nset ytics auto\nset title '{}'\n{}",
+        left, left + 0.9 * width, spaced(methods[m]), y);
+    out += fmt::format("plot $limit using 1:2 with lines lw 2 dt 2 lc '#555555' title 'explicit limit', \\\n{}\n",
+                       plotOf(fmt::format("map{}_", m), 1.1));
+  }
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    const double left = 0.13 + width * static_cast<double>(m);
+    out += fmt::format(
+        "set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen 0.48\nset bmargin at screen "
+        "0.09\nunset logscale y\nset yrange [{}:-0.5]\nunset ylabel\nset format y '%g'\nunset title\n",
+        left, left + 0.9 * width, static_cast<double>(trials.size()) - 0.5);
+    out += "set ytics (";
+    for (std::size_t k = 0; k < trials.size(); ++k)
+      out += fmt::format("{}'{}' {}", k == 0 ? "" : ", ", m == 0 ? spaced(trials[k]) : "", k);
+    out += ")\n";
+    if (m + 1 == methods.size()) out += "set key at screen 0.98, screen 0.025 horizontal samplen 1\n";
+    out += fmt::format("plot {}\n", plotOf(fmt::format("trial{}_", m), 0.9));
+  }
+  return out + "unset multiplot\n";
+}
+
+}  // namespace medulla

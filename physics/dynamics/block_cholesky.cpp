@@ -1,0 +1,158 @@
+#include "physics/dynamics/block_cholesky.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace medulla {
+
+namespace {
+
+// Columns of the factor, by elimination of the row with fewest neighbours; the lowest number decides between equals.
+std::vector<std::vector<int>> eliminate(int rows, const std::vector<std::array<int, 2>>& blocks,
+                                        std::vector<int>& order) {
+  std::vector<std::set<int>> neighbours(rows);
+  for (const auto& [a, b] : blocks) {
+    neighbours[a].insert(b);
+    neighbours[b].insert(a);
+  }
+  std::set<std::array<int, 2>> byDegree;
+  for (int i = 0; i < rows; ++i) byDegree.insert({static_cast<int>(neighbours[i].size()), i});
+  std::vector<std::vector<int>> columns;
+  order.clear();
+  while (!byDegree.empty()) {
+    const int pivot = (*byDegree.begin())[1];
+    byDegree.erase(byDegree.begin());
+    order.push_back(pivot);
+    const std::vector<int> column(neighbours[pivot].begin(), neighbours[pivot].end());
+    for (const int i : column) {
+      byDegree.erase({static_cast<int>(neighbours[i].size()), i});
+      neighbours[i].erase(pivot);
+      for (const int k : column)
+        if (k != i) neighbours[i].insert(k);
+      byDegree.insert({static_cast<int>(neighbours[i].size()), i});
+    }
+    columns.push_back(column);
+  }
+  return columns;
+}
+
+// L of a = L L^T in the lower triangle; its pivots are stored inverted, which solves without divisions.
+bool factoriseBlock(Block6& a) {
+  for (int j = 0; j < 6; ++j) {
+    double pivot = a(j, j);
+    for (int k = 0; k < j; ++k) pivot -= a(j, k) * a(j, k);
+    if (!(pivot > 0)) return false;
+    const double inverse = 1 / std::sqrt(pivot);
+    a(j, j) = inverse;
+    for (int i = j + 1; i < 6; ++i) {
+      double sum = a(i, j);
+      for (int k = 0; k < j; ++k) sum -= a(i, k) * a(j, k);
+      a(i, j) = sum * inverse;
+    }
+  }
+  return true;
+}
+
+// b := b L^-T
+void solveFromRight(const Block6& l, Block6& b) {
+  for (int j = 0; j < 6; ++j) {
+    for (int k = 0; k < j; ++k) b.col(j) -= l(j, k) * b.col(k);
+    b.col(j) *= l(j, j);
+  }
+}
+
+void solveForward(const Block6& l, Vector6& x) {
+  for (int j = 0; j < 6; ++j) {
+    x[j] *= l(j, j);
+    for (int i = j + 1; i < 6; ++i) x[i] -= l(i, j) * x[j];
+  }
+}
+
+void solveBackward(const Block6& l, Vector6& x) {
+  for (int j = 5; j >= 0; --j) {
+    for (int i = j + 1; i < 6; ++i) x[j] -= l(i, j) * x[i];
+    x[j] *= l(j, j);
+  }
+}
+
+}  // namespace
+
+void BlockCholesky::analyse(int rows, const std::vector<std::array<int, 2>>& blocks) {
+  std::vector<std::vector<int>> columns = eliminate(rows, blocks, order_);
+  position_.resize(rows);
+  for (int p = 0; p < rows; ++p) position_[order_[p]] = p;
+  firstEntry_.assign(1, 0);
+  entryRow_.clear();
+  for (std::vector<int>& column : columns) {
+    for (int& i : column) i = position_[i];
+    std::sort(column.begin(), column.end());
+    entryRow_.insert(entryRow_.end(), column.begin(), column.end());
+    firstEntry_.push_back(static_cast<int>(entryRow_.size()));
+  }
+  const auto find = [&](int row, int column) {
+    const auto begin = entryRow_.begin() + firstEntry_[column], end = entryRow_.begin() + firstEntry_[column + 1];
+    return static_cast<int>(std::lower_bound(begin, end, row) - entryRow_.begin());
+  };
+  updates_.clear();
+  firstUpdate_.assign(1, 0);
+  for (int p = 0; p < rows; ++p) {
+    for (int k = firstEntry_[p]; k < firstEntry_[p + 1]; ++k)
+      for (int i = k; i < firstEntry_[p + 1]; ++i)
+        updates_.push_back({i, k, i == k ? -1 - entryRow_[i] : find(entryRow_[i], entryRow_[k])});
+    firstUpdate_.push_back(static_cast<int>(updates_.size()));
+  }
+  slot_.clear();
+  turned_.clear();
+  for (const auto& [a, b] : blocks) {
+    const int row = std::max(position_[a], position_[b]), column = std::min(position_[a], position_[b]);
+    slot_.push_back(find(row, column));
+    turned_.push_back(position_[a] < position_[b]);
+  }
+  entry_.resize(entryRow_.size());
+  diagonal_.resize(rows);
+  work_.resize(rows);
+}
+
+void BlockCholesky::setZero() {
+  for (Block6& b : entry_) b.setZero();
+  for (Block6& b : diagonal_) b.setZero();
+}
+
+void BlockCholesky::addBlock(int k, const Block6& block) {
+  if (turned_[k]) {
+    entry_[slot_[k]] += block.transpose();
+  } else {
+    entry_[slot_[k]] += block;
+  }
+}
+
+bool BlockCholesky::factorise() {
+  for (std::size_t p = 0; p < diagonal_.size(); ++p) {
+    if (!factoriseBlock(diagonal_[p])) return false;
+    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i) solveFromRight(diagonal_[p], entry_[i]);
+    for (int u = firstUpdate_[p]; u < firstUpdate_[p + 1]; ++u) {
+      const Update& update = updates_[u];
+      Block6& target = update.target < 0 ? diagonal_[-1 - update.target] : entry_[update.target];
+      target.noalias() -= entry_[update.i] * entry_[update.k].transpose();
+    }
+  }
+  return true;
+}
+
+void BlockCholesky::solve(std::vector<Vector6>& x) const {
+  const std::size_t rows = order_.size();
+  for (std::size_t p = 0; p < rows; ++p) work_[p] = x[order_[p]];
+  for (std::size_t p = 0; p < rows; ++p) {
+    solveForward(diagonal_[p], work_[p]);
+    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i) work_[entryRow_[i]].noalias() -= entry_[i] * work_[p];
+  }
+  for (std::size_t p = rows; p-- > 0;) {
+    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i)
+      work_[p].noalias() -= entry_[i].transpose() * work_[entryRow_[i]];
+    solveBackward(diagonal_[p], work_[p]);
+  }
+  for (std::size_t p = 0; p < rows; ++p) x[order_[p]] = work_[p];
+}
+
+}  // namespace medulla

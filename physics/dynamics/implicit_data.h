@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "physics/dynamics/block_cholesky.h"
+#include "physics/dynamics/node_factor.h"
+#include "physics/dynamics/world_data.h"
+
+// What an implicit step works on, laid out once. A motion has one velocity for every freedom: two quads per sphere,
+// linear and angular, then one per dynamic node. Everything is in impulses: matrices in kg, right sides in N s.
+namespace medulla {
+
+using Motion = std::vector<Quad>;
+
+// The state from which a stage sets out.
+struct StageStart {
+  std::vector<Quad> position, orientation, angularMomentum, nodePosition, unwoundTwist;
+  Motion motion;  // angular velocities are the first guess only: angularMomentum is what forces add to
+};
+
+// One direction of a load at a point: its velocity is the sum of coefficient . motion[quad], and impulses return by the
+// same coefficients. `weight` (kg) is impulse per velocity.
+struct LoadRow {
+  int first = 0, end = 0;  // in ImplicitData::rowQuad, rowCoefficient
+  double weight = 0;
+  double impulse = 0;  // N s at the present motion
+};
+
+// A contact or a tool's spring: three rows, along the normal and two tangents.
+struct PointLoad {
+  bool isContact = false;
+  std::size_t index = 0;  // in ContactData::contacts, or of Loads, tool springs first
+  std::array<Eigen::Vector3d, 3> axes;
+};
+
+struct ImplicitData {
+  double duration = 0;  // s, of a stage
+  // Constants.
+  std::vector<Quad> freedom;              // as Motion: 1, or 0 where a freedom is held or led
+  std::vector<Eigen::Matrix3d> inertia;   // kg m2, per sphere, in its frame
+  std::vector<double> pull, carriedMass;  // kg, per node: the attachments' share; what a host feels of node and spring
+  NodeFactor nodes;                       // masses, attachments and edges of all dynamic nodes
+  // Of the present iteration.
+  std::vector<Block6> diagonal, beside;      // spheres and links alone, per sphere and per link
+  std::vector<Block6> lumped, lumpedBeside;  // and with surface and loads lumped into them
+  BlockCholesky spheres;                     // of the latter
+  std::vector<LoadRow> rows;
+  std::vector<int> rowQuad;
+  std::vector<Quad> rowCoefficient;
+  std::vector<PointLoad> loads;
+
+  StageStart before, start;  // of the step, of its present stage
+  double totalMass = 0;      // kg
+  double workOfPaths = 0;    // J, that led spheres give in this stage
+  Motion motion, residual, change, direction, image, preconditioned;
+  std::vector<Quad> carried, given;  // per node: the operator's velocities of anchors, impulses
+  std::vector<Vector6> blocks;
+  long solves = 0, iterations = 0;  // linear systems, and conjugate gradients in all
+};
+
+}  // namespace medulla

@@ -1,0 +1,81 @@
+#include "physics/dynamics/implicit_stages.h"
+
+namespace medulla {
+
+namespace {
+
+Quad all(bool free) {
+  const double f = free ? 1 : 0;
+  return {{f, f, f, 0}};
+}
+
+void layOutNodes(const WorldData& d, ImplicitData& s) {
+  const Nodes& n = d.nodes;
+  const double h2 = s.duration * s.duration;
+  s.pull.resize(n.dynamicEnd);
+  const auto pullOf = [&](const std::vector<HostRange>& ranges) {
+    for (const HostRange& r : ranges)
+      for (int i = 4 * r.firstGroup; i < 4 * r.endGroup; ++i)
+        s.pull[i] = (h2 + s.duration * r.relaxation) * n.groups[i / 4].stiffness[i % 4];
+  };
+  pullOf(n.onLinks);
+  pullOf(n.onSpheres);
+  std::vector<double> diagonal;
+  for (int i = 0; i < n.dynamicEnd; ++i) {
+    const double m = n.mass[i];
+    const bool free = n.inverseMass[i] > 0;
+    s.carriedMass.push_back(free ? s.pull[i] * m / (m + s.pull[i]) : s.pull[i]);
+    diagonal.push_back(free ? m + s.pull[i] : 1);
+  }
+  std::vector<NodeFactor::Edge> edges;
+  for (const SpringGroup& g : d.springs.groups) {
+    for (int k = 0; k < 4; ++k) {
+      const int i = static_cast<int>(g.node0[k] / sizeof(Quad)), j = static_cast<int>(g.node1[k] / sizeof(Quad));
+      const bool freeI = n.inverseMass[i] > 0, freeJ = n.inverseMass[j] > 0;
+      const double weight = h2 * g.stiffness[k];
+      if (weight == 0 || (!freeI && !freeJ)) continue;
+      if (freeI && freeJ) {
+        edges.push_back({i, j, weight});
+      } else {
+        diagonal[freeI ? i : j] += weight;
+      }
+    }
+  }
+  if (n.dynamicEnd > 0) s.nodes.factorise(diagonal, edges);
+}
+
+}  // namespace
+
+void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
+  s.duration = duration;
+  for (int i = 0; i < d.spheres.count; ++i) {
+    const SphereGroup& g = d.spheres.groups[i / 4];
+    const int l = i % 4;
+    s.freedom.push_back(all(g.inverseMass[l] > 0));
+    s.freedom.push_back(all(g.freeToTurn[l] > 0));
+    const Lanes* e = g.inverseInertia;
+    Eigen::Matrix3d inverse;
+    inverse << e[0][l], e[3][l], e[4][l], e[3][l], e[1][l], e[5][l], e[4][l], e[5][l], e[2][l];
+    s.inertia.push_back(inverse.inverse());
+  }
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) s.freedom.push_back(all(d.nodes.inverseMass[i] > 0));
+  layOutNodes(d, s);
+  for (int i = 0; i < d.spheres.count; ++i) s.totalMass += d.spheres.groups[i / 4].mass[i % 4];
+  for (const double m : d.nodes.mass) s.totalMass += m;
+  std::vector<std::array<int, 2>> links;
+  for (int k = 0; k < d.links.count; ++k) {
+    const LinkGroup& g = d.links.groups[k / 4];
+    links.push_back({static_cast<int>(g.sphere0[k % 4]), static_cast<int>(g.sphere1[k % 4])});
+  }
+  s.spheres.analyse(d.spheres.count, links);
+  s.diagonal.resize(d.spheres.count);
+  s.beside.resize(d.links.count);
+  s.blocks.resize(d.spheres.count);
+  for (Motion* m : {&s.before.motion, &s.start.motion, &s.motion, &s.residual, &s.change, &s.direction, &s.image,
+                    &s.preconditioned})
+    m->resize(s.freedom.size());
+  s.carried.resize(d.nodes.dynamicEnd);
+  s.given.resize(d.nodes.dynamicEnd);
+}
+
+}  // namespace medulla

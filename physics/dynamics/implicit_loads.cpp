@@ -1,0 +1,164 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "physics/dynamics/contact_stages.h"
+#include "physics/dynamics/implicit_stages.h"
+#include "physics/dynamics/node_motion.h"
+#include "physics/dynamics/point_spring.h"
+
+// Loads at points, inside the system: what they give depends on the motion at the stage's end. A side that would pull
+// where it may only push, or drag beyond Coulomb's limit, is decided anew in every iteration (a semismooth Newton
+// method).
+namespace medulla {
+
+namespace {
+
+using Eigen::Vector3d;
+
+std::array<Vector3d, 3> axesAround(const Vector3d& normal) {
+  int least = 0;
+  normal.cwiseAbs().minCoeff(&least);
+  const Vector3d across = normal.cross(Vector3d::Unit(least)).normalized();
+  return {normal, across, normal.cross(across)};
+}
+
+void addTerm(ImplicitData& s, int quad, const Vector3d& coefficient) {
+  s.rowQuad.push_back(quad);
+  s.rowCoefficient.push_back(quadOf(coefficient));
+}
+
+// The terms of a node's velocity along `axis`, times `weight`.
+void addNodeTerms(const WorldData& d, ImplicitData& s, int node, double weight, const Vector3d& axis) {
+  if (!isSkin(d, node)) return addTerm(s, 2 * d.spheres.count + node, weight * axis);
+  const GroupHost host = d.nodes.groupHosts[node / 4];
+  if (!host.onLink) {
+    addTerm(s, 2 * host.host, weight * axis);
+    addTerm(s, 2 * host.host + 1, weight * sphereOffset(d, host.host, node).cross(axis));
+    return;
+  }
+  const LinkPoint p = linkPoint(d, host.host, node);
+  const auto loads = loadsOf(p, weight * axis);
+  const int spheres[2] = {p.sphere0, p.sphere1};
+  for (int k = 0; k < 2; ++k) {
+    addTerm(s, 2 * spheres[k], loads[k].linear);
+    addTerm(s, 2 * spheres[k] + 1, loads[k].angular);
+  }
+}
+
+template <class AddTerms>
+void addRows(ImplicitData& s, bool isContact, std::size_t index, const Vector3d& normal, const AddTerms& addTerms) {
+  PointLoad load{isContact, index, axesAround(normal)};
+  for (const Vector3d& axis : load.axes) {
+    LoadRow row;
+    row.first = static_cast<int>(s.rowQuad.size());
+    addTerms(axis);
+    row.end = static_cast<int>(s.rowQuad.size());
+    s.rows.push_back(row);
+  }
+  s.loads.push_back(load);
+}
+
+void addContactRows(const WorldData& d, ImplicitData& s, std::size_t index) {
+  const Contact& c = d.contact.contacts[index];
+  const Vector3d normal(c.normal[0], c.normal[1], c.normal[2]);
+  addRows(s, true, index, normal, [&](const Vector3d& axis) {
+    for (int e = 0; e < c.ends; ++e) {
+      const Vector3d lever(c.lever[e][0], c.lever[e][1], c.lever[e][2]);
+      addTerm(s, 2 * static_cast<int>(c.sphere[e]), c.weight[e] * axis);
+      addTerm(s, 2 * static_cast<int>(c.sphere[e]) + 1, c.weight[e] * lever.cross(axis));
+    }
+  });
+}
+
+Vector3d ratesOf(const ImplicitData& s, const LoadRow* rows) {
+  Vector3d out;
+  for (int a = 0; a < 3; ++a) {
+    double rate = 0;
+    for (int k = rows[a].first; k < rows[a].end; ++k)
+      rate += dotProduct(load(s.rowCoefficient[k]), load(s.motion[s.rowQuad[k]]));
+    out[a] = rate;
+  }
+  return out;
+}
+
+void settleContact(const WorldData& d, const ImplicitData& s, const Contact& c, LoadRow* rows) {
+  const ContactLaw law = contactLaw(d, c, s.duration);
+  const Vector3d rate = ratesOf(s, rows);
+  const double wanted = -(rate[0] + law.bias) / law.softness;
+  if (!(law.softness > 0 && wanted > 0)) return;
+  rows[0].impulse = wanted;
+  rows[0].weight = 1 / law.softness;
+  const double sliding = std::hypot(rate[1], rate[2]), sticking = 1 / law.softness;
+  const double drag = sliding * sticking > c.friction * wanted ? c.friction * wanted / sliding : sticking;
+  for (int a = 1; a < 3; ++a) {
+    rows[a].weight = drag;
+    rows[a].impulse = -drag * rate[a];
+  }
+}
+
+void settleTool(WorldData& d, const ImplicitData& s, const PointLoad& load, const StageLoads& stage, LoadRow* rows) {
+  const PointSpring p = pointSpring(d, *stage.loads, load.index, stage.remaining);
+  Vector3d x = Vector3d::Zero();
+  for (int i = 0; i < p.count; ++i) x += p.weights[i] * nodePosition(d, p.nodes[i]);
+  const Vector3d rate = ratesOf(s, rows);
+  const double h = s.duration, weight = h * (h * p.stiffness + p.damping);
+  Vector3d force = Vector3d::Zero();
+  for (int a = 0; a < 3; ++a) {
+    const double along =
+        p.stiffness * load.axes[a].dot(p.anchor - x) + p.damping * (load.axes[a].dot(p.anchorVelocity) - rate[a]);
+    if (a == 0 && p.outward != nullptr && along > 0) continue;
+    rows[a].weight = weight;
+    rows[a].impulse = h * along;
+    force += along * load.axes[a];
+  }
+  d.loadForces[load.index] = force;
+}
+
+void addDeadLoads(const WorldData& d, ImplicitData& s, double time) {
+  for (const NodeForce& load : d.deadLoads) {
+    const double size = load.force.norm();
+    if (time < load.from || !(size > 0)) continue;
+    const double share = time < load.to ? (time - load.from) / (load.to - load.from) : 1;
+    LoadRow row;
+    row.first = static_cast<int>(s.rowQuad.size());
+    addNodeTerms(d, s, load.node, 1, load.force / size);
+    row.end = static_cast<int>(s.rowQuad.size());
+    row.impulse = s.duration * share * size;
+    s.rows.push_back(row);
+  }
+}
+
+}  // namespace
+
+void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
+  s.rows.clear();
+  s.rowQuad.clear();
+  s.rowCoefficient.clear();
+  s.loads.clear();
+  for (std::size_t k = 0; k < d.contact.contacts.size(); ++k) addContactRows(d, s, k);
+  for (std::size_t k = 0; k < d.loadForces.size(); ++k) {
+    const PointSpring p = pointSpring(d, *stage.loads, k, stage.remaining);
+    addRows(s, false, k, p.outward != nullptr ? *p.outward : Vector3d::UnitX(), [&](const Vector3d& axis) {
+      for (int i = 0; i < p.count; ++i) addNodeTerms(d, s, p.nodes[i], p.weights[i], axis);
+    });
+  }
+  for (std::size_t k = 0; k < s.loads.size(); ++k) {
+    LoadRow* rows = &s.rows[3 * k];
+    if (s.loads[k].isContact) {
+      settleContact(d, s, d.contact.contacts[s.loads[k].index], rows);
+    } else {
+      settleTool(d, s, s.loads[k], stage, rows);
+    }
+  }
+  addDeadLoads(d, s, stage.end);
+  for (const LoadRow& row : s.rows) {
+    if (row.impulse == 0) continue;
+    for (int k = row.first; k < row.end; ++k) {
+      Quad& to = s.residual[s.rowQuad[k]];
+      store(to, fnma(splat(row.impulse), load(s.rowCoefficient[k]), load(to)));
+    }
+  }
+}
+
+}  // namespace medulla

@@ -1,0 +1,43 @@
+#pragma once
+
+#include "physics/dynamics/implicit_data.h"
+
+// The stages of an implicit step, in their order. All work on the state as it stands in WorldData.
+namespace medulla {
+
+// implicit_layout.cpp: what never changes; `duration` is that of a stage (s).
+void layOutImplicit(const WorldData& d, double duration, ImplicitData& s);
+
+// surface_map.cpp: the velocities with which spheres of this motion carry the anchors of all dynamic nodes, into
+// `carried`; overwrites the velocities in Links::frames.
+void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried);
+// Its transpose: impulses on the anchors, added to the spheres' part of `motion`; overwrites the loads in Links::frames
+// and Links::slots.
+void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& motion);
+// Adds J^T m J of the nodes' maps J, `mass` per node (kg), to the spheres' blocks.
+void addCarriedMass(const WorldData& d, const std::vector<double>& mass, std::vector<Block6>& diagonal,
+                    std::vector<Block6>& beside);
+
+// implicit_loads.cpp: contacts, tools and dead loads at the present motion.
+struct StageLoads {
+  const Loads* loads = nullptr;
+  double end = 0, remaining = 0;  // s: when the stage ends; from there to the frame's end
+};
+void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& loads);  // rows, and their part of the residual
+
+// link_stiffness.cpp: adds the links' stiffness and damping, times the squared duration, to `diagonal`; sets `beside`.
+void addLinkStiffness(const WorldData& d, ImplicitData& s);
+
+// implicit_system.cpp
+void assembleSystem(WorldData& d, ImplicitData& s);
+void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y);  // y = A x
+// Conjugate gradients: A change = -residual, to `tolerance` of the residual. Returns the iterations.
+int solveSystem(WorldData& d, ImplicitData& s, double tolerance);
+double product(const Motion& a, const Motion& b);
+void addScaled(double f, const Motion& b, Motion& a);  // a += f b
+void hold(const std::vector<Quad>& freedom, Motion& m);
+
+// implicit_step.cpp: one substep; positions, velocities, momenta and the tools' impulses.
+void stepImplicitly(WorldData& d, const Loads& loads, double remaining, std::vector<Eigen::Vector3d>& toolImpulse);
+
+}  // namespace medulla

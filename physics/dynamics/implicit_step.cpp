@@ -1,0 +1,312 @@
+#include <cmath>
+#include <cstddef>
+
+#include "physics/dynamics/angles.h"
+#include "physics/dynamics/contact_stages.h"
+#include "physics/dynamics/implicit_stages.h"
+#include "physics/dynamics/point_spring.h"
+#include "physics/dynamics/stages.h"
+
+// Backward Euler in a stage of duration T from the state (x0, q0, p0, L0): the motion u at its end obeys
+//   M u - p0 = T f(x0 + T u, u),   I(q) w - L0 = T tau,   q = exp(T w) q0,
+// solved by Newton's iteration. Order 1: one stage. Order 2: the two stages of SDIRK2 (Alexander 1977), L-stable like
+// the first: T = g h with g = 1 - 1/sqrt(2), the second from where the first one's velocity and force lead in (1 - g)
+// h.
+namespace medulla {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr double kGamma = 0.29289321881345248;  // 1 - 1/sqrt(2)
+
+Quaterniond quaternionOf(const Quad& q) {
+  return {q.v[3], q.v[0], q.v[1], q.v[2]};
+}
+
+// exp(turn) q
+Quad turned(const Quad& q, const Vector3d& turn) {
+  const double angle = turn.norm();
+  if (!(angle > 0)) return q;
+  Lanes c, s;
+  cosineSine(splat(0.5 * angle), c, s);
+  const Vector3d axis = s[0] / angle * turn;
+  const Quaterniond out = (Quaterniond(c[0], axis.x(), axis.y(), axis.z()) * quaternionOf(q)).normalized();
+  return {{out.x(), out.y(), out.z(), out.w()}};
+}
+
+Matrix3d worldInertia(const ImplicitData& s, const Quad& orientation, int sphere) {
+  const Matrix3d r = quaternionOf(orientation).toRotationMatrix();
+  return r * s.inertia[sphere] * r.transpose();
+}
+
+// out = a + f b, three numbers each
+void addTo(const Quad& a, double f, const Quad& b, Quad& out) {
+  store(out, fma(splat(f), load(b), load(a)));
+}
+
+// The present state becomes the one that the stage sets out from.
+void beginHere(const WorldData& d, StageStart& start) {
+  const Spheres& s = d.spheres;
+  start.position.assign(s.position.begin(), s.position.begin() + s.count);
+  start.orientation.assign(s.orientation.begin(), s.orientation.begin() + s.count);
+  start.angularMomentum.assign(s.angularMomentum.begin(), s.angularMomentum.begin() + s.count);
+  start.nodePosition.assign(d.nodes.position.begin(), d.nodes.position.begin() + d.nodes.dynamicEnd);
+  start.unwoundTwist = d.links.unwoundTwist;
+  for (int i = 0; i < s.count; ++i) {
+    start.motion[2 * i] = s.velocity[i];
+    start.motion[2 * i + 1] = s.angularVelocity[i];
+  }
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) start.motion[2 * s.count + i] = d.nodes.velocity[i];
+}
+
+// The state that `s.motion` leads to in `time` from the start.
+void place(WorldData& d, const ImplicitData& s, double time) {
+  Spheres& to = d.spheres;
+  for (int i = 0; i < to.count; ++i) {
+    const Quad &v = s.motion[2 * i], &omega = s.motion[2 * i + 1];
+    addTo(s.start.position[i], time, v, to.position[i]);
+    to.orientation[i] = turned(s.start.orientation[i], time * vectorOf(omega));
+    to.velocity[i] = v;
+    to.angularVelocity[i] = omega;
+  }
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
+    const Quad& v = s.motion[2 * to.count + i];
+    addTo(s.start.nodePosition[i], time, v, d.nodes.position[i]);
+    d.nodes.velocity[i] = v;
+  }
+  d.links.unwoundTwist = s.start.unwoundTwist;
+}
+
+// M u - p0 - T f at the placed state. Returns its size, sqrt(J): the square is twice the energy of the motion that it
+// would give the free masses.
+double evaluateResidual(WorldData& d, ImplicitData& s, const StageLoads& stage) {
+  evaluateForces(d);
+  const double t = s.duration;
+  for (int i = 0; i < d.spheres.count; ++i) {
+    const double mass = d.spheres.groups[i / 4].mass[i % 4];
+    const Vector3d v = vectorOf(s.motion[2 * i]) - vectorOf(s.start.motion[2 * i]);
+    s.residual[2 * i] = quadOf(mass * v - t * vectorOf(d.spheres.force[i]));
+    s.residual[2 * i + 1] = quadOf(worldInertia(s, d.spheres.orientation[i], i) * vectorOf(s.motion[2 * i + 1]) -
+                                   vectorOf(s.start.angularMomentum[i]) - t * vectorOf(d.spheres.torque[i]));
+  }
+  const Vector3d gravity = vectorOf(d.gravity);
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
+    const int k = 2 * d.spheres.count + i;
+    const double m = d.nodes.mass[i];
+    s.residual[k] = quadOf(m * (vectorOf(s.motion[k]) - vectorOf(s.start.motion[k]) - t * gravity) -
+                           t * vectorOf(d.nodes.force[i]));
+  }
+  evaluateLoads(d, s, stage);
+  s.workOfPaths = 0;
+  for (const SphereDrive& drive : d.drives)
+    s.workOfPaths += dotProduct(load(s.residual[2 * drive.sphere]), load(s.motion[2 * drive.sphere]));
+  hold(s.freedom, s.residual);
+  double squared = 0;
+  for (int i = 0; i < d.spheres.count; ++i) {
+    const SphereGroup& g = d.spheres.groups[i / 4];
+    const Lanes* e = g.inverseInertia;
+    squared += g.inverseMass[i % 4] * vectorOf(s.residual[2 * i]).squaredNorm() +
+               (e[0][i % 4] + e[1][i % 4] + e[2][i % 4]) / 3 * vectorOf(s.residual[2 * i + 1]).squaredNorm();
+  }
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+    squared += d.nodes.inverseMass[i] * vectorOf(s.residual[2 * d.spheres.count + i]).squaredNorm();
+  return std::sqrt(squared);
+}
+
+void leadDriven(WorldData& d, ImplicitData& s, double end) {
+  if (d.drives.empty()) return;
+  // driveSpheres() gives the velocity that reaches the path in one substep; here in one stage.
+  const double substep = d.substep;
+  d.substep = s.duration;
+  driveSpheres(d, end);
+  d.substep = substep;
+  for (const SphereDrive& drive : d.drives) s.motion[2 * drive.sphere] = d.spheres.velocity[drive.sphere];
+}
+
+// Goes along s.change as far as it makes the residual smaller. Returns the residual's size there.
+double search(WorldData& d, ImplicitData& s, const StageLoads& stage, double before) {
+  constexpr int kHalvings = 12;
+  double share = 1, gone = 0, left = 0;
+  for (int k = 0; k <= kHalvings; ++k, share *= 0.5) {
+    addScaled(share - gone, s.change, s.motion);
+    gone = share;
+    place(d, s, s.duration);
+    left = evaluateResidual(d, s, stage);
+    if (left < (1 - 1e-4 * share) * before) break;
+  }
+  return left;
+}
+
+// From the present state, which `s.start` holds, with its momenta there. False where the iteration does not settle.
+bool runStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
+  constexpr int kIterations = 20;
+  constexpr double kLeastAcceleration = 1e-5;  // m/s2, of all masses
+  const double share = d.settings.order == 2 ? 1e-6 : 1e-3;
+  if (d.contact.mode != ContactMode::none) {
+    findContacts(d);
+    notePenetration(d.contact);
+  }
+  s.motion = s.start.motion;
+  leadDriven(d, s, stage.end);
+  place(d, s, s.duration);
+  double left = evaluateResidual(d, s, stage);
+  const double enough = share * left + s.duration * kLeastAcceleration * std::sqrt(s.totalMass);
+  for (int i = 0; i < kIterations && left > enough; ++i) {
+    const double before = left;
+    assembleSystem(d, s);
+    s.iterations += solveSystem(d, s, 1e-2);
+    ++s.solves;
+    left = search(d, s, stage, before);
+    if (!(left < before)) break;
+  }
+  return left <= 10 * enough;  // rounding stops some iterations of very stiff bodies just short of it
+}
+
+// Steps of half of the one before at each level; all but the first are made when a step fails for the first time.
+ImplicitData& implicitLevel(WorldData& d, std::size_t level) {
+  while (d.implicit.size() <= level) {
+    d.implicit.push_back(std::make_shared<ImplicitData>());
+    layOutImplicit(d, d.settings.order == 2 ? kGamma * d.substep : d.substep, *d.implicit.back());
+  }
+  return *d.implicit[level];
+}
+
+// The second stage of order 2 sets out from the first one's start, led on for the time of the first stage's complement
+// by the velocity and the force found there.
+void beginSecondStage(WorldData& d, ImplicitData& s, double late) {
+  const double gain = (1 - kGamma) / kGamma;  // p1 - p0 is the force times the first stage's duration
+  for (int i = 0; i < d.spheres.count; ++i) {
+    Quad& start = s.start.angularMomentum[i];
+    const Vector3d end = worldInertia(s, d.spheres.orientation[i], i) * vectorOf(s.motion[2 * i + 1]);
+    start = quadOf(vectorOf(start) + gain * (end - vectorOf(start)));
+  }
+  place(d, s, late);
+  for (std::size_t i = 0; i < s.motion.size(); ++i) {
+    const Lanes start = load(s.start.motion[i]);
+    store(s.start.motion[i], fma(splat(gain), load(s.motion[i]) - start, start));
+  }
+  for (int i = 0; i < d.spheres.count; ++i) {
+    s.start.position[i] = d.spheres.position[i];
+    s.start.orientation[i] = d.spheres.orientation[i];
+  }
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) s.start.nodePosition[i] = d.nodes.position[i];
+}
+
+// J
+double kineticEnergy(const WorldData& d, const ImplicitData& s) {
+  double kinetic = 0;
+  for (int i = 0; i < d.spheres.count; ++i) {
+    const Vector3d omega = vectorOf(d.spheres.angularVelocity[i]);
+    kinetic += d.spheres.groups[i / 4].mass[i % 4] * vectorOf(d.spheres.velocity[i]).squaredNorm() +
+               omega.dot(worldInertia(s, d.spheres.orientation[i], i) * omega);
+  }
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) kinetic += d.nodes.mass[i] * vectorOf(d.nodes.velocity[i]).squaredNorm();
+  return 0.5 * kinetic;
+}
+
+// At the state of the last evaluateForces().
+double elasticEnergy(const WorldData& d) {
+  return linkEnergy(d) + surfaceEnergy(d);
+}
+
+// J: what gravity, loads, contacts and paths give in the last stage, for the time of the whole step.
+double workOf(const WorldData& d, const ImplicitData& s) {
+  double sum = s.workOfPaths;
+  const Vector3d gravity = s.duration * vectorOf(d.gravity);
+  for (int i = 0; i < d.spheres.count; ++i)
+    sum += d.spheres.groups[i / 4].mass[i % 4] * gravity.dot(vectorOf(s.motion[2 * i]));
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+    sum += d.nodes.mass[i] * gravity.dot(vectorOf(s.motion[2 * d.spheres.count + i]));
+  for (const LoadRow& row : s.rows) {
+    if (row.impulse == 0) continue;
+    for (int k = row.first; k < row.end; ++k)
+      sum += row.impulse * dotProduct(load(s.rowCoefficient[k]), load(s.motion[s.rowQuad[k]]));
+  }
+  return d.substep / s.duration * sum;
+}
+
+void slowDown(WorldData& d, double share) {
+  const Lanes kept = splat(share);
+  for (std::vector<Quad>* all :
+       {&d.spheres.velocity, &d.spheres.angularVelocity, &d.spheres.angularMomentum, &d.nodes.velocity})
+    for (Quad& v : *all) store(v, kept * load(v));
+}
+
+// Puts back the state that `start` holds.
+void restore(WorldData& d, const StageStart& start) {
+  Spheres& s = d.spheres;
+  std::copy(start.position.begin(), start.position.end(), s.position.begin());
+  std::copy(start.orientation.begin(), start.orientation.end(), s.orientation.begin());
+  std::copy(start.angularMomentum.begin(), start.angularMomentum.end(), s.angularMomentum.begin());
+  std::copy(start.nodePosition.begin(), start.nodePosition.end(), d.nodes.position.begin());
+  d.links.unwoundTwist = start.unwoundTwist;
+  for (int i = 0; i < s.count; ++i) {
+    s.velocity[i] = start.motion[2 * i];
+    s.angularVelocity[i] = start.motion[2 * i + 1];
+  }
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) d.nodes.velocity[i] = start.motion[2 * s.count + i];
+}
+
+struct StepTime {
+  double end, remaining;  // s: when it ends; from there to the frame's end
+};
+
+// Both stages from s.before. False where one does not settle or energy comes from nowhere; the state is of no account
+// then.
+bool attempt(WorldData& d, ImplicitData& s, std::size_t level, const Loads& loads, const StepTime& time,
+             double energyBefore) {
+  // A body far beyond what its links measure may not settle in any step; what loses energy is then good enough.
+  constexpr std::size_t kMustSettle = 2;
+  const double late = d.substep - s.duration;  // 0 in order 1
+  s.start = s.before;
+  bool settled = true;
+  if (late > 0) {
+    settled = runStage(d, s, {&loads, time.end - late, time.remaining + late});
+    beginSecondStage(d, s, late);
+  }
+  if (settled || level > kMustSettle) settled = runStage(d, s, {&loads, time.end, time.remaining});
+  if (!settled && level <= kMustSettle) return false;
+  for (int i = 0; i < d.spheres.count; ++i)
+    d.spheres.angularMomentum[i] = quadOf(worldInertia(s, d.spheres.orientation[i], i) * vectorOf(s.motion[2 * i + 1]));
+  // Backward Euler loses energy where the potential is convex; elsewhere this decides. Order 2 swings about it.
+  const double given = workOf(d, s), elastic = elasticEnergy(d), kinetic = kineticEnergy(d, s);
+  const double slack = d.settings.order == 2 ? 0.5 : 1e-3;
+  if (!(elastic + kinetic <= energyBefore + given + slack * (energyBefore + std::abs(given)))) return false;
+  const double allowed = std::max(0.0, energyBefore + given - elastic);
+  if (d.settings.order == 1 && kinetic > allowed) slowDown(d, std::sqrt(allowed / kinetic));
+  return true;
+}
+
+// One step of d.substep; where it fails, two of half of it. In the last resort the state stays and its motion is lost:
+// energy never comes from nowhere.
+void advanceBy(WorldData& d, std::size_t level, const Loads& loads, const StepTime& time,
+               std::vector<Vector3d>& toolImpulse) {
+  constexpr std::size_t kDeepest = 6;
+  ImplicitData& s = implicitLevel(d, level);
+  beginHere(d, s.before);
+  evaluateForces(d);
+  if (attempt(d, s, level, loads, time, kineticEnergy(d, s) + elasticEnergy(d))) {
+    for (std::size_t k = 0; k < d.loadForces.size(); ++k)
+      toolImpulse[pointSpring(d, loads, k, time.remaining).tool] += d.substep * d.loadForces[k];
+    return;
+  }
+  restore(d, s.before);
+  if (level == kDeepest) return slowDown(d, 0);
+  const double half = 0.5 * d.substep;
+  d.substep = half;
+  advanceBy(d, level + 1, loads, {time.end - half, time.remaining + half}, toolImpulse);
+  advanceBy(d, level + 1, loads, time, toolImpulse);
+  d.substep = 2 * half;
+}
+
+}  // namespace
+
+void stepImplicitly(WorldData& d, const Loads& loads, double remaining, std::vector<Vector3d>& toolImpulse) {
+  const double end = static_cast<double>(d.frame + 1) * d.settings.frameDuration - remaining;
+  advanceBy(d, 0, loads, {end, remaining}, toolImpulse);
+}
+
+}  // namespace medulla

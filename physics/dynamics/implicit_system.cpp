@@ -1,0 +1,205 @@
+#include <cmath>
+#include <cstddef>
+
+#include "physics/dynamics/implicit_stages.h"
+
+// The linear system of an implicit stage. With J the map from the motion of the spheres to that of the anchors, S the
+// spheres' masses and links, M the nodes' masses and G the springs of the surface (attachments and edges, constant
+// because they act on displacements):
+//
+//   | S + J^T G J   -J^T G |  spheres
+//   |   -G J         M + G |  nodes
+//
+// M + G is factorised once. The preconditioner eliminates the nodes by it, and takes for what is left of J^T ... J
+// the masses that a node behind an attachment alone would have: exact but for the edges' springs. Contacts and tools
+// are rows of rank one on top; in the preconditioner a contact stands with its own spheres' blocks alone.
+namespace medulla {
+
+namespace {
+
+Vector6 blockOf(const Motion& m, std::size_t sphere) {
+  const Quad &v = m[2 * sphere], &w = m[2 * sphere + 1];
+  return (Vector6() << v.v[0], v.v[1], v.v[2], w.v[0], w.v[1], w.v[2]).finished();
+}
+void putBlock(const Vector6& b, Motion& m, std::size_t sphere) {
+  m[2 * sphere] = {{b[0], b[1], b[2], 0}};
+  m[2 * sphere + 1] = {{b[3], b[4], b[5], 0}};
+}
+
+// given = G (x - carried): impulses of attachments and edges on the nodes. `x` holds a velocity per node, or is null:
+// 0.
+void applySurface(const WorldData& d, ImplicitData& s, const Quad* x) {
+  std::vector<Quad>& displaced = s.carried;
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
+    const Lanes of = x != nullptr ? load(x[i]) : splat(0);
+    const Lanes difference = of - load(displaced[i]);
+    store(displaced[i], difference);
+    store(s.given[i], splat(s.pull[i]) * difference);
+  }
+  const double h2 = s.duration * s.duration;
+  for (const SpringGroup& g : d.springs.groups) {
+    for (int k = 0; k < 4; ++k) {
+      const std::size_t i = g.node0[k] / sizeof(Quad), j = g.node1[k] / sizeof(Quad);
+      const Lanes pull = splat(h2 * g.stiffness[k]) * (load(displaced[j]) - load(displaced[i]));
+      store(s.given[j], load(s.given[j]) + pull);
+      store(s.given[i], load(s.given[i]) - pull);
+    }
+  }
+}
+
+void negate(std::vector<Quad>& q) {
+  for (Quad& a : q) store(a, splat(0) - load(a));
+}
+
+// Of every load, the part that each of its spheres would feel alone.
+void lumpRows(const WorldData& d, ImplicitData& s) {
+  const int quads = 2 * d.spheres.count;
+  for (const LoadRow& row : s.rows) {
+    for (int k = row.first; k < row.end; ++k) {
+      const int quad = s.rowQuad[k];
+      if (quad >= quads || quad % 2 != 0) continue;  // a node; the turning half of the sphere before
+      Vector6 c = Vector6::Zero();
+      c.head<3>() = vectorOf(s.rowCoefficient[k]);
+      if (k + 1 < row.end && s.rowQuad[k + 1] == quad + 1) c.tail<3>() = vectorOf(s.rowCoefficient[k + 1]);
+      s.lumped[quad / 2].noalias() += row.weight * c * c.transpose();
+    }
+  }
+}
+
+// Held freedoms: a row and column of the unit matrix.
+void loadFactor(const WorldData& d, ImplicitData& s) {
+  s.spheres.setZero();
+  const auto mask = [&s](int sphere) {
+    Vector6 m = blockOf(s.freedom, sphere);
+    return m;
+  };
+  for (int i = 0; i < d.spheres.count; ++i) {
+    const Vector6 m = mask(i);
+    Block6& to = s.spheres.diagonal(i);
+    to = m.asDiagonal() * s.lumped[i] * m.asDiagonal();
+    for (int k = 0; k < 6; ++k)
+      if (m[k] == 0) to(k, k) = 1;
+  }
+  for (int k = 0; k < d.links.count; ++k) {
+    const LinkGroup& g = d.links.groups[k / 4];
+    const Vector6 m0 = mask(static_cast<int>(g.sphere0[k % 4])), m1 = mask(static_cast<int>(g.sphere1[k % 4]));
+    s.spheres.addBlock(k, m0.asDiagonal() * s.lumpedBeside[k] * m1.asDiagonal());
+  }
+}
+
+void precondition(WorldData& d, ImplicitData& s, const Motion& r, Motion& z) {
+  const std::size_t first = 2 * static_cast<std::size_t>(d.spheres.count);
+  z = r;
+  if (d.nodes.dynamicEnd > 0) {
+    // Spheres: r_s + J^T G (M + G)^-1 r_n
+    s.nodes.solve(z.data() + first);
+    std::fill(s.carried.begin(), s.carried.end(), Quad{});
+    applySurface(d, s, z.data() + first);
+    returnImpulses(d, s.given, z);
+  }
+  for (std::size_t i = 0; i < s.blocks.size(); ++i) s.blocks[i] = blockOf(z, i).cwiseProduct(blockOf(s.freedom, i));
+  s.spheres.solve(s.blocks);
+  for (std::size_t i = 0; i < s.blocks.size(); ++i) putBlock(s.blocks[i], z, i);
+  if (d.nodes.dynamicEnd > 0) {
+    // Nodes: z_n + (M + G)^-1 G J z_s
+    carryMotion(d, z, s.carried);
+    applySurface(d, s, nullptr);
+    negate(s.given);
+    for (int i = 0; i < d.nodes.dynamicEnd; ++i) store(s.given[i], load(s.freedom[first + i]) * load(s.given[i]));
+    s.nodes.solve(s.given.data());
+    for (int i = 0; i < d.nodes.dynamicEnd; ++i) store(z[first + i], load(z[first + i]) + load(s.given[i]));
+  }
+  hold(s.freedom, z);
+}
+
+}  // namespace
+
+void hold(const std::vector<Quad>& freedom, Motion& m) {
+  for (std::size_t i = 0; i < m.size(); ++i) store(m[i], load(freedom[i]) * load(m[i]));
+}
+
+double product(const Motion& a, const Motion& b) {
+  Lanes sum = splat(0);
+  for (std::size_t i = 0; i < a.size(); ++i) sum = fma(load(a[i]), load(b[i]), sum);
+  return sumOfLanes(sum);
+}
+
+void addScaled(double f, const Motion& b, Motion& a) {
+  for (std::size_t i = 0; i < a.size(); ++i) store(a[i], fma(splat(f), load(b[i]), load(a[i])));
+}
+
+void assembleSystem(WorldData& d, ImplicitData& s) {
+  for (int i = 0; i < d.spheres.count; ++i) {
+    Block6& b = s.diagonal[i];
+    const Quad& q = d.spheres.orientation[i];
+    const Eigen::Matrix3d r = Eigen::Quaterniond(q.v[3], q.v[0], q.v[1], q.v[2]).toRotationMatrix();
+    b.setZero();
+    b.topLeftCorner<3, 3>().diagonal().setConstant(d.spheres.groups[i / 4].mass[i % 4]);
+    b.bottomRightCorner<3, 3>() = r * s.inertia[i] * r.transpose();
+  }
+  addLinkStiffness(d, s);
+  s.lumped = s.diagonal;
+  s.lumpedBeside = s.beside;
+  addCarriedMass(d, s.carriedMass, s.lumped, s.lumpedBeside);
+  lumpRows(d, s);
+  loadFactor(d, s);
+  s.spheres.factorise();
+}
+
+void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y) {
+  const std::size_t first = 2 * static_cast<std::size_t>(d.spheres.count);
+  for (std::size_t i = 0; i < s.blocks.size(); ++i) s.blocks[i].noalias() = s.diagonal[i] * blockOf(x, i);
+  for (int k = 0; k < d.links.count; ++k) {
+    const LinkGroup& g = d.links.groups[k / 4];
+    const std::uint32_t i = g.sphere0[k % 4], j = g.sphere1[k % 4];
+    s.blocks[i].noalias() += s.beside[k] * blockOf(x, j);
+    s.blocks[j].noalias() += s.beside[k].transpose() * blockOf(x, i);
+  }
+  for (std::size_t i = 0; i < s.blocks.size(); ++i) putBlock(s.blocks[i], y, i);
+  if (d.nodes.dynamicEnd > 0) {
+    carryMotion(d, x, s.carried);
+    applySurface(d, s, x.data() + first);
+    for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+      store(y[first + i], fma(splat(d.nodes.mass[i]), load(x[first + i]), load(s.given[i])));
+    negate(s.given);
+    returnImpulses(d, s.given, y);
+  }
+  for (const LoadRow& row : s.rows) {
+    if (row.weight == 0) continue;
+    double rate = 0;
+    for (int k = row.first; k < row.end; ++k) rate += dotProduct(load(s.rowCoefficient[k]), load(x[s.rowQuad[k]]));
+    for (int k = row.first; k < row.end; ++k) {
+      Quad& to = y[s.rowQuad[k]];
+      store(to, fma(splat(row.weight * rate), load(s.rowCoefficient[k]), load(to)));
+    }
+  }
+  hold(s.freedom, y);
+}
+
+int solveSystem(WorldData& d, ImplicitData& s, double tolerance) {
+  constexpr int kIterations = 200;
+  std::fill(s.change.begin(), s.change.end(), Quad{});
+  Motion& r = s.residual;
+  negate(r);
+  hold(s.freedom, r);
+  precondition(d, s, r, s.preconditioned);
+  s.direction = s.preconditioned;
+  double size = product(r, s.preconditioned);
+  const double enough = tolerance * tolerance * size;
+  for (int i = 0; i < kIterations; ++i) {
+    if (!(size > enough)) return i;
+    applySystem(d, s, s.direction, s.image);
+    const double step = size / product(s.direction, s.image);
+    addScaled(step, s.direction, s.change);
+    addScaled(-step, s.image, r);
+    precondition(d, s, r, s.preconditioned);
+    const double next = product(r, s.preconditioned);
+    const double keep = next / size;
+    for (std::size_t k = 0; k < s.direction.size(); ++k)
+      store(s.direction[k], fma(splat(keep), load(s.direction[k]), load(s.preconditioned[k])));
+    size = next;
+  }
+  return kIterations;
+}
+
+}  // namespace medulla

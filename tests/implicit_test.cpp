@@ -1,0 +1,266 @@
+#include "physics/dynamics/implicit_stages.h"
+#include "tests/contact_bodies.h"
+#include "tests/dynamics_states.h"
+#include "tests/synthetic_model.h"
+
+// The implicit step: its matrix, its order, what it keeps and what it may only lose, loads and contact inside.
+namespace medulla {
+
+using namespace states;
+
+static WorldSettings implicitly(double step, int order = 1, const Vector3d& gravity = Vector3d::Zero()) {
+  WorldSettings s;
+  s.integrator = Integrator::implicit;
+  s.order = order;
+  s.gravity = gravity;
+  s.frameDuration = step;
+  s.substeps = 1;
+  return s;
+}
+
+static BodyDescription tube(SurfaceMode surface, bool held, double damping = 0.1) {
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
+  b.surface = surface;
+  b.tissue.damping = damping;
+  if (held) {
+    b.fixed = {{0, FixedFreedom::all}};
+    for (int i = 0; i < 11; ++i) b.fixedNodes.push_back(i);
+  }
+  return b;
+}
+
+static double energyOf(const World& world) {
+  const Energies e = world.energies();
+  return e.kinetic + e.elastic + e.gravity;
+}
+
+static void run(World& world, double duration, const Loads& loads = {}) {
+  while (world.time() < duration - 1e-9) world.advance(loads);
+}
+
+static double farthest(const World& a, const World& b) {
+  double out = 0;
+  DynamicsFrame fa, fb;
+  a.readFrame(fa);
+  b.readFrame(fb);
+  for (std::size_t k = 0; k < fa.bodies.size(); ++k)
+    for (std::size_t i = 0; i < fa.bodies[k].nodes.size(); ++i)
+      out = std::max(out, (fa.bodies[k].nodes[i] - fb.bodies[k].nodes[i]).norm());
+  return out;
+}
+
+// At rest the matrix is exact: M + T^2 K + T C against differences of the forces themselves.
+TEST(Implicit, TheMatrixIsTheForcesDerivativeAtRest) {
+  for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    const double duration = 0.01, tiny = 1e-6;
+    World world(implicitly(duration), {tube(surface, true)});
+    world.advance({});  // lays everything out; nothing moves
+    WorldData& d = world.data();
+    ImplicitData& s = *d.implicit.at(0);
+    evaluateForces(d);
+    assembleSystem(d, s);
+    Random random(3);
+    Motion x(s.freedom.size()), y(s.freedom.size());
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = quadOf(random.vector());
+    hold(s.freedom, x);
+    applySystem(d, s, x, y);
+    // Forces after `tiny` of a step at the motion x, with damping at that motion.
+    World moved(implicitly(duration), {tube(surface, true)});
+    WorldData& m = moved.data();
+    for (int i = 0; i < m.spheres.count; ++i) {
+      m.spheres.position[i] = quadOf(vectorOf(m.spheres.position[i]) + tiny * duration * vectorOf(x[2 * i]));
+      turnBy(m, i, tiny * duration * vectorOf(x[2 * i + 1]));
+      m.spheres.velocity[i] = quadOf(tiny * vectorOf(x[2 * i]));
+      m.spheres.angularVelocity[i] = quadOf(tiny * vectorOf(x[2 * i + 1]));
+    }
+    for (int i = 0; i < m.nodes.dynamicEnd; ++i) {
+      const Vector3d v = tiny * vectorOf(x[2 * m.spheres.count + i]);
+      m.nodes.position[i] = quadOf(vectorOf(m.nodes.position[i]) + duration * v);
+      m.nodes.velocity[i] = quadOf(v);
+    }
+    evaluateForces(m);
+    double largest = 0, error = 0;
+    const auto compare = [&](std::size_t quad, const Vector3d& inertial, const Quad& force) {
+      const Vector3d expected = vectorOf(s.freedom[quad]).cwiseProduct(inertial - duration / tiny * vectorOf(force));
+      largest = std::max(largest, expected.norm());
+      error = std::max(error, (vectorOf(y[quad]) - expected).norm());
+    };
+    for (int i = 0; i < m.spheres.count; ++i) {
+      compare(2 * i, sphereMass(m, i) * vectorOf(x[2 * i]), m.spheres.force[i]);
+      compare(2 * i + 1, inertia(world.data(), i) * vectorOf(x[2 * i + 1]), m.spheres.torque[i]);
+    }
+    for (int i = 0; i < m.nodes.dynamicEnd; ++i) {
+      const std::size_t quad = 2 * m.spheres.count + i;
+      compare(quad, m.nodes.mass[i] * vectorOf(x[quad]), m.nodes.force[i]);
+    }
+    EXPECT_LT(error, 1e-5 * largest);
+  }
+}
+
+TEST(Implicit, RestsWhereTheExplicitStepRests) {
+  for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    BodyDescription body = tube(surface, true, 1);
+    DeadLoad load;
+    load.node = static_cast<int>(body.model->restNodes.size()) - 1;
+    load.force = {0.002, 0.004, -0.001};
+    load.to = 0.1;
+    body.deadLoads = {load};
+    WorldSettings explicitly;
+    World a(explicitly, {body}), b(implicitly(0.02, 1, explicitly.gravity), {body}),
+        c(implicitly(0.02, 2, explicitly.gravity), {body});
+    for (World* world : {&a, &b, &c}) run(*world, 12);
+    EXPECT_LT(farthest(a, b), 2e-7);
+    EXPECT_LT(farthest(a, c), 2e-7);
+  }
+}
+
+// A bending tube, let go: errors against a far finer run shrink as the step and as its square.
+TEST(Implicit, ConvergesWithItsOrder) {
+  const auto end = [](double step, int order) {
+    auto world =
+        std::make_unique<World>(implicitly(step, order, {0, -2, 0.5}), std::vector{tube(SurfaceMode::full, true, 0.3)});
+    run(*world, 0.16);
+    return world;
+  };
+  const auto finest = end(0.16 / 4096, 2);
+  for (const int order : {1, 2}) {
+    const double coarse = farthest(*end(0.16 / 64, order), *finest), fine = farthest(*end(0.16 / 128, order), *finest);
+    EXPECT_NEAR(std::log2(coarse / fine), order, 0.15) << coarse << " " << fine;
+  }
+}
+
+TEST(Implicit, EnergyNeverGrowsInOrderOne) {
+  for (const double damping : {0.0, 0.2}) {
+    for (const double step : {0.001, 0.01, 0.05}) {
+      World world(implicitly(step), {tube(SurfaceMode::full, false, damping)});
+      shake(world.data(), 3, 1.5, 0.01, 1);
+      double before = energyOf(world);
+      const double start = before;
+      for (int i = 0; i < 60; ++i) {
+        world.advance({});
+        const double now = energyOf(world);
+        EXPECT_LE(now, before + 1e-12 * start) << step << " s, step " << i;
+        before = now;
+      }
+    }
+  }
+}
+
+TEST(Implicit, OrderTwoStaysBounded) {
+  for (const double step : {0.001, 0.01, 0.05}) {
+    World world(implicitly(step, 2), {tube(SurfaceMode::full, true, 0)});
+    shake(world.data(), 3, 1, 0.01, 1);
+    // What is held does not move.
+    world.data().spheres.velocity[0] = world.data().spheres.angularMomentum[0] = {};
+    refreshAngularVelocities(world.data());
+    for (int i = 0; i < 11; ++i) world.data().nodes.velocity[world.data().ranges[0].node[i]] = {};
+    const double start = energyOf(world);
+    for (int i = 0; i < 100; ++i) {
+      world.advance({});
+      EXPECT_LT(energyOf(world), 1.5 * start) << step << " s, step " << i;
+    }
+  }
+}
+
+TEST(Implicit, AFreeBodyKeepsItsMomentum) {
+  World world(implicitly(0.005), {tube(SurfaceMode::full, false)});
+  shake(world.data(), 5, 0.2, 0.001, 0.2);
+  const Momentum before = momentum(world.data());
+  run(world, 1);
+  const Momentum after = momentum(world.data());
+  // As far as the iteration is taken: a thousandth of the impulses of a step.
+  EXPECT_LT((after.linear - before.linear).norm(), 1e-3 * before.linearScale);
+  EXPECT_LT((after.angular - before.angular).norm(), 0.02 * before.angularScale);
+}
+
+TEST(Implicit, ATurnedAndMovedWorldIsTheSameWorld) {
+  const auto node = [](const Eigen::Isometry3d& place) {
+    BodyDescription body = tube(SurfaceMode::full, true);
+    body.worldFromModel = place;
+    World world(implicitly(0.01, 1, place.linear() * Vector3d(0, -9.81, 0)), {body});
+    run(world, 0.3);
+    DynamicsFrame frame;
+    world.readFrame(frame);
+    return Vector3d(place.inverse() * frame.bodies[0].nodes.back());
+  };
+  Eigen::Isometry3d place(Eigen::AngleAxisd(0.8, Vector3d(1, -2, 0.5).normalized()));
+  place.translation() = Vector3d(0.3, 0.1, -0.2);
+  EXPECT_LT((node(place) - node(Eigen::Isometry3d::Identity())).norm(), 1e-6);
+}
+
+TEST(Implicit, AToolFeelsWhatTheBodyGets) {
+  for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    World world(implicitly(0.01), {tube(surface, false)});
+    Loads loads;
+    HeldNode held;
+    held.node = 40;
+    held.anchor = world.bodies()[0].model->restNodes[40] + Vector3d(0.001, 0.003, -0.002);
+    held.stiffness = 300;
+    held.damping = 1;
+    loads.heldNodes = {held};
+    const Momentum before = momentum(world.data());
+    const Vector3d given = world.advance(loads).toolImpulse.at(0);
+    const Momentum after = momentum(world.data());
+    EXPECT_GT(given.norm(), 0);
+    EXPECT_LT((after.linear - before.linear - given).norm(), 5e-3 * given.norm());
+  }
+}
+
+TEST(Implicit, ABallRestsOnAPlane) {
+  StaticShape floor;
+  floor.friction = 0.5;
+  WorldSettings settings = implicitly(0.005, 1, {0, -9.81, 0});
+  settings.contact = ContactMode::balls;
+  World world(settings, {synthetic::ball("ball", 0.01, {0, 0.012, 0}, 0.5)}, {floor});
+  run(world, 1);
+  const double omega = std::numbers::pi / 0.005, depth = 9.81 / (omega * omega);
+  EXPECT_NEAR(world.data().spheres.position[0].v[1], 0.01 - depth, 0.01 * depth);
+}
+
+TEST(Implicit, FrictionHoldsOnASlopeAndSlidesOnASteeperOne) {
+  for (const double slope : {0.2, 0.5}) {
+    StaticShape floor;
+    floor.friction = 0.3;
+    WorldSettings settings = implicitly(0.005, 1, 9.81 * Vector3d(std::sin(slope), -std::cos(slope), 0));
+    settings.contact = ContactMode::balls;
+    // Three balls in a triangle, linked: they do not roll.
+    const auto model = synthetic::ballModel({{{0, 0, 0}, 0.01}, {{0.05, 0, 0}, 0.01}, {{0.025, 0, 0.04}, 0.01}},
+                                            {{0, 1}, {1, 2}, {2, 0}});
+    BodyDescription body = synthetic::ballBody("tripod", model, {0, 0.01, 0}, 0.3);
+    body.tissue.young = 1e6;
+    World world(settings, {body}, {floor});
+    run(world, 1);
+    const double moved = world.data().spheres.position[0].v[0], free = 9.81 * (std::sin(slope) - 0.3 * std::cos(slope));
+    if (free < 0) {
+      EXPECT_LT(std::abs(moved), 1e-3);
+    } else {
+      EXPECT_NEAR(moved, 0.5 * free, 0.03 * free);
+    }
+  }
+}
+
+TEST(Implicit, TheSameRunTwiceHasTheSameHash) {
+  const auto hash = [] {
+    World world(implicitly(0.01, 1, {0, -9.81, 0}), {tube(SurfaceMode::full, true)});
+    run(world, 0.3);
+    return world.stateHash();
+  };
+  EXPECT_EQ(hash(), hash());
+}
+
+TEST(Implicit, ALedSphereIsOnItsPath) {
+  for (const int order : {1, 2}) {
+    BodyDescription body = tube(SurfaceMode::skin, false);
+    DrivenSphere driven;
+    driven.amplitude = 0.01;
+    body.driven = {driven};
+    WorldSettings explicitly;
+    explicitly.gravity.setZero();
+    World a(implicitly(0.01, order), {body}), b(explicitly, {body});
+    run(a, 0.7);
+    run(b, 0.7);
+    EXPECT_LT((vectorOf(a.data().spheres.position[0]) - vectorOf(b.data().spheres.position[0])).norm(), 1e-6);
+  }
+}
+
+}  // namespace medulla

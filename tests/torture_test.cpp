@@ -1,0 +1,92 @@
+#include "app/torture.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "app/files/stability_file.h"
+#include "tests/program_run.h"
+#include "tests/synthetic_model.h"
+#include "tests/temporary_folder.h"
+
+// Stability where methods fail: trials in the library, `medulla stability` around them.
+namespace medulla {
+namespace {
+
+BodyDescription heldTube() {
+  BodyDescription body = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 6, 8)), 6e3);
+  body.tissue.damping = 0.4;
+  body.fixed = {{0, FixedFreedom::all}};
+  return body;
+}
+
+class Torture : public testing::TestWithParam<std::string> {};
+
+// The whole set at the steps where explicit methods have long failed.
+TEST_P(Torture, ImplicitStepsSurviveAndComeBackToRest) {
+  const BodyDescription body = heldTube();
+  for (const TortureMethod& method : tortureMethods()) {
+    if (method.integrator != Integrator::implicit) continue;
+    for (const double step : {0.01, 0.05}) {
+      const TortureOutcome outcome = torture(body, method, GetParam(), step);
+      EXPECT_TRUE(outcome.survived) << method.name << ' ' << step;
+      EXPECT_TRUE(outcome.recoveredAt) << method.name << ' ' << step << " after " << outcome.duration << " s";
+      EXPECT_LE(outcome.largestEnergy, (method.order == 1 ? 1 + 1e-12 : 1.5) * outcome.startEnergy)
+          << method.name << ' ' << step;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Trials, Torture, testing::ValuesIn(tortureTrials()), [](const auto& trial) {
+  std::string name = trial.param;
+  for (char& c : name)
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+  return name;
+});
+
+TEST(TortureOfExplicitSteps, FailsBeyondTheLimitAndSaysSo) {
+  const BodyDescription body = heldTube();
+  const TortureMethod& method = tortureMethods()[0];
+  ASSERT_EQ(method.integrator, Integrator::explicitEuler);
+  const double limit = explicitLimit(body);
+  EXPECT_TRUE(torture(body, method, "stiffness_1", 0.5 * limit).recoveredAt);
+  const TortureOutcome failed = torture(body, method, "stiffness_1", 4 * limit);
+  EXPECT_FALSE(failed.survived);
+  EXPECT_FALSE(failed.recoveredAt);
+  EXPECT_GT(failed.largestEnergy, failed.startEnergy);
+}
+
+TEST(TortureOfExplicitSteps, UnknownTrialsAndFreeBodiesAreRefused) {
+  EXPECT_THROW(torture(heldTube(), tortureMethods()[0], "tickled", 0.01), std::runtime_error);
+  BodyDescription body = heldTube();
+  body.fixed.clear();
+  EXPECT_THROW(torture(body, tortureMethods()[0], "random", 0.01), std::runtime_error);
+}
+
+TEST(StabilityCommand, WritesMapAndTrials) {
+  const TemporaryFolder folder;
+  const std::string scene = std::string(MEDULLA_SOURCE_DIR) + "/scenes/gallbladder.xml";
+  const ProgramResult result = runProgram(
+      {"stability", scene, "-o", folder / "out", "--steps", "10,50", "--young", "1e4,1e6", "--trial-steps", "50"});
+  EXPECT_EQ(result.exitCode, 0) << result.err;
+  EXPECT_NE(result.out.find("implicit.map_recovered 4/4"), std::string::npos) << result.out;
+  const std::string map = readFile(folder / "out/map.csv"), trials = readFile(folder / "out/trials.csv");
+  EXPECT_EQ(std::count(map.begin(), map.end(), '\n'), 1 + 3 * 4);
+  EXPECT_EQ(std::count(trials.begin(), trials.end(), '\n'), 1 + 3 * static_cast<long>(tortureTrials().size()));
+  EXPECT_NE(map.find("explicit,,10000,0.05,0,"), std::string::npos) << map;
+}
+
+TEST(StabilityCommand, BadStepsAndFreeBodiesAreOneLine) {
+  const TemporaryFolder folder;
+  const std::string scenes = std::string(MEDULLA_SOURCE_DIR) + "/scenes/";
+  const ProgramResult bad = runProgram({"stability", scenes + "gallbladder.xml", "-o", folder / "a", "--steps", "0,1"});
+  EXPECT_EQ(bad.exitCode, 2);
+  const ProgramResult free = runProgram({"stability", scenes + "heap.xml", "-o", folder / "b"});
+  EXPECT_EQ(free.exitCode, 1);
+  EXPECT_EQ(free.err, "medulla: body 'bean_0' is not held anywhere: expected a body with <fix>\n");
+  EXPECT_FALSE(std::filesystem::exists(folder / "b"));
+}
+
+}  // namespace
+}  // namespace medulla
