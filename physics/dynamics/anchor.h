@@ -10,6 +10,7 @@ struct Anchor {
   Lanes3 base, baseVelocity;  // m, m/s: the point of the skeleton
   Lanes3 omega;               // rad/s of the frame that carries the offset
   Lanes3 offset;              // m, from the base to where the node belongs
+  Lanes3 normal;              // of the surface at rest, carried along
 };
 
 inline Lanes3 positionOf(const Anchor& a) {
@@ -56,9 +57,12 @@ inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   } else {
     smallCosineSine(angle, c, s);
   }
+  Anchor a;
+  a.normal = fma(
+      g.restNormal.x, h.n,
+      fma(fnma(g.restNormal.z, s, g.restNormal.y * c), h.axisU, fma(g.restNormal.y, s, g.restNormal.z * c) * h.axisV));
   c = c * h.thickness;
   s = s * h.thickness;
-  Anchor a;
   a.base = fma(g.along, h.line, h.origin);
   a.omega = fma(fma(g.twistShare, h.spinAlong, h.spin0), h.n, h.turning);
   a.offset =
@@ -79,7 +83,8 @@ inline SphereHost sphereHost(const WorldData& d, int i) {
 }
 
 inline Anchor anchorOnSphere(const SphereHost& h, const NodeGroup& g) {
-  return {h.position, h.velocity, h.angularVelocity, rotate(h.rotation, g.restOffset)};
+  return {h.position, h.velocity, h.angularVelocity, rotate(h.rotation, g.restOffset),
+          rotate(h.rotation, g.restNormal)};
 }
 
 }  // namespace medulla

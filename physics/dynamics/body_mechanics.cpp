@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "physics/model/attachment.h"
+#include "physics/model/mesh_topology.h"
 
 namespace medulla {
 
@@ -23,6 +24,10 @@ using Eigen::Vector3d;
 // against finite elements on organs about 12 mm deep gave E / 12 mm per area. The column is never taken shorter than it
 // is wide: a load on a small disc reaches about as deep as the disc is wide, whatever lies below.
 constexpr double kFoundationFactor = 1;
+
+// Volume pressure: the bulk modulus E / 3 (1 - 2 nu), of Young's modulus not more than this. More keeps the volume no
+// better than to a percent, and its one mode, all nodes in and out, would alone bound the step.
+constexpr double kLargestBulk = 1;
 
 // Edge springs: Van Gelder (1998), k = E t sum(triangle areas) / length^2, with the layer's effective thickness t a
 // fixed share of the mean attachment depth. The same fits gave 0.17 mm E at a depth of 12 mm; Van Gelder's sum is 0.87
@@ -253,11 +258,17 @@ std::vector<Attachment> attachmentsToSpans(const SoftBodyModel& m, const std::ve
 void setSurfaceStiffness(const BodyDescription& body, BodyMechanics& out) {
   const SoftBodyModel& m = *body.model;
   double depthSum = 0;
-  for (const Attachment& a : m.attachments) {
-    const double depth = attachmentDepth(a);
+  const TriangleMesh mesh{m.restNodes, m.triangles};
+  out.normal = vertexNormals(mesh);
+  for (std::size_t i = 0; i < m.attachments.size(); ++i) {
+    const Attachment& a = m.attachments[i];
+    const double depth = attachmentDepth(a, out.normal[i], m.spheres);
     out.attachmentStiffness.push_back(depth > 0 ? kFoundationFactor * body.tissue.young * a.area / depth : 0);
     depthSum += depth;
   }
+  const double compression = 1 / (3 * (1 - 2 * body.tissue.poisson));
+  const double volume = enclosedVolume(mesh), bulk = std::min(compression, kLargestBulk) * body.tissue.young;
+  out.bulk = volume > 0 ? bulk / volume : 0;
   const double thickness =
       kLayerThicknessOverDepth * depthSum / static_cast<double>(std::max<std::size_t>(1, m.restNodes.size()));
   out.edgeStiffness.assign(m.edges.size(), 0);

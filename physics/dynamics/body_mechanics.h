@@ -36,7 +36,9 @@ struct BodyMechanics {
   std::vector<LinkStiffness> links;
   std::vector<Attachment> attachments;      // to the spans of links, with restOffset made exactly perpendicular to them
   std::vector<double> twistShare;           // per node on a link: of its torsion, what lies between end0 and the node
+  std::vector<Eigen::Vector3d> normal;      // unit, per node
   std::vector<double> attachmentStiffness;  // N/m per node; of the full surface
+  double bulk = 0;                          // N/m5: pressure per volume between nodes and anchors
   std::vector<double> edgeStiffness;        // N/m per edge; of the full surface
   std::vector<double> nodeMass;             // kg; 0 on skin
   std::vector<bool> nodeMoves;              // per node: not fixed

@@ -55,6 +55,7 @@ struct ImplicitData {
   double workOfPaths = 0;    // J, that led spheres give in this stage
   Motion motion, residual, change, direction, image, preconditioned;
   std::vector<Quad> carried, given;  // per node: the operator's velocities of anchors, impulses
+  std::vector<double> swollen;       // per body: volume that the nodes in `carried` enclose
   std::vector<Vector6> blocks;
   long solves = 0, iterations = 0;  // linear systems, and conjugate gradients in all
 };

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -26,8 +27,32 @@ void putBlock(const Vector6& b, Motion& m, std::size_t sphere) {
   m[2 * sphere + 1] = {{b[3], b[4], b[5], 0}};
 }
 
-// given = G (x - carried): impulses of attachments and edges on the nodes. `x` holds a velocity per node, or is null:
-// 0.
+// Adds the bodies' pressures, each a row of rank one, to the impulses `given` of what stands in `carried`. The factor
+// of M + G does without them: conjugate gradients take one iteration more for each.
+void applyPressure(const WorldData& d, ImplicitData& s) {
+  const auto forGroups = [&](const auto& visit) {
+    for (const std::vector<HostRange>* ranges : {&d.nodes.onLinks, &d.nodes.onSpheres})
+      for (const HostRange& range : *ranges)
+        for (int g = range.firstGroup; g < range.endGroup; ++g) visit(g, range.body);
+  };
+  std::fill(s.swollen.begin(), s.swollen.end(), 0.0);
+  forGroups([&](int g, int body) {
+    const Quad* q = &s.carried[4 * g];
+    s.swollen[body] += sumOfLanes(d.nodes.groups[g].area * dot(d.nodes.normal[g], gather(q[0], q[1], q[2], q[3])));
+  });
+  const double h2 = s.duration * s.duration;
+  forGroups([&](int g, int body) {
+    const Lanes push = splat(h2 * d.ranges[body].bulk * s.swollen[body]) * d.nodes.groups[g].area;
+    const Lanes3 impulse = push * d.nodes.normal[g];
+    for (int k = 0; k < 4; ++k) {
+      Quad& to = s.given[4 * g + k];
+      store(to, load(to) + Lanes{impulse.x[k], impulse.y[k], impulse.z[k], 0});
+    }
+  });
+}
+
+// given = G (x - carried): impulses of attachments, edges and pressure on the nodes. `x` holds a velocity per node, or
+// is null: 0.
 void applySurface(const WorldData& d, ImplicitData& s, const Quad* x) {
   std::vector<Quad>& displaced = s.carried;
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
@@ -45,6 +70,7 @@ void applySurface(const WorldData& d, ImplicitData& s, const Quad* x) {
       store(s.given[i], load(s.given[i]) - pull);
     }
   }
+  applyPressure(d, s);
 }
 
 void negate(std::vector<Quad>& q) {

@@ -104,7 +104,7 @@ void appendNodes(NodeOrder& order, Nodes& nodes, const BodyMechanics& mechanics,
                    [&](int i, int j) { return mechanics.attachments[i].host < mechanics.attachments[j].host; });
   for (std::size_t k = 0; k < sorted.size();) {
     const int host = mechanics.attachments[sorted[k]].host;
-    HostRange range{firstHost + host, static_cast<int>(order.node.size()) / 4, 0, mechanics.surfaceRelaxation};
+    HostRange range{firstHost + host, static_cast<int>(order.node.size()) / 4, 0, mechanics.surfaceRelaxation, b};
     for (; k < sorted.size() && mechanics.attachments[sorted[k]].host == host; ++k) {
       order.body.push_back(b);
       order.node.push_back(sorted[k]);
@@ -146,6 +146,7 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   n.force.resize(n.count);
   n.displaced.resize(n.count);
   n.offset.resize(n.count / 4);
+  n.normal.resize(n.count / 4);
   n.mass.resize(n.count, 0);
   n.inverseMass.resize(n.count, 0);
   n.groups.resize(n.count / 4, NodeGroup{});
@@ -160,8 +161,11 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
     n.inverseMass[i] = n.mass[i] > 0 && mechanics[b].nodeMoves[k] ? 1 / n.mass[i] : 0;
     NodeGroup& g = n.groups[i / 4];
     g.stiffness[lane] = mechanics[b].attachmentStiffness[k];
+    g.area[lane] = a.area;
+    const Vector3d& normal = mechanics[b].normal[k];
     if (!a.onLink) {
       setLane(g.restOffset, lane, a.restOffset);
+      setLane(g.restNormal, lane, normal);
       continue;
     }
     const int link = d.ranges[b].firstLink + a.host, l = link % 4;
@@ -169,6 +173,7 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
     g.along[lane] = a.along;
     g.twistShare[lane] = mechanics[b].twistShare[k];
     setLane(g.restOffset, lane, {0, a.restOffset.dot(u), a.restOffset.dot(t.cross(u))});
+    setLane(g.restNormal, lane, {normal.dot(t), normal.dot(u), normal.dot(t.cross(u))});
   }
 }
 
@@ -254,6 +259,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.linkCount = static_cast<int>(m.links.size());
     r.node.resize(m.restNodes.size());
     r.restVolume = enclosedVolume(m);
+    r.bulk = mechanics[b].bulk;
     r.massDamping = mechanics[b].massDamping;
     r.held = !d.bodies[b].fixed.empty() || !d.bodies[b].fixedNodes.empty();
     d.ranges.push_back(r);

@@ -79,10 +79,14 @@ class RestModel {
     }
     if (nodes_ == 0) return y;
     std::vector<Vector3d> displaced(nodes_), force(nodes_);
+    double swollen = 0;
     for (int i = 0; i < nodes_; ++i) {
       displaced[i] = x.segment<3>(node(i)) - anchorRate(i, x);
       force[i] = mechanics_.attachmentStiffness[i] * displaced[i];
+      swollen += mechanics_.attachments[i].area * mechanics_.normal[i].dot(displaced[i]);
     }
+    for (int i = 0; i < nodes_; ++i)
+      force[i] += mechanics_.bulk * swollen * mechanics_.attachments[i].area * mechanics_.normal[i];
     for (std::size_t e = 0; e < model_.edges.size(); ++e) {
       const auto& [a, b] = model_.edges[e];
       const Vector3d f = mechanics_.edgeStiffness[e] * (displaced[b] - displaced[a]);
@@ -334,7 +338,12 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
   // An implicit step has no limit to keep.
   if (integrator == Integrator::implicit) mechanics.surfaceRelaxation = asked;
   mechanics.linkRelaxation = integrator == Integrator::implicit ? asked : std::min(asked, std::max(0.0, bound));
-  mechanics.massDamping = (asked - mechanics.linkRelaxation) * lowest * lowest;
+  // It acts on the spheres for all that hangs on them, too.
+  double onSpheres = 0;
+  for (const double mass : mechanics.sphereMass) onSpheres += mass;
+  double whole = onSpheres;
+  for (const double mass : mechanics.nodeMass) whole += mass;
+  mechanics.massDamping = (asked - mechanics.linkRelaxation) * lowest * lowest * whole / onSpheres;
   // Both matrices are sums of the links' and the surface's, and the modes that are stiffest are not those damped most:
   // the step is searched for where the largest eigenvalue of h^2 K + 2 h C itself reaches 4.
   const double linkBeta = mechanics.linkRelaxation, surfaceBeta = mechanics.surfaceRelaxation;

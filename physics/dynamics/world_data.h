@@ -96,13 +96,16 @@ struct NodeGroup {    // constants of four nodes
   Lanes along;        // 0..1 on a link
   Lanes twistShare;   // 0..1 of the link's twist
   Lanes3 restOffset;  // m; on a link (0, component on U, component on V), on a sphere in its frame
+  Lanes3 restNormal;  // unit, in the offset's frame (on a link: along it, on U, on V); 0 on pads
   Lanes stiffness;    // N/m of the attachment; 0 on pads
+  Lanes area;         // m2; 0 on pads
 };
 
 struct HostRange {
   int host;                  // link or sphere
   int firstGroup, endGroup;  // of its nodes
   double relaxation;         // s, the attachments' damping over stiffness
+  int body;
 };
 
 struct GroupHost {
@@ -115,6 +118,7 @@ struct Nodes {
   std::vector<Quad> position, velocity;   // m, m/s
   std::vector<Quad> force;                // N, of the current substep, weight apart; dynamic nodes only
   std::vector<Lanes3> offset;             // m, per group: from the anchors' bases to them; of the current substep
+  std::vector<Lanes3> normal;             // of the surface at rest, carried along, per group; of the current substep
   std::vector<Quad> displaced;            // m, from where the host would carry the node; of the current substep
   std::vector<double> mass, inverseMass;  // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
   std::vector<NodeGroup> groups;
@@ -143,6 +147,8 @@ struct BodyRange {
   int firstLink = 0, linkCount = 0;
   std::vector<int> node;   // index in Nodes of every model node
   double restVolume = 0;   // m3, enclosed by the rest nodes
+  double bulk = 0;         // N/m5, pressure per volume between anchors and dynamic nodes
+  double swollen = 0;      // m3, that volume; of the current substep
   double massDamping = 0;  // 1/s, Rayleigh's alpha
   bool held = false;       // some sphere is fixed: deformation is motion against it rather than against a rigid motion
 };

@@ -95,8 +95,10 @@ Vector3d restAnchor(const Attachment& a, const std::vector<FillingSphere>& spher
   return (1 - a.along) * spheres[link.sphere0].restLinkEnd + a.along * spheres[link.sphere1].restLinkEnd;
 }
 
-double attachmentDepth(const Attachment& a) {
-  return std::max(a.restOffset.norm(), std::sqrt(a.area));
+double attachmentDepth(const Attachment& a, const Vector3d& normal, const std::vector<FillingSphere>& spheres) {
+  Vector3d offset = a.restOffset;
+  if (!a.onLink) offset += spheres[a.host].restFrame - spheres[a.host].restLinkEnd;
+  return std::max(std::abs(offset.dot(normal)), std::sqrt(a.area));
 }
 
 HostShares hostShares(const Attachment& a, const std::vector<ElasticLink>& links) {

@@ -30,9 +30,11 @@ struct HostShares {
 };
 HostShares hostShares(const Attachment& attachment, const std::vector<ElasticLink>& links);
 
-// m, how deep the tissue between a node and what it hangs on is taken to be: its stiffness per area goes by the
-// inverse.
-double attachmentDepth(const Attachment& attachment);
+// m, how deep the tissue between a node and the skeleton is taken to be: its stiffness per area goes by the inverse.
+// Measured along the surface's unit normal, from the link's end where a chain ends: what lies between a sphere and the
+// end of its chain is the link's to stretch. Never less than the node's share of the surface is wide.
+double attachmentDepth(const Attachment& attachment, const Eigen::Vector3d& normal,
+                       const std::vector<FillingSphere>& spheres);
 
 // Nodes whose segment to the skeleton crosses the surface.
 int countCrossings(const TriangleMesh& mesh, const SurfaceTree& tree, const std::vector<Attachment>& attachments,

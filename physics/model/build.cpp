@@ -126,7 +126,7 @@ void hangNodesAndShareMass(const BodyShape& shape, const SpheresAndLinks& s, dou
     } else {
       reprojectAttachments(shape.mesh, model.spheres, model.links, model.attachments);
     }
-    shareOutMass(model.restNodes, s.cells, massFraction, model.attachments, model.spheres);
+    shareOutMass(shape.mesh, s.cells, massFraction, model.attachments, model.spheres);
     placeLinkEnds(shape.mesh, shape.tree, s.cells.sites, model.links, model.spheres);
   }
   reprojectAttachments(shape.mesh, model.spheres, model.links, model.attachments);

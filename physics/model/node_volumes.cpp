@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "physics/model/attachment.h"
+#include "physics/model/mesh_topology.h"
 
 namespace medulla {
 
@@ -20,10 +21,16 @@ struct CellNodes {  // of one cell
   double volumePerStiffness = 0;  // m2, what the cell can give at most
 };
 
-// Of the attachment of a node, over Young's modulus.
-double stiffnessOf(const Attachment& a) {
-  const double depth = attachmentDepth(a);
-  return depth > 0 ? a.area / depth : 0;
+// Of the nodes' attachments, over Young's modulus.
+std::vector<double> stiffnesses(const std::vector<Attachment>& attachments, const std::vector<Vector3d>& normals,
+                                const std::vector<FillingSphere>& spheres) {
+  std::vector<double> out;
+  out.reserve(attachments.size());
+  for (std::size_t n = 0; n < attachments.size(); ++n) {
+    const double depth = attachmentDepth(attachments[n], normals[n], spheres);
+    out.push_back(depth > 0 ? attachments[n].area / depth : 0);
+  }
+  return out;
 }
 
 int cellOf(const PowerCells& cells, const Vector3d& x) {
@@ -46,10 +53,10 @@ struct Moments {
 };
 
 Moments momentsOf(const CellNodes& cell, const Vector3d& centroid, const std::vector<Vector3d>& nodes,
-                  const std::vector<Attachment>& attachments) {
+                  const std::vector<double>& stiffness) {
   Moments m;
   for (const int n : cell.nodes) {
-    const double k = stiffnessOf(attachments[n]);
+    const double k = stiffness[n];
     const Vector3d r = nodes[n] - centroid;
     m.volume += k;
     m.first += k * r;
@@ -76,14 +83,14 @@ double mostVolumePerStiffness(const MassProperties& cell, const Moments& taken) 
 }
 
 std::vector<CellNodes> nodesOfCells(const std::vector<Vector3d>& nodes, const PowerCells& cells,
-                                    std::vector<Attachment>& attachments) {
+                                    const std::vector<double>& stiffness, std::vector<Attachment>& attachments) {
   std::vector<CellNodes> out(cells.cells.size());
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     attachments[n].massSphere = cellOf(cells, nodes[n]);
     out[attachments[n].massSphere].nodes.push_back(static_cast<int>(n));
   }
   for (std::size_t i = 0; i < out.size(); ++i) {
-    const Moments m = momentsOf(out[i], cells.cells[i].centroid, nodes, attachments);
+    const Moments m = momentsOf(out[i], cells.cells[i].centroid, nodes, stiffness);
     out[i].stiffness = m.volume;
     out[i].volumePerStiffness = mostVolumePerStiffness(cells.cells[i], m);
   }
@@ -122,9 +129,11 @@ std::vector<MassProperties> withoutNodes(std::vector<MassProperties> about, cons
 
 }  // namespace
 
-void shareOutMass(const std::vector<Vector3d>& nodes, const PowerCells& cells, double fraction,
+void shareOutMass(const TriangleMesh& mesh, const PowerCells& cells, double fraction,
                   std::vector<Attachment>& attachments, std::vector<FillingSphere>& spheres) {
-  const std::vector<CellNodes> groups = nodesOfCells(nodes, cells, attachments);
+  const std::vector<Vector3d>& nodes = mesh.vertices;
+  const std::vector<double> stiffness = stiffnesses(attachments, vertexNormals(mesh), spheres);
+  const std::vector<CellNodes> groups = nodesOfCells(nodes, cells, stiffness, attachments);
   double volume = 0;
   for (const MassProperties& cell : cells.cells) volume += cell.volume;
   const double common = commonVolumePerStiffness(groups, fraction * volume);
@@ -134,7 +143,7 @@ void shareOutMass(const std::vector<Vector3d>& nodes, const PowerCells& cells, d
     Vector3d first = Vector3d::Zero();
     double taken = 0;
     for (const int n : groups[i].nodes) {
-      attachments[n].volume = c * stiffnessOf(attachments[n]);
+      attachments[n].volume = c * stiffness[n];
       taken += attachments[n].volume;
       first += attachments[n].volume * (nodes[n] - cell.centroid);
     }

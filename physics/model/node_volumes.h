@@ -5,6 +5,7 @@
 #include "physics/model/mass_properties.h"
 #include "physics/model/power_cells.h"
 #include "physics/model/soft_body_model.h"
+#include "physics/model/triangle_mesh.h"
 
 namespace medulla {
 
@@ -23,7 +24,7 @@ namespace medulla {
 // The nodes carry `fraction` (0..0.4) of the body in all, each by the stiffness of its attachment (area over depth), so
 // that all swing alike and none alone bounds the step of the dynamics. A cell gives at most half of its volume and 70 %
 // of its second moment in any direction: what remains stays positive definite; the sum may fall short of `fraction`.
-void shareOutMass(const std::vector<Eigen::Vector3d>& nodes, const PowerCells& cells, double fraction,
+void shareOutMass(const TriangleMesh& mesh, const PowerCells& cells, double fraction,
                   std::vector<Attachment>& attachments, std::vector<FillingSphere>& spheres);
 
 // What remains of every sphere for the dynamics, by the two formulas above.

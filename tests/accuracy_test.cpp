@@ -1,0 +1,160 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "app/files/mesh_file.h"
+#include "physics/dynamics/fixation.h"
+#include "physics/dynamics/world.h"
+#include "physics/model/build.h"
+#include "tests/accuracy_reference.h"
+#include "tests/test_shapes.h"
+
+// What the program makes of the load cases that finite elements solved (tests/accuracy): nothing is fitted but what
+// physics/README.md says. Limits are the errors reached, a little above; tests/accuracy/README.md lists them.
+namespace medulla {
+namespace {
+
+using namespace reference;
+
+// Made once per body and number of spheres.
+std::shared_ptr<const SoftBodyModel> modelOf(const Result& result, int spheres) {
+  static std::map<std::pair<std::string, int>, std::shared_ptr<const SoftBodyModel>> made;
+  std::shared_ptr<const SoftBodyModel>& model = made[{result.text("mesh"), spheres}];
+  if (model) return model;
+  BuildSettings settings;
+  settings.spheres = spheres;
+  settings.renderLevels = 0;
+  BuildReport report;
+  const TriangleMesh mesh = readMesh(std::string(MEDULLA_SOURCE_DIR "/") + result.text("mesh"));
+  model = std::make_shared<SoftBodyModel>(buildModel(asRepaired(mesh), nullptr, settings, report));
+  return model;
+}
+
+// The reference's body under `share` of its load from `from` to `to` (s) and for good, held as it says.
+BodyDescription bodyOf(const Result& result, std::shared_ptr<const SoftBodyModel> model, double from, double to) {
+  BodyDescription body;
+  body.name = result.text("case");
+  body.model = std::move(model);
+  body.tissue.young = result.number("young");
+  body.tissue.poisson = result.number("poisson");
+  body.tissue.density = result.number("density");
+  for (const int vertex : readFix(result)) body.fixedNodes.push_back(body.model->nodeOfInputVertex[vertex]);
+  for (const int sphere : spheresHeldBy(*body.model, body.fixedNodes)) body.fixed.push_back({sphere});
+  for (const auto& [vertex, force] : readLoad(result)) {
+    body.deadLoads.push_back({body.model->nodeOfInputVertex[vertex], force, from, to});
+  }
+  return body;
+}
+
+World worldOf(const BodyDescription& body) {
+  WorldSettings settings;
+  settings.gravity.setZero();
+  return World(settings, {body});
+}
+
+struct Error {
+  double max = 0, rms = 0;  // % of the largest displacement
+  double volume = 0;        // %, of the volume ratios
+};
+
+Error errorAtRest(const Result& result, int spheres) {
+  constexpr double seconds = 6;
+  BodyDescription body = bodyOf(result, modelOf(result, spheres), 0, 0.3 * seconds);
+  body.tissue.damping = 1;
+  World world = worldOf(body);
+  while (world.time() < seconds) world.advance({});
+  DynamicsFrame frame;
+  world.readFrame(frame);
+  const std::vector<Vector3d> expected = result.vectors(result.number("unit"));
+  double largest = 0, worst = 0, sum = 0;
+  for (std::size_t v = 0; v < expected.size(); ++v) {
+    const int node = body.model->nodeOfInputVertex[v];
+    const Vector3d moved = frame.bodies[0].nodes[node] - body.model->restNodes[node];
+    largest = std::max(largest, expected[v].norm());
+    worst = std::max(worst, (moved - expected[v]).norm());
+    sum += (moved - expected[v]).squaredNorm();
+  }
+  return {100 * worst / largest, 100 * std::sqrt(sum / static_cast<double>(expected.size())) / largest,
+          100 * (world.volumeRatio(0) - result.number("volume_ratio"))};
+}
+
+struct StaticCase {
+  const char* name;
+  int spheres;
+  double max, rms, volume;  // %
+};
+
+void PrintTo(const StaticCase& c, std::ostream* out) {
+  *out << c.name;
+}
+
+class StaticAccuracy : public testing::TestWithParam<StaticCase> {};
+
+TEST_P(StaticAccuracy, SurfaceLiesWhereFiniteElementsPutIt) {
+  const StaticCase& limit = GetParam();
+  const Error error = errorAtRest(readResult(limit.name), limit.spheres);
+  EXPECT_LE(error.max, limit.max);
+  EXPECT_LE(error.rms, limit.rms);
+  EXPECT_LE(std::abs(error.volume), limit.volume);
+  RecordProperty("max", std::to_string(error.max));
+  RecordProperty("rms", std::to_string(error.rms));
+  RecordProperty("volume", std::to_string(error.volume));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, StaticAccuracy,
+    testing::Values(
+        StaticCase{"cylinder_tip", 7, 2.4, 0.9, 0.1}, StaticCase{"cylinder_tip_large", 7, 2.4, 1, 0.2},
+        StaticCase{"cylinder_mid", 7, 3.3, 1.2, 0.1}, StaticCase{"cylinder_axial", 7, 4.4, 1.2, 0.5},
+        StaticCase{"cylinder_torsion", 7, 1.4, 0.5, 0.1}, StaticCase{"cylinder_poke_small", 7, 31.1, 6.1, 0.3},
+        StaticCase{"cylinder_poke_large", 7, 35.2, 12.1, 0.7}, StaticCase{"gallbladder_tip", 7, 5.1, 2.7, 0.1},
+        StaticCase{"gallbladder_tip_large", 7, 4.7, 2.5, 0.1}, StaticCase{"gallbladder_mid", 7, 5.2, 2.8, 0.1},
+        StaticCase{"gallbladder_axial", 7, 9.4, 4.1, 0.8}, StaticCase{"gallbladder_torsion", 7, 12.1, 4.1, 0.1},
+        StaticCase{"gallbladder_poke_small", 7, 37.2, 12, 0.3},
+        StaticCase{"gallbladder_poke_large", 7, 41.2, 23.3, 0.8}, StaticCase{"liver_tip", 35, 20.2, 7, 0.1},
+        StaticCase{"liver_tip_in_plane", 35, 21.4, 10.2, 0.3}, StaticCase{"liver_mid", 35, 36.4, 11, 0.4},
+        StaticCase{"liver_axial", 35, 35.1, 18.2, 1.6}),
+    [](const auto& tested) { return tested.param.name; });
+
+// The loaded vertices' mean displacement along the load swings about where it ends: its extremes give the first mode's
+// frequency and damping ratio.
+TEST(DynamicAccuracy, TheCylinderSwingsAndDecaysAsInFiniteElements) {
+  const Result result = readResult("cylinder_step");
+  const double expected = result.number("frequencies");
+  BodyDescription body = bodyOf(result, modelOf(result, 7), 0, 0);
+  body.tissue.damping = 0.05;
+  World world = worldOf(body);
+  const Vector3d along = result.vector("force").normalized();
+  std::vector<double> place;
+  DynamicsFrame frame;
+  while (world.time() < 12 / expected) {
+    world.advance({});
+    world.readFrame(frame);
+    double sum = 0;
+    for (const DeadLoad& load : body.deadLoads) {
+      sum += (frame.bodies[0].nodes[load.node] - body.model->restNodes[load.node]).dot(along);
+    }
+    place.push_back(sum / static_cast<double>(body.deadLoads.size()));
+  }
+  // Turning points, each by the parabola through three frames; the first two hold higher modes.
+  std::vector<double> time, value;
+  for (std::size_t i = 1; i + 1 < place.size(); ++i) {
+    const double before = place[i] - place[i - 1], after = place[i + 1] - place[i];
+    if (before * after > 0) continue;
+    const double shift = 0.5 * (before + after) / (before - after);
+    time.push_back(static_cast<double>(i) + shift);
+    value.push_back(place[i] + 0.25 * (before + after) * shift);
+  }
+  ASSERT_GE(value.size(), 9u);
+  const double halfPeriod = (time[8] - time[2]) / 6 * 0.02;
+  const double decay = std::log((value[2] - value[3]) / (value[6] - value[7])) / 4;
+  const double zeta = decay / std::hypot(decay, std::numbers::pi);
+  const double frequency = 0.5 / halfPeriod / std::sqrt(1 - zeta * zeta);
+  EXPECT_NEAR(frequency / expected, 1, 0.005);
+  EXPECT_NEAR(zeta / 0.05, 1, 0.05);
+}
+
+}  // namespace
+}  // namespace medulla
