@@ -4,10 +4,9 @@
 
 #include <Eigen/Dense>
 
-#include "physics/dynamics/node_factor.h"
 #include "tests/dynamics_states.h"
 
-// The two factorisations of the implicit step against dense ones.
+// The factorisation of the implicit step against a dense one.
 namespace medulla {
 
 using states::Random;
@@ -66,32 +65,6 @@ TEST(BlockCholesky, SaysWhereAMatrixIsNotDefinite) {
   factor.diagonal(0) = factor.diagonal(1) = Block6::Identity();
   factor.addBlock(0, 2 * Block6::Identity());
   EXPECT_FALSE(factor.factorise());
-}
-
-TEST(NodeFactor, SolvesWhatADenseFactorSolvesInEachDirection) {
-  constexpr int count = 12;
-  Random random(4);
-  std::vector<double> diagonal(count);
-  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(count, count);
-  for (int i = 0; i < count; ++i) dense(i, i) = diagonal[i] = 1.5 + random.uniform();
-  std::vector<NodeFactor::Edge> edges;
-  for (int i = 0; i < count; ++i)
-    for (const int j : {(i + 1) % count, (5 * i + 2) % count}) {
-      if (i == j) continue;
-      const double w = 2 + random.uniform();
-      edges.push_back({i, j, w});
-      dense(i, i) += w;
-      dense(j, j) += w;
-      dense(i, j) -= w;
-      dense(j, i) -= w;
-    }
-  NodeFactor factor;
-  factor.factorise(diagonal, edges);
-  const Eigen::MatrixXd right = randomMatrix(random, count, 3), expected = dense.ldlt().solve(right);
-  std::vector<Quad> x(count);
-  for (int i = 0; i < count; ++i) x[i] = quadOf(right.row(i).transpose());
-  factor.solve(x.data());
-  for (int i = 0; i < count; ++i) EXPECT_LT((vectorOf(x[i]) - expected.row(i).transpose()).norm(), 1e-13);
 }
 
 }  // namespace medulla

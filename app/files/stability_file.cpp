@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "app/files/output_file.h"
 
@@ -33,13 +34,33 @@ std::string block(const std::string& name, const std::vector<StabilityPoint>& po
   return out + "EOD\n";
 }
 
+// Okabe and Ito (2008): told apart by all kinds of eyes.
+struct Grade {
+  const char *style, *meaning;
+};
+constexpr Grade kGrades[] = {{"points pt 5 lc '#009e73'", "back at rest within 1 %"},
+                             {"points pt 5 lc '#e69f00'", "survived"},
+                             {"points pt 2 lw 2 lc '#d55e00'", "failed"}};
+
 std::string plotOf(const std::string& name, double size) {
-  // Okabe and Ito (2008): told apart by all kinds of eyes.
-  return fmt::format(
-      "  ${0}0 using 1:2 with points pt 5 ps {1} lc '#009e73' title 'back at rest within 1 %', \\\n"
-      "  ${0}1 using 1:2 with points pt 5 ps {1} lc '#e69f00' title 'survived', \\\n"
-      "  ${0}2 using 1:2 with points pt 2 ps {1} lw 2 lc '#d55e00' title 'failed'",
-      name, size);
+  std::string out;
+  for (std::size_t k = 0; k < std::size(kGrades); ++k)
+    out += fmt::format("{}${}{} using 1:2 with {} ps {} notitle", k == 0 ? "" : ", \\\n  ", name, k, kGrades[k].style,
+                       size);
+  return out;
+}
+
+// By hand: a key of gnuplot's has room in one panel only.
+std::string keyLabels() {
+  std::string out;
+  double x = 0.2;
+  for (const Grade& g : kGrades) {
+    std::string style = g.style;
+    style.erase(0, std::string("points ").size());
+    out += fmt::format("set label '{}' at screen {:.2f}, 0.012 left point {} ps 1.1 offset 1,0\n", g.meaning, x, style);
+    x += 0.22;
+  }
+  return out + "set label 'dashed: explicit limit' at screen 0.72, 0.012 left\n";
 }
 
 std::string spaced(std::string name) {
@@ -78,33 +99,36 @@ std::string stabilityScript(const std::string& title, const std::vector<Stabilit
                    [](const StabilityPoint& p) { return p.young; });
       out += block(fmt::format("trial{}_{}", m, grade), torture, methods[m], grade, rowOf);
     }
-  const auto [low, high] = std::minmax_element(
-      map.begin(), map.end(), [](const StabilityPoint& a, const StabilityPoint& b) { return a.step < b.step; });
-  out +=
-      fmt::format("set xrange [{:.6g}:{:.6g}]\nset multiplot title '{}'\n", 500 * low->step, 2000 * high->step, title);
-  const double width = 0.86 / static_cast<double>(methods.size());
+  double low = map[0].step, high = low;
+  for (const auto* points : {&map, &torture})
+    for (const StabilityPoint& p : *points) {
+      low = std::min(low, p.step);
+      high = std::max(high, p.step);
+    }
+  out += fmt::format("set xrange [{:.6g}:{:.6g}]\nset multiplot title '{}'\n", 500 * low, 2000 * high, title);
+  const double width = 0.84 / static_cast<double>(methods.size());
   for (std::size_t m = 0; m < methods.size(); ++m) {
-    const double left = 0.13 + width * static_cast<double>(m);
+    const double left = 0.15 + width * static_cast<double>(m);
     const char* y =
-        m == 0 ? "set ylabel \"Young's modulus, Pa\"\nset format y '10^%T'\n" : "unset ylabel\nset format y ''\n";
+        m == 0 ? "set ylabel \"Young's modulus, Pa\"\nset format y '1e%T'\n" : "unset ylabel\nset format y ''\n";
     out += fmt::format(
         "set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen 0.92\nset bmargin at screen "
         "0.57\nset logscale y\nset autoscale y\nset ytics auto\nset title '{}'\n{}",
         left, left + 0.9 * width, spaced(methods[m]), y);
-    out += fmt::format("plot $limit using 1:2 with lines lw 2 dt 2 lc '#555555' title 'explicit limit', \\\n{}\n",
+    out += fmt::format("plot $limit using 1:2 with lines lw 2 dt 2 lc '#555555' notitle, \\\n  {}\n",
                        plotOf(fmt::format("map{}_", m), 1.1));
   }
   for (std::size_t m = 0; m < methods.size(); ++m) {
-    const double left = 0.13 + width * static_cast<double>(m);
+    const double left = 0.15 + width * static_cast<double>(m);
     out += fmt::format(
         "set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen 0.48\nset bmargin at screen "
-        "0.09\nunset logscale y\nset yrange [{}:-0.5]\nunset ylabel\nset format y '%g'\nunset title\n",
+        "0.1\nunset logscale y\nset yrange [{}:-0.5]\nunset ylabel\nset format y '%g'\nunset title\n",
         left, left + 0.9 * width, static_cast<double>(trials.size()) - 0.5);
     out += "set ytics (";
     for (std::size_t k = 0; k < trials.size(); ++k)
       out += fmt::format("{}'{}' {}", k == 0 ? "" : ", ", m == 0 ? spaced(trials[k]) : "", k);
     out += ")\n";
-    if (m + 1 == methods.size()) out += "set key at screen 0.98, screen 0.025 horizontal samplen 1\n";
+    if (m + 1 == methods.size()) out += keyLabels();
     out += fmt::format("plot {}\n", plotOf(fmt::format("trial{}_", m), 0.9));
   }
   return out + "unset multiplot\n";

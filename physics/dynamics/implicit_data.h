@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "physics/dynamics/block_cholesky.h"
-#include "physics/dynamics/node_factor.h"
 #include "physics/dynamics/world_data.h"
 
 // What an implicit step works on, laid out once. A motion has one velocity for every freedom: two quads per sphere,
@@ -40,7 +39,7 @@ struct ImplicitData {
   std::vector<Quad> freedom;              // as Motion: 1, or 0 where a freedom is held or led
   std::vector<Eigen::Matrix3d> inertia;   // kg m2, per sphere, in its frame
   std::vector<double> pull, carriedMass;  // kg, per node: the attachments' share; what a host feels of node and spring
-  NodeFactor nodes;                       // masses, attachments and edges of all dynamic nodes
+  std::vector<double> nodeMobility;       // 1/kg, per node: of itself, its attachment and its edges; 0: held
   // Of the present iteration.
   std::vector<Block6> diagonal, beside;      // spheres and links alone, per sphere and per link
   std::vector<Block6> lumped, lumpedBeside;  // and with surface and loads lumped into them
@@ -53,6 +52,7 @@ struct ImplicitData {
   StageStart before, start;  // of the step, of its present stage
   double totalMass = 0;      // kg
   double workOfPaths = 0;    // J, that led spheres give in this stage
+  Motion balance, kept;      // the residual without loads; the motion while a derivative is taken
   Motion motion, residual, change, direction, image, preconditioned;
   std::vector<Quad> carried, given;  // per node: the operator's velocities of anchors, impulses
   std::vector<double> swollen;       // per body: volume that the nodes in `carried` enclose

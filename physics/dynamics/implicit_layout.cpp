@@ -20,28 +20,17 @@ void layOutNodes(const WorldData& d, ImplicitData& s) {
   };
   pullOf(n.onLinks);
   pullOf(n.onSpheres);
-  std::vector<double> diagonal;
   for (int i = 0; i < n.dynamicEnd; ++i) {
     const double m = n.mass[i];
     const bool free = n.inverseMass[i] > 0;
     s.carriedMass.push_back(free ? s.pull[i] * m / (m + s.pull[i]) : s.pull[i]);
-    diagonal.push_back(free ? m + s.pull[i] : 1);
+    s.nodeMobility.push_back(free ? m + s.pull[i] : 0);
   }
-  std::vector<NodeFactor::Edge> edges;
-  for (const SpringGroup& g : d.springs.groups) {
-    for (int k = 0; k < 4; ++k) {
-      const int i = static_cast<int>(g.node0[k] / sizeof(Quad)), j = static_cast<int>(g.node1[k] / sizeof(Quad));
-      const bool freeI = n.inverseMass[i] > 0, freeJ = n.inverseMass[j] > 0;
-      const double weight = h2 * g.stiffness[k];
-      if (weight == 0 || (!freeI && !freeJ)) continue;
-      if (freeI && freeJ) {
-        edges.push_back({i, j, weight});
-      } else {
-        diagonal[freeI ? i : j] += weight;
-      }
-    }
-  }
-  if (n.dynamicEnd > 0) s.nodes.factorise(diagonal, edges);
+  for (const SpringGroup& g : d.springs.groups)
+    for (int k = 0; k < 4; ++k)
+      for (const std::uint32_t offset : {g.node0[k], g.node1[k]})
+        if (s.nodeMobility[offset / sizeof(Quad)] > 0) s.nodeMobility[offset / sizeof(Quad)] += h2 * g.stiffness[k];
+  for (double& mobility : s.nodeMobility) mobility = mobility > 0 ? 1 / mobility : 0;
 }
 
 }  // namespace
@@ -71,8 +60,8 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
   s.diagonal.resize(d.spheres.count);
   s.beside.resize(d.links.count);
   s.blocks.resize(d.spheres.count);
-  for (Motion* m : {&s.before.motion, &s.start.motion, &s.motion, &s.residual, &s.change, &s.direction, &s.image,
-                    &s.preconditioned})
+  for (Motion* m : {&s.balance, &s.kept, &s.before.motion, &s.start.motion, &s.motion, &s.residual, &s.change,
+                    &s.direction, &s.image, &s.preconditioned})
     m->resize(s.freedom.size());
   s.carried.resize(d.nodes.dynamicEnd);
   s.given.resize(d.nodes.dynamicEnd);

@@ -32,7 +32,9 @@ void addLinkStiffness(const WorldData& d, ImplicitData& s);
 void assembleSystem(WorldData& d, ImplicitData& s);
 void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y);  // y = A x
 // Conjugate gradients: A change = -residual, to `tolerance` of the residual. Returns the iterations.
-int solveSystem(WorldData& d, ImplicitData& s, double tolerance);
+using Operator = void (*)(WorldData& d, ImplicitData& s, const Motion& x, Motion& y);
+int solveSystem(WorldData& d, ImplicitData& s, double tolerance, Operator apply);
+void addRows(const ImplicitData& s, const Motion& x, Motion& y);  // y += the loads' part of A x
 double product(const Motion& a, const Motion& b);
 void addScaled(double f, const Motion& b, Motion& a);  // a += f b
 void hold(const std::vector<Quad>& freedom, Motion& m);

@@ -118,7 +118,7 @@ void precondition(WorldData& d, ImplicitData& s, const Motion& r, Motion& z) {
   z = r;
   if (d.nodes.dynamicEnd > 0) {
     // Spheres: r_s + J^T G (M + G)^-1 r_n
-    s.nodes.solve(z.data() + first);
+    for (int i = 0; i < d.nodes.dynamicEnd; ++i) store(z[first + i], splat(s.nodeMobility[i]) * load(z[first + i]));
     std::fill(s.carried.begin(), s.carried.end(), Quad{});
     applySurface(d, s, z.data() + first);
     returnImpulses(d, s.given, z);
@@ -131,9 +131,8 @@ void precondition(WorldData& d, ImplicitData& s, const Motion& r, Motion& z) {
     carryMotion(d, z, s.carried);
     applySurface(d, s, nullptr);
     negate(s.given);
-    for (int i = 0; i < d.nodes.dynamicEnd; ++i) store(s.given[i], load(s.freedom[first + i]) * load(s.given[i]));
-    s.nodes.solve(s.given.data());
-    for (int i = 0; i < d.nodes.dynamicEnd; ++i) store(z[first + i], load(z[first + i]) + load(s.given[i]));
+    for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+      store(z[first + i], fma(splat(s.nodeMobility[i]), load(s.given[i]), load(z[first + i])));
   }
   hold(s.freedom, z);
 }
@@ -190,6 +189,11 @@ void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y) {
     negate(s.given);
     returnImpulses(d, s.given, y);
   }
+  addRows(s, x, y);
+  hold(s.freedom, y);
+}
+
+void addRows(const ImplicitData& s, const Motion& x, Motion& y) {
   for (const LoadRow& row : s.rows) {
     if (row.weight == 0) continue;
     double rate = 0;
@@ -199,10 +203,9 @@ void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y) {
       store(to, fma(splat(row.weight * rate), load(s.rowCoefficient[k]), load(to)));
     }
   }
-  hold(s.freedom, y);
 }
 
-int solveSystem(WorldData& d, ImplicitData& s, double tolerance) {
+int solveSystem(WorldData& d, ImplicitData& s, double tolerance, Operator apply) {
   constexpr int kIterations = 200;
   std::fill(s.change.begin(), s.change.end(), Quad{});
   Motion& r = s.residual;
@@ -214,16 +217,22 @@ int solveSystem(WorldData& d, ImplicitData& s, double tolerance) {
   const double enough = tolerance * tolerance * size;
   for (int i = 0; i < kIterations; ++i) {
     if (!(size > enough)) return i;
-    applySystem(d, s, s.direction, s.image);
-    const double step = size / product(s.direction, s.image);
+    apply(d, s, s.direction, s.image);
+    const double curvature = product(s.direction, s.image);
+    // Along such a direction the residual is no minimum; what the preconditioner says is a way down all the same.
+    if (!(curvature > 1e-3 * size)) {
+      if (i == 0) s.change = s.direction;
+      return i + 1;
+    }
+    const double step = product(r, s.direction) / curvature;
     addScaled(step, s.direction, s.change);
     addScaled(-step, s.image, r);
     precondition(d, s, r, s.preconditioned);
-    const double next = product(r, s.preconditioned);
-    const double keep = next / size;
+    // Not quite symmetric away from rest: the next direction is made conjugate to the last by its own image.
+    const double keep = -product(s.preconditioned, s.image) / curvature;
     for (std::size_t k = 0; k < s.direction.size(); ++k)
       store(s.direction[k], fma(splat(keep), load(s.direction[k]), load(s.preconditioned[k])));
-    size = next;
+    size = product(r, s.preconditioned);
   }
   return kIterations;
 }

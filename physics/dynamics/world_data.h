@@ -182,6 +182,7 @@ struct WorldData {
   std::vector<NodeForce> deadLoads;  // body after body, as described
   ContactData contact;
   std::vector<std::shared_ptr<ImplicitData>> implicit;  // per halving of the step; made when it is first needed
+  double mostEnergy = 0;  // J, kinetic and elastic, at the beginning of any implicit step so far
 
   // Force of each tool load in the current substep, tool springs first, then held nodes; zero at the frame's start.
   std::vector<Eigen::Vector3d> loadForces;

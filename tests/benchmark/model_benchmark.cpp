@@ -12,7 +12,7 @@ static void buildGallbladder(benchmark::State& state) {
   BuildSettings settings;
   settings.spheres = static_cast<int>(state.range(0));
   BuildReport report;
-  while (state.KeepRunning()) benchmark::DoNotOptimize(buildModel(mesh, &fine, settings, report));
+  for ([[maybe_unused]] auto _ : state) benchmark::DoNotOptimize(buildModel(mesh, &fine, settings, report));
 }
 BENCHMARK(buildGallbladder)->Arg(7)->Arg(25)->Unit(benchmark::kMillisecond);
 

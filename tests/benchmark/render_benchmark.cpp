@@ -71,7 +71,7 @@ void BM_Picture720p(benchmark::State& state) {
   scene.picture.view = static_cast<ViewKind>(state.range(0));
   for (int k = 0; k < 3; ++k) scene.renderer.render(scene.picture, scene.image);
   int k = 0;
-  while (state.KeepRunning()) {
+  for ([[maybe_unused]] auto _ : state) {
     scene.move(k++);
     scene.renderer.render(scene.picture, scene.image);
   }
@@ -90,7 +90,7 @@ void BM_Film720p(benchmark::State& state) {
   {
     VideoWriter writer(path.string(), scene.settings.width, scene.settings.height, 30);
     int k = 0;
-    while (state.KeepRunning()) {
+    for ([[maybe_unused]] auto _ : state) {
       scene.move(k++);
       scene.renderer.render(scene.picture, scene.image);
       writer.write(scene.image);
@@ -103,7 +103,7 @@ void BM_Png720p(benchmark::State& state) {
   Scene scene;
   scene.renderer.render(scene.picture, scene.image);
   const auto path = std::filesystem::temp_directory_path() / "medulla_benchmark.png";
-  while (state.KeepRunning()) writePng(path.string(), scene.image);
+  for ([[maybe_unused]] auto _ : state) writePng(path.string(), scene.image);
   std::filesystem::remove(path);
 }
 BENCHMARK(BM_Png720p)->Unit(benchmark::kMillisecond);

@@ -41,7 +41,7 @@ static void strokes(benchmark::State& state, const TouchShape& shape) {
   std::vector<ToolSample> input(1);
   int tick = 0;
   std::size_t contacts = 0;
-  while (state.KeepRunning()) {
+  for ([[maybe_unused]] auto _ : state) {
     if (tick > 0 && tick % 24 == 0) {
       state.PauseTiming();
       const int k = tick / 24;
@@ -77,7 +77,7 @@ static void BucketsCommit(benchmark::State& state) {
   const TouchShape shape = ellipsoid(int(state.range(0)), int(state.range(1)), int(state.range(2)));
   const DynamicsFrame frame = frameAt(*shape, 0);
   Servo servo({{shape}}, {ToolSettings()}, 1.0 / 1200, frame, {ToolSample()});
-  while (state.KeepRunning()) servo.commit(frame, frame);
+  for ([[maybe_unused]] auto _ : state) servo.commit(frame, frame);
 }
 BENCHMARK(BucketsCommit)->Args({18, 14, 7})->Args({32, 32, 50})->Unit(benchmark::kMicrosecond);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "physics/dynamics/implicit_data.h"
 #include "physics/dynamics/stages.h"
 #include "physics/dynamics/world_data.h"
 #include "tests/synthetic_model.h"
@@ -41,6 +42,29 @@ BENCHMARK(gallbladderSubstep)
     ->ReportAggregatesOnly()
     ->ComputeStatistics("min", quickest);
 BENCHMARK(abdomenSubstep)->MinTime(0.02)->Repetitions(50)->ReportAggregatesOnly()->ComputeStatistics("min", quickest);
+
+// Implicit steps of 10 ms of the larger scene while it sags; `solve` is the time per linear system, assembled,
+// factorised and solved, the forces around it included.
+static void implicitStep(benchmark::State& state, SurfaceMode surface) {
+  std::vector<BodyDescription> bodies = synthetic::abdomenScene();
+  for (BodyDescription& body : bodies) body.surface = surface;
+  WorldSettings settings;
+  settings.integrator = Integrator::implicit;
+  settings.frameDuration = 0.01;
+  settings.substeps = 1;
+  World world(settings, std::move(bodies));
+  for (int i = 0; i < 3; ++i) world.advance({});
+  const long before = world.data().implicit[0]->solves;
+  for ([[maybe_unused]] auto _ : state) world.advance({});
+  const auto solves = static_cast<double>(world.data().implicit[0]->solves - before);
+  state.counters["spheres"] = world.data().spheres.count;
+  state.counters["links"] = world.data().links.count;
+  state.counters["nodes"] = world.data().nodes.dynamicEnd;
+  state.counters["solves_per_step"] = solves / static_cast<double>(state.iterations());
+  state.counters["solve"] = benchmark::Counter(solves, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+BENCHMARK_CAPTURE(implicitStep, spheres, SurfaceMode::skin);
+BENCHMARK_CAPTURE(implicitStep, full, SurfaceMode::full);
 
 static void runStage(benchmark::State& state, void (*stage)(WorldData&)) {
   World world({}, synthetic::abdomenScene());
