@@ -28,6 +28,7 @@ static void strokes(benchmark::State& state, const TouchShape& shape) {
     return Vector3d(x + 0.03 * std::sin(6 * t) * (x - middle));
   };
   std::vector<DynamicsFrame> frames;
+  frames.reserve(64);
   for (int k = 0; k < 64; ++k) frames.push_back(frameAt(*shape, 0.02 * k, breathing));
   const auto device = [&](int tick) {
     ToolSample sample;
