@@ -43,7 +43,7 @@ World packedRods(int spheres, ContactMode mode) {
   WorldSettings s;
   s.contact = mode;
   s.frameDuration = 0.02;
-  if (mode == ContactMode::none) s.gravity.setZero();  // nothing would stop their fall within the ten kilometres allowed
+  if (mode == ContactMode::none) s.gravity.setZero();  // nothing would stop their fall within a world's ten kilometres
   const Eigen::Vector3d size(4 * kPitch * columns, kPitch * (layers + 1), kPitch * (depth + 1));
   return World(s, std::move(bodies), caseOf(size));
 }
