@@ -19,7 +19,7 @@ namespace {
 constexpr double kRadius = 0.01, kGravity = 9.81;
 constexpr double kOmegaTimesStep = std::numbers::pi;  // contact_solve.cpp
 
-WorldSettings settings(ContactMode mode, double step, Vector3d gravity = Vector3d::Zero()) {
+WorldSettings settings(ContactMode mode, double step, const Vector3d& gravity = Vector3d::Zero()) {
   WorldSettings s;
   s.contact = mode;
   s.gravity = gravity;
@@ -193,8 +193,11 @@ TEST(Contact, MomentaStayWhileBodiesCollide) {
   for (FillingSphere& s : offCentre->spheres) s.restBallCentre += Vector3d(0.002, -0.003, 0.001);
   for (const ContactMode mode : {ContactMode::balls, ContactMode::swept}) {
     std::vector<BodyDescription> bodies;
-    for (int i = 0; i < 12; ++i)
-      bodies.push_back(ballBody("b", i % 2 ? stick : offCentre, 0.04 * Vector3d(i % 3, i / 3 % 2, i / 6), 0.5));
+    bodies.reserve(12);
+    for (int i = 0; i < 12; ++i) {
+      const int row = i / 3 % 2, layer = i / 6;
+      bodies.push_back(ballBody("b", i % 2 ? stick : offCentre, 0.04 * Vector3d(i % 3, row, layer), 0.5));
+    }
     WorldSettings s = settings(mode, 0.001);
     s.substeps = 2;
     World world(s, bodies);
