@@ -59,7 +59,7 @@ void disturb(WorldData& d, const std::function<Vector3d(const Vector3d&)>& move,
     if (d.spheres.groups[i / 4].inverseMass[i % 4] > 0) d.spheres.position[i] = quadOf(move(x));
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i)
-    if (d.nodes.inverseMass[i] > 0) d.nodes.position[i] = quadOf(move(vectorOf(d.nodes.position[i])));
+    if (d.nodes.inverseMass[i] > 0) setVector(d.nodes.position, i, move(vectorAt(d.nodes.position, i)));
   evaluateLinks(d);
 }
 
@@ -255,7 +255,7 @@ double farthestFromRest(const WorldData& d, const BodyDescription& body) {
   double squared = 0;
   for (std::size_t i = 0; i < body.model->restNodes.size(); ++i)
     squared =
-        std::max(squared, (vectorOf(d.nodes.position[d.ranges[0].node[i]]) - body.model->restNodes[i]).squaredNorm());
+        std::max(squared, (vectorAt(d.nodes.position, d.ranges[0].node[i]) - body.model->restNodes[i]).squaredNorm());
   return std::sqrt(squared);
 }
 

@@ -11,8 +11,8 @@
 #include "tests/accuracy_reference.h"
 #include "tests/test_shapes.h"
 
-// What the program makes of the load cases that finite elements solved (tests/accuracy): nothing is fitted but what
-// physics/README.md says. Limits are the errors reached, a little above; tests/accuracy/README.md lists them.
+// What the program makes of the load cases that finite elements solved (tests/accuracy). Limits are the errors reached,
+// a little above; tests/accuracy/README.md lists them, and says which cases set a constant and so prove nothing.
 namespace medulla {
 namespace {
 

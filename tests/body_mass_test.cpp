@@ -16,7 +16,7 @@ static MassProperties simulated(const WorldData& d) {
         {sphereMass(d, i), vectorOf(d.spheres.position[i]), 0.5 * j.trace() * Eigen::Matrix3d::Identity() - j});
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i)
-    if (d.nodes.mass[i] > 0) parts.push_back({d.nodes.mass[i], vectorOf(d.nodes.position[i]), Eigen::Matrix3d::Zero()});
+    if (d.nodes.mass[i] > 0) parts.push_back({d.nodes.mass[i], vectorAt(d.nodes.position, i), Eigen::Matrix3d::Zero()});
   return combined(parts);
 }
 

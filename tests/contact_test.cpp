@@ -43,7 +43,7 @@ void throwBody(World& w, int body, const Vector3d& velocity) {
   const BodyRange& r = d.ranges[body];
   for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) d.spheres.velocity[i] = quadOf(velocity);
   for (const int n : r.node)
-    if (n < d.nodes.dynamicEnd) d.nodes.velocity[n] = quadOf(velocity);
+    if (n < d.nodes.dynamicEnd) setVector(d.nodes.velocity, n, velocity);
 }
 
 StaticShape plane(const Vector3d& normal = Vector3d::UnitY(), double friction = 0) {
@@ -341,7 +341,6 @@ TEST(Contact, AHeapInABowlComesToRest) {
       BodyDescription& b = bodies.emplace_back(synthetic::body(k % 3 == 2 ? lump : rod, 5e3));
       b.tissue.damping = 0.3;
       b.surface = SurfaceMode::skin;
-      b.links = LinkModel::springs;
       b.worldFromModel.translation() = Vector3d(-0.03, -0.05 + 0.06 * k, 0.02 * random.uniform());
       b.worldFromModel.linear() = Eigen::AngleAxisd(0.5 * random.uniform(), Vector3d::UnitY()).toRotationMatrix();
     }

@@ -87,7 +87,7 @@ TEST(AmbientDrag, SlowsEveryPartAlike) {
     const Vector3d start(0.3, -0.2, 0.1);
     for (int i = 0; i < d.spheres.count; ++i) d.spheres.velocity[i] = quadOf(start);
     for (int i = 0; i < d.nodes.dynamicEnd; ++i)
-      if (d.nodes.mass[i] > 0) d.nodes.velocity[i] = quadOf(start);
+      if (d.nodes.mass[i] > 0) setVector(d.nodes.velocity, i, start);
     for (int frame = 0; frame < 10; ++frame) world.advance({});
     const Vector3d expected = start / std::pow(1 + d.substep * 0.8, 500);
     for (int i = 0; i < d.spheres.count; ++i)

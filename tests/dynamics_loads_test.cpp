@@ -205,7 +205,7 @@ TEST(Loads, TheAnchorMovesWithinTheFrame) {
     world.readFrame(frame);
     EXPECT_LT((frame.bodies[0].nodes[held.node] - held.anchor).norm(), 2e-4) << "frame " << i;
   }
-  EXPECT_NEAR(vectorOf(world.data().nodes.velocity[world.data().ranges[0].node[held.node]]).y(), 0.05, 0.005);
+  EXPECT_NEAR(vectorAt(world.data().nodes.velocity, world.data().ranges[0].node[held.node]).y(), 0.05, 0.005);
 }
 
 TEST(Loads, AStiffToolDoesNotBoundTheStep) {

@@ -72,8 +72,8 @@ inline void shake(WorldData& d, std::uint64_t seed, double angle, double shift, 
   for (const BodyRange& r : d.ranges) {
     for (int i : r.node) {
       if (i >= d.nodes.dynamicEnd) continue;
-      d.nodes.position[i] = quadOf(vectorOf(d.nodes.position[i]) + shift * random.vector());
-      d.nodes.velocity[i] = quadOf(speed * random.vector());
+      setVector(d.nodes.position, i, vectorAt(d.nodes.position, i) + shift * random.vector());
+      setVector(d.nodes.velocity, i, speed * random.vector());
     }
   }
   evaluateLinks(d);
@@ -96,12 +96,13 @@ inline Momentum momentum(const WorldData& d) {
     add(vectorOf(d.spheres.position[i]), sphereMass(d, i) * vectorOf(d.spheres.velocity[i]),
         vectorOf(d.spheres.angularMomentum[i]));
   for (int i = 0; i < d.nodes.dynamicEnd; ++i)
-    add(vectorOf(d.nodes.position[i]), d.nodes.mass[i] * vectorOf(d.nodes.velocity[i]), Vector3d::Zero());
+    add(vectorAt(d.nodes.position, i), d.nodes.mass[i] * vectorAt(d.nodes.velocity, i), Vector3d::Zero());
   return m;
 }
 
 inline double elastic(WorldData& d) {
   evaluateLinks(d);
+  evaluateAttachments(d);
   return linkEnergy(d) + surfaceEnergy(d);
 }
 

@@ -31,7 +31,8 @@ static World bareChain(int spheres, SurfaceMode surface, double damping) {
 // Central differences of the elastic energy along every freedom, against the forces.
 static void expectForcesAreMinusGradient(WorldData& d, double tolerance) {
   evaluateForces(d);
-  const std::vector<Quad> force = d.spheres.force, torque = d.spheres.torque, nodeForce = d.nodes.force;
+  const std::vector<Quad> force = d.spheres.force, torque = d.spheres.torque;
+  const std::vector<Lanes3> nodeForce = d.nodes.force;
   double forceScale = 0, torqueScale = 0;
   for (int i = 0; i < d.spheres.count; ++i) {
     forceScale = std::max(forceScale, vectorOf(force[i]).norm());
@@ -60,14 +61,14 @@ static void expectForcesAreMinusGradient(WorldData& d, double tolerance) {
   }
   for (int i = 0; i < d.nodes.dynamicEnd; i += 5) {
     for (int k = 0; k < 3; ++k) {
-      const Quad position = d.nodes.position[i];
+      const Vector3d position = vectorAt(d.nodes.position, i);
       double energy[2];
       for (int side : {0, 1}) {
-        d.nodes.position[i].v[k] = position.v[k] + (side == 0 ? -1 : 1) * 0.1 * step;
+        setVector(d.nodes.position, i, position + (side == 0 ? -1 : 1) * 0.1 * step * Vector3d::Unit(k));
         energy[side] = elastic(d);
-        d.nodes.position[i] = position;
+        setVector(d.nodes.position, i, position);
       }
-      EXPECT_NEAR(nodeForce[i].v[k], -(energy[1] - energy[0]) / (0.2 * step), tolerance * forceScale)
+      EXPECT_NEAR(vectorAt(nodeForce, i)[k], -(energy[1] - energy[0]) / (0.2 * step), tolerance * forceScale)
           << "node " << i << " axis " << k;
     }
   }

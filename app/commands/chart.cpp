@@ -252,12 +252,6 @@ std::vector<Result> chartResults(const std::vector<ChartPoint>& points, const Ch
   return results;
 }
 
-void writeText(const std::string& path, const std::string& text) {
-  OutputFile file(path);
-  file.write(text);
-  file.commit();
-}
-
 }  // namespace
 
 std::vector<std::string> chartMethodNames() {

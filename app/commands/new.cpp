@@ -22,12 +22,6 @@ static std::string nameFrom(const std::string& meshPath) {
   return name;
 }
 
-static void writeText(const std::string& path, const std::string& text) {
-  OutputFile file(path);
-  file.write(text);
-  file.commit();
-}
-
 int runNew(const NewOptions& options) {
   const std::string name = nameFrom(options.build.meshes[0]);
   const fs::path folder = options.folder;

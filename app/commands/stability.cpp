@@ -46,12 +46,6 @@ StabilityPoint tryOne(const BodyDescription& body, const TortureMethod& method, 
   return out;
 }
 
-void writeText(const std::string& path, const std::string& text) {
-  OutputFile file(path);
-  file.write(text);
-  file.commit();
-}
-
 std::vector<Result> resultsOf(const std::vector<StabilityPoint>& map, const std::vector<StabilityPoint>& trials) {
   std::vector<Result> out;
   for (const TortureMethod& method : tortureMethods()) {

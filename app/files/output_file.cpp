@@ -74,6 +74,12 @@ void OutputFile::commit() {
   temporaryPath_.clear();
 }
 
+void writeText(const std::string& path, const std::string& text) {
+  OutputFile file(path);
+  file.write(text);
+  file.commit();
+}
+
 void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
   const auto place = [](const std::string& path) {
     std::error_code error;

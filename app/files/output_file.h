@@ -31,4 +31,7 @@ class OutputFile {
   std::string buffer_;
 };
 
+// A whole OutputFile in one call.
+void writeText(const std::string& path, const std::string& text);
+
 }  // namespace medulla

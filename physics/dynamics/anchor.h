@@ -10,7 +10,7 @@ struct Anchor {
   Lanes3 base, baseVelocity;  // m, m/s: the point of the skeleton
   Lanes3 omega;               // rad/s of the frame that carries the offset
   Lanes3 offset;              // m, from the base to where the node belongs
-  Lanes3 normal;              // of the surface at rest, carried along
+  Lanes3 area;                // m2, of the surface at rest, carried along
 };
 
 inline Lanes3 positionOf(const Anchor& a) {
@@ -47,6 +47,20 @@ inline LinkHost linkHost(const WorldData& d, int link) {
   return h;
 }
 
+// What a link's nodes give it: sums of force and twist share, of force along the link and thickness, of moments.
+inline void setLoads(LinkFrame& f, int lane, Lanes sumAndTwist, Lanes alongAndThickness, Lanes moment) {
+  const auto set = [lane](Lanes3& to, Lanes from) {
+    to.x[lane] = from[0];
+    to.y[lane] = from[1];
+    to.z[lane] = from[2];
+  };
+  set(f.loadSum, sumAndTwist);
+  set(f.loadAlong, alongAndThickness);
+  set(f.loadMoment, moment);
+  f.loadTwist[lane] = sumAndTwist[3];
+  f.loadThickness[lane] = alongAndThickness[3];
+}
+
 // The point at `along` of the centre line, slid with its stretch, plus the offset in the frame of sphere 0 carried onto
 // the line, twisted by its share of the torsion and as much shorter as the link is thinner.
 inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
@@ -58,9 +72,8 @@ inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
     smallCosineSine(angle, c, s);
   }
   Anchor a;
-  a.normal = fma(
-      g.restNormal.x, h.n,
-      fma(fnma(g.restNormal.z, s, g.restNormal.y * c), h.axisU, fma(g.restNormal.y, s, g.restNormal.z * c) * h.axisV));
+  a.area = fma(g.restArea.x, h.n,
+               fma(fnma(g.restArea.z, s, g.restArea.y * c), h.axisU, fma(g.restArea.y, s, g.restArea.z * c) * h.axisV));
   c = c * h.thickness;
   s = s * h.thickness;
   a.base = fma(g.along, h.line, h.origin);
@@ -83,8 +96,7 @@ inline SphereHost sphereHost(const WorldData& d, int i) {
 }
 
 inline Anchor anchorOnSphere(const SphereHost& h, const NodeGroup& g) {
-  return {h.position, h.velocity, h.angularVelocity, rotate(h.rotation, g.restOffset),
-          rotate(h.rotation, g.restNormal)};
+  return {h.position, h.velocity, h.angularVelocity, rotate(h.rotation, g.restOffset), rotate(h.rotation, g.restArea)};
 }
 
 }  // namespace medulla

@@ -38,7 +38,7 @@ void dragVelocities(WorldData& d) {
   };
   drag(d.spheres.velocity, d.spheres.count);
   drag(d.spheres.angularMomentum, d.spheres.count);
-  drag(d.nodes.velocity, d.nodes.dynamicEnd);
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) d.nodes.velocity[g] = kept * d.nodes.velocity[g];
 }
 
 }  // namespace medulla

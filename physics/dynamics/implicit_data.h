@@ -14,7 +14,8 @@ using Motion = std::vector<Quad>;
 
 // The state from which a stage sets out.
 struct StageStart {
-  std::vector<Quad> position, orientation, angularMomentum, nodePosition, unwoundTwist;
+  std::vector<Quad> position, orientation, angularMomentum, unwoundTwist;
+  std::vector<Lanes3> nodePosition;  // as in Nodes
   Motion motion;  // angular velocities are the first guess only: angularMomentum is what forces add to
 };
 
@@ -54,8 +55,9 @@ struct ImplicitData {
   double workOfPaths = 0;    // J, that led spheres give in this stage
   Motion balance, kept;      // the residual without loads; the motion while a derivative is taken
   Motion motion, residual, change, direction, image, preconditioned;
-  std::vector<Quad> carried, given;  // per node: the operator's velocities of anchors, impulses
-  std::vector<double> swollen;       // per body: volume that the nodes in `carried` enclose
+  std::vector<Eigen::Vector3d> toolImpulses;  // N s, per load, of the whole step
+  std::vector<Quad> carried, given;           // per node: the operator's velocities of anchors, impulses
+  std::vector<double> swollen;                // per body: volume that the nodes in `carried` enclose
   std::vector<Vector6> blocks;
   long solves = 0, iterations = 0;  // linear systems, and conjugate gradients in all
 };

@@ -26,10 +26,9 @@ void layOutNodes(const WorldData& d, ImplicitData& s) {
     s.carriedMass.push_back(free ? s.pull[i] * m / (m + s.pull[i]) : s.pull[i]);
     s.nodeMobility.push_back(free ? m + s.pull[i] : 0);
   }
-  for (const SpringGroup& g : d.springs.groups)
-    for (int k = 0; k < 4; ++k)
-      for (const std::uint32_t offset : {g.node0[k], g.node1[k]})
-        if (s.nodeMobility[offset / sizeof(Quad)] > 0) s.nodeMobility[offset / sizeof(Quad)] += h2 * g.stiffness[k];
+  for (int i = 0; i < n.dynamicEnd; ++i)
+    for (int e = d.springs.first[i / 4]; e < d.springs.first[i / 4 + 1]; ++e)
+      if (s.nodeMobility[i] > 0) s.nodeMobility[i] += h2 * d.springs.groups[e].stiffness[i % 4];
   for (double& mobility : s.nodeMobility) mobility = mobility > 0 ? 1 / mobility : 0;
 }
 

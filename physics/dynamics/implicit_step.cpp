@@ -53,13 +53,13 @@ void beginHere(const WorldData& d, StageStart& start) {
   start.position.assign(s.position.begin(), s.position.begin() + s.count);
   start.orientation.assign(s.orientation.begin(), s.orientation.begin() + s.count);
   start.angularMomentum.assign(s.angularMomentum.begin(), s.angularMomentum.begin() + s.count);
-  start.nodePosition.assign(d.nodes.position.begin(), d.nodes.position.begin() + d.nodes.dynamicEnd);
+  start.nodePosition.assign(d.nodes.position.begin(), d.nodes.position.begin() + d.nodes.dynamicEnd / 4);
   start.unwoundTwist = d.links.unwoundTwist;
   for (int i = 0; i < s.count; ++i) {
     start.motion[2 * i] = s.velocity[i];
     start.motion[2 * i + 1] = s.angularVelocity[i];
   }
-  for (int i = 0; i < d.nodes.dynamicEnd; ++i) start.motion[2 * s.count + i] = d.nodes.velocity[i];
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) storeFour(d.nodes.velocity[g], start.motion, 2 * s.count + 4 * g);
 }
 
 // The state that `s.motion` leads to in `time` from the start.
@@ -72,10 +72,9 @@ void place(WorldData& d, const ImplicitData& s, double time) {
     to.velocity[i] = v;
     to.angularVelocity[i] = omega;
   }
-  for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
-    const Quad& v = s.motion[2 * to.count + i];
-    addTo(s.start.nodePosition[i], time, v, d.nodes.position[i]);
-    d.nodes.velocity[i] = v;
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
+    d.nodes.velocity[g] = gatherFour(s.motion, 2 * to.count + 4 * g);
+    d.nodes.position[g] = fma(splat(time), d.nodes.velocity[g], s.start.nodePosition[g]);
   }
   d.links.unwoundTwist = s.start.unwoundTwist;
 }
@@ -96,7 +95,7 @@ void balanceForces(WorldData& d, const ImplicitData& s, Motion& out) {
     const int k = 2 * d.spheres.count + i;
     const double m = d.nodes.mass[i];
     out[k] = quadOf(m * (vectorOf(s.motion[k]) - vectorOf(s.start.motion[k]) - t * gravity) -
-                    t * vectorOf(d.nodes.force[i]));
+                    t * vectorAt(d.nodes.force, i));
   }
 }
 
@@ -224,7 +223,7 @@ void beginSecondStage(WorldData& d, ImplicitData& s, double late) {
     s.start.position[i] = d.spheres.position[i];
     s.start.orientation[i] = d.spheres.orientation[i];
   }
-  for (int i = 0; i < d.nodes.dynamicEnd; ++i) s.start.nodePosition[i] = d.nodes.position[i];
+  std::copy_n(d.nodes.position.begin(), s.start.nodePosition.size(), s.start.nodePosition.begin());
 }
 
 // J
@@ -235,7 +234,7 @@ double kineticEnergy(const WorldData& d, const ImplicitData& s) {
     kinetic += d.spheres.groups[i / 4].mass[i % 4] * vectorOf(d.spheres.velocity[i]).squaredNorm() +
                omega.dot(worldInertia(s, d.spheres.orientation[i], i) * omega);
   }
-  for (int i = 0; i < d.nodes.dynamicEnd; ++i) kinetic += d.nodes.mass[i] * vectorOf(d.nodes.velocity[i]).squaredNorm();
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) kinetic += d.nodes.mass[i] * vectorAt(d.nodes.velocity, i).squaredNorm();
   return 0.5 * kinetic;
 }
 
@@ -262,9 +261,9 @@ double workOf(const WorldData& d, const ImplicitData& s) {
 
 void slowDown(WorldData& d, double share) {
   const Lanes kept = splat(share);
-  for (std::vector<Quad>* all :
-       {&d.spheres.velocity, &d.spheres.angularVelocity, &d.spheres.angularMomentum, &d.nodes.velocity})
+  for (std::vector<Quad>* all : {&d.spheres.velocity, &d.spheres.angularVelocity, &d.spheres.angularMomentum})
     for (Quad& v : *all) store(v, kept * load(v));
+  for (Lanes3& v : d.nodes.velocity) v = kept * v;
 }
 
 // Puts back the state that `start` holds.
@@ -279,7 +278,11 @@ void restore(WorldData& d, const StageStart& start) {
     s.velocity[i] = start.motion[2 * i];
     s.angularVelocity[i] = start.motion[2 * i + 1];
   }
-  for (int i = 0; i < d.nodes.dynamicEnd; ++i) d.nodes.velocity[i] = start.motion[2 * s.count + i];
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) d.nodes.velocity[g] = gatherFour(start.motion, 2 * s.count + 4 * g);
+}
+
+void addToolImpulses(const WorldData& d, double time, std::vector<Vector3d>& impulses) {
+  for (std::size_t k = 0; k < impulses.size(); ++k) impulses[k] += time * d.loadForces[k];
 }
 
 struct StepTime {
@@ -295,11 +298,14 @@ bool attempt(WorldData& d, ImplicitData& s, std::size_t level, const Loads& load
   const double late = d.substep - s.duration;  // 0 in order 1
   s.start = s.before;
   bool settled = true;
+  s.toolImpulses.assign(d.loadForces.size(), Vector3d::Zero());
   if (late > 0) {
     settled = runStage(d, s, {&loads, time.end - late, time.remaining + late});
+    addToolImpulses(d, late, s.toolImpulses);
     beginSecondStage(d, s, late);
   }
   if (settled || level > kMustSettle) settled = runStage(d, s, {&loads, time.end, time.remaining});
+  addToolImpulses(d, s.duration, s.toolImpulses);
   if (!settled && level <= kMustSettle) return false;
   for (int i = 0; i < d.spheres.count; ++i)
     d.spheres.angularMomentum[i] = quadOf(worldInertia(s, d.spheres.orientation[i], i) * vectorOf(s.motion[2 * i + 1]));
@@ -333,7 +339,7 @@ void advanceBy(WorldData& d, std::size_t level, const Loads& loads, const StepTi
   d.mostEnergy = std::max(d.mostEnergy, energy);
   if (attempt(d, s, level, loads, time, energy)) {
     for (std::size_t k = 0; k < d.loadForces.size(); ++k)
-      toolImpulse[pointSpring(d, loads, k, time.remaining).tool] += d.substep * d.loadForces[k];
+      toolImpulse[pointSpring(d, loads, k, time.remaining).tool] += s.toolImpulses[k];
     return;
   }
   if (level == kDeepest) return creep(d, s);

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "physics/dynamics/edge_springs.h"
 #include "physics/dynamics/implicit_stages.h"
 
 // The linear system of an implicit stage. With J the map from the motion of the spheres to that of the anchors, S the
@@ -36,18 +37,12 @@ void applyPressure(const WorldData& d, ImplicitData& s) {
         for (int g = range.firstGroup; g < range.endGroup; ++g) visit(g, range.body);
   };
   std::fill(s.swollen.begin(), s.swollen.end(), 0.0);
-  forGroups([&](int g, int body) {
-    const Quad* q = &s.carried[4 * g];
-    s.swollen[body] += sumOfLanes(d.nodes.groups[g].area * dot(d.nodes.normal[g], gather(q[0], q[1], q[2], q[3])));
-  });
+  forGroups(
+      [&](int g, int body) { s.swollen[body] += sumOfLanes(dot(d.nodes.area[g], gatherFour(s.carried, 4 * g))); });
   const double h2 = s.duration * s.duration;
   forGroups([&](int g, int body) {
-    const Lanes push = splat(h2 * d.ranges[body].bulk * s.swollen[body]) * d.nodes.groups[g].area;
-    const Lanes3 impulse = push * d.nodes.normal[g];
-    for (int k = 0; k < 4; ++k) {
-      Quad& to = s.given[4 * g + k];
-      store(to, load(to) + Lanes{impulse.x[k], impulse.y[k], impulse.z[k], 0});
-    }
+    const Lanes pressure = splat(h2 * d.ranges[body].bulk * s.swollen[body]);
+    storeFour(fma(pressure, d.nodes.area[g], gatherFour(s.given, 4 * g)), s.given, 4 * g);
   });
 }
 
@@ -57,17 +52,15 @@ void applySurface(const WorldData& d, ImplicitData& s, const Quad* x) {
   std::vector<Quad>& displaced = s.carried;
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
     const Lanes of = x != nullptr ? load(x[i]) : splat(0);
-    const Lanes difference = of - load(displaced[i]);
-    store(displaced[i], difference);
-    store(s.given[i], splat(s.pull[i]) * difference);
+    store(displaced[i], of - load(displaced[i]));
   }
-  const double h2 = s.duration * s.duration;
-  for (const SpringGroup& g : d.springs.groups) {
+  const Lanes h2 = splat(s.duration * s.duration);
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
+    Lanes edges[4];
+    pullOfEdges(d.springs, displaced.data(), g, edges);
     for (int k = 0; k < 4; ++k) {
-      const std::size_t i = g.node0[k] / sizeof(Quad), j = g.node1[k] / sizeof(Quad);
-      const Lanes pull = splat(h2 * g.stiffness[k]) * (load(displaced[j]) - load(displaced[i]));
-      store(s.given[j], load(s.given[j]) + pull);
-      store(s.given[i], load(s.given[i]) - pull);
+      const int i = 4 * g + k;
+      store(s.given[i], fnma(h2, edges[k], splat(s.pull[i]) * load(displaced[i])));
     }
   }
   applyPressure(d, s);

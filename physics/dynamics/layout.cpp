@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include "physics/dynamics/stages.h"
 
@@ -13,12 +14,6 @@ using Eigen::Vector3d;
 
 // Forces of a link divide by no less than this share of its rest length: two spheres pushed into one point stay finite.
 constexpr double kSmallestLength = 0.05;
-
-void setLane(Lanes3& to, int lane, const Vector3d& a) {
-  to.x[lane] = a.x();
-  to.y[lane] = a.y();
-  to.z[lane] = a.z();
-}
 
 void addSpheres(WorldData& d, const BodyDescription& body, const BodyMechanics& mechanics) {
   Spheres& s = d.spheres;
@@ -94,14 +89,19 @@ struct NodeOrder {  // one entry per padded place: which node of which body, -1 
 };
 
 // Appends the nodes of `b` that hang on links (or spheres) in the order of their hosts, each host's range padded to
-// four.
-void appendNodes(NodeOrder& order, Nodes& nodes, const BodyMechanics& mechanics, int b, bool onLink, int firstHost,
+// four; those with as many edges side by side, because a group has as many springs as the node of it that has most.
+void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics, int b, bool onLink,
                  std::vector<HostRange>& ranges) {
+  const SoftBodyModel& m = *d.bodies[b].model;
+  const int firstHost = onLink ? d.ranges[b].firstLink : d.ranges[b].firstSphere;
+  std::vector<int> edges(m.restNodes.size(), 0);
+  for (const auto& e : m.edges) ++edges[e[0]], ++edges[e[1]];
   std::vector<int> sorted;
   for (std::size_t i = 0; i < mechanics.attachments.size(); ++i)
     if (mechanics.attachments[i].onLink == onLink) sorted.push_back(static_cast<int>(i));
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [&](int i, int j) { return mechanics.attachments[i].host < mechanics.attachments[j].host; });
+  std::stable_sort(sorted.begin(), sorted.end(), [&](int i, int j) {
+    return std::pair(mechanics.attachments[i].host, -edges[i]) < std::pair(mechanics.attachments[j].host, -edges[j]);
+  });
   for (std::size_t k = 0; k < sorted.size();) {
     const int host = mechanics.attachments[sorted[k]].host;
     HostRange range{firstHost + host, static_cast<int>(order.node.size()) / 4, 0, mechanics.surfaceRelaxation, b};
@@ -114,7 +114,7 @@ void appendNodes(NodeOrder& order, Nodes& nodes, const BodyMechanics& mechanics,
       order.node.push_back(-1);
     }
     range.endGroup = static_cast<int>(order.node.size()) / 4;
-    nodes.groupHosts.resize(range.endGroup, {range.host, onLink});
+    d.nodes.groupHosts.resize(range.endGroup, {range.host, onLink});
     ranges.push_back(range);
   }
 }
@@ -124,9 +124,7 @@ NodeOrder orderNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) 
   const auto append = [&](SurfaceMode mode, bool onLink, std::vector<HostRange>& ranges) {
     for (std::size_t b = 0; b < d.bodies.size(); ++b) {
       if (d.bodies[b].surface != mode) continue;
-      const BodyRange& r = d.ranges[b];
-      appendNodes(order, d.nodes, mechanics[b], static_cast<int>(b), onLink, onLink ? r.firstLink : r.firstSphere,
-                  ranges);
+      appendNodes(order, d, mechanics[b], static_cast<int>(b), onLink, ranges);
     }
   };
   append(SurfaceMode::full, true, d.nodes.onLinks);
@@ -141,12 +139,9 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   const NodeOrder order = orderNodes(d, mechanics);
   Nodes& n = d.nodes;
   n.count = static_cast<int>(order.node.size());
-  n.position.resize(n.count);
-  n.velocity.resize(n.count);
-  n.force.resize(n.count);
   n.displaced.resize(n.count);
-  n.offset.resize(n.count / 4);
-  n.normal.resize(n.count / 4);
+  for (std::vector<Lanes3>* a : {&n.position, &n.velocity, &n.force, &n.offset, &n.area})
+    a->resize(n.count / 4, Lanes3{splat(0), splat(0), splat(0)});
   n.mass.resize(n.count, 0);
   n.inverseMass.resize(n.count, 0);
   n.groups.resize(n.count / 4, NodeGroup{});
@@ -156,16 +151,15 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
     const BodyDescription& body = d.bodies[b];
     const Attachment& a = mechanics[b].attachments[k];
     d.ranges[b].node[k] = i;
-    n.position[i] = quadOf(body.worldFromModel * body.model->restNodes[k]);
+    setVector(n.position, i, body.worldFromModel * body.model->restNodes[k]);
     n.mass[i] = mechanics[b].nodeMass[k];
     n.inverseMass[i] = n.mass[i] > 0 && mechanics[b].nodeMoves[k] ? 1 / n.mass[i] : 0;
     NodeGroup& g = n.groups[i / 4];
     g.stiffness[lane] = mechanics[b].attachmentStiffness[k];
-    g.area[lane] = a.area;
-    const Vector3d& normal = mechanics[b].normal[k];
+    const Vector3d area = a.area * mechanics[b].normal[k];
     if (!a.onLink) {
       setLane(g.restOffset, lane, a.restOffset);
-      setLane(g.restNormal, lane, normal);
+      setLane(g.restArea, lane, area);
       continue;
     }
     const int link = d.ranges[b].firstLink + a.host, l = link % 4;
@@ -173,37 +167,41 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
     g.along[lane] = a.along;
     g.twistShare[lane] = mechanics[b].twistShare[k];
     setLane(g.restOffset, lane, {0, a.restOffset.dot(u), a.restOffset.dot(t.cross(u))});
-    setLane(g.restNormal, lane, {normal.dot(t), normal.dot(u), normal.dot(t.cross(u))});
+    setLane(g.restArea, lane, {area.dot(t), area.dot(u), area.dot(t.cross(u))});
   }
 }
 
-// An order in which neighbours of the list are kStride apart: edges are sorted by their nodes, and springs that follow
-// each other at one node would each wait for the sum that the one before has just stored. Blocks keep to the cache.
-std::vector<std::size_t> interleaved(std::size_t count) {
-  constexpr std::size_t kStride = 8, kBlock = kStride * kStride;
-  std::vector<std::size_t> order;
-  for (std::size_t block = 0; block < count; block += kBlock)
-    for (std::size_t first = block; first < std::min(count, block + kStride); ++first)
-      for (std::size_t i = first; i < std::min(count, block + kBlock); i += kStride) order.push_back(i);
-  return order;
-}
+struct SpringEnd {
+  int other;
+  double stiffness;
+};
 
 void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   Springs& s = d.springs;
+  std::vector<std::vector<SpringEnd>> ends(d.nodes.dynamicEnd);
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     const SoftBodyModel& m = *d.bodies[b].model;
     if (d.bodies[b].surface != SurfaceMode::full) continue;
-    for (const std::size_t e : interleaved(m.edges.size())) {
-      const int k = s.count++, lane = k % 4;
-      if (lane == 0) s.groups.emplace_back();
-      SpringGroup& g = s.groups.back();
-      const int n0 = d.ranges[b].node[m.edges[e][0]], n1 = d.ranges[b].node[m.edges[e][1]];
-      for (int l = lane; l < 4; ++l) {
-        g.node0[l] = static_cast<std::uint32_t>(n0 * sizeof(Quad));
-        g.node1[l] = static_cast<std::uint32_t>(n1 * sizeof(Quad));
-        g.stiffness[l] = l == lane ? mechanics[b].edgeStiffness[e] : 0;
+    for (std::size_t e = 0; e < m.edges.size(); ++e) {
+      const int node0 = d.ranges[b].node[m.edges[e][0]], node1 = d.ranges[b].node[m.edges[e][1]];
+      ends[node0].push_back({node1, mechanics[b].edgeStiffness[e]});
+      ends[node1].push_back({node0, mechanics[b].edgeStiffness[e]});
+      ++s.count;
+    }
+  }
+  s.first.push_back(0);
+  for (int i = 0; i < d.nodes.dynamicEnd; i += 4) {
+    std::size_t most = 0;
+    for (int l = 0; l < 4; ++l) most = std::max(most, ends[i + l].size());
+    for (std::size_t k = 0; k < most; ++k) {
+      SpringGroup& g = s.groups.emplace_back();
+      for (int l = 0; l < 4; ++l) {
+        const SpringEnd end = k < ends[i + l].size() ? ends[i + l][k] : SpringEnd{i + l, 0};
+        g.other[l] = static_cast<std::uint32_t>(end.other * sizeof(Quad));
+        g.stiffness[l] = end.stiffness;
       }
     }
+    s.first.push_back(static_cast<int>(s.groups.size()));
   }
 }
 
@@ -218,7 +216,7 @@ void addDrives(WorldData& d, const BodyDescription& body, const BodyRange& r) {
     drive.phase = driven.phase;
     d.drives.push_back(drive);
     for (int i = 0; i < r.sphereCount; ++i) d.spheres.velocity[r.firstSphere + i] = drive.velocity;
-    for (int i : r.node) d.nodes.velocity[i] = drive.velocity;
+    for (int i : r.node) setVector(d.nodes.velocity, i, vectorOf(drive.velocity));
   }
 }
 

@@ -204,33 +204,33 @@ void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundT
   const Lanes3 bend0 = flexionGradient(m.end0, moments0), bend1 = flexionGradient(m.end1, moments1);
   const Lanes3 bend = bend0 + bend1;
   const Lanes3 across = fnma(dot(bend, m.n), m.n, bend);
-  f.force1 = (splat(0) - tension) * m.n - m.inverseLength * across;
-  f.torque0 = cross(m.n, bend0);
-  f.torque1 = cross(m.n, bend1);
+  put((splat(0) - tension) * m.n - m.inverseLength * across, f.force1);
+  put(cross(m.n, bend0), f.torque0);
+  put(cross(m.n, bend1), f.torque1);
   f.twistMoment =
       fma(link.torsion, fma(link.relaxation, spin1 - spin0, m.twist), couplingTorque(link, m, still0, still1));
 
   thin(link, m.length, lengthRate, f);
-  f.arm0 = s0.arm;
-  f.arm1 = s1.arm;
-  f.origin = s0.position;
-  f.line = m.line;
-  f.originVelocity = s0.velocity;
-  f.lineVelocity = lineVelocity;
-  f.n = m.n;
-  f.axisU = m.axisU;
-  f.axisV = m.axisV;
-  f.turning = cross(m.n, nRate);
+  put(s0.arm, f.arm0);
+  put(s1.arm, f.arm1);
+  put(s0.position, f.origin);
+  put(m.line, f.line);
+  put(s0.velocity, f.originVelocity);
+  put(lineVelocity, f.lineVelocity);
+  put(m.n, f.n);
+  put(m.axisU, f.axisU);
+  put(m.axisV, f.axisV);
+  put(cross(m.n, nRate), f.turning);
   f.spin0 = spin0;
   f.spinAlong = spin1 - spin0;
   f.twist = m.twist;
   f.inverseLength = m.inverseLength;
-  f.spinAxis0 = m.end0.spinAxis;
-  f.spinAxis1 = m.end1.spinAxis;
-  f.spinLever0 = m.end0.lever;
-  f.spinLever1 = m.end1.lever;
+  put(m.end0.spinAxis, f.spinAxis0);
+  put(m.end1.spinAxis, f.spinAxis1);
+  put(m.end0.lever, f.spinLever0);
+  put(m.end1.lever, f.spinLever1);
   const Lanes zero = splat(0);
-  f.loadSum = f.loadAlong = f.loadMoment = {zero, zero, zero};
+  for (Lanes3* sum : {&f.loadSum, &f.loadAlong, &f.loadMoment}) put({zero, zero, zero}, *sum);
   f.loadTwist = f.loadThickness = zero;
 }
 

@@ -49,7 +49,7 @@ SphereMotion motionOf(const WorldData& d, int sphere) {
 }
 
 Vector3d nodeVelocity(const WorldData& d, int node) {
-  if (!isSkin(d, node)) return vectorOf(d.nodes.velocity[node]);
+  if (!isSkin(d, node)) return vectorAt(d.nodes.velocity, node);
   const GroupHost host = d.nodes.groupHosts[node / 4];
   if (host.onLink) {
     const LinkPoint p = linkPoint(d, host.host, node);
@@ -61,7 +61,7 @@ Vector3d nodeVelocity(const WorldData& d, int node) {
 
 void addNodeImpulse(WorldData& d, int node, const Vector3d& impulse) {
   if (!isSkin(d, node)) {
-    add(d.nodes.velocity[node], d.nodes.inverseMass[node] * impulse);
+    setVector(d.nodes.velocity, node, vectorAt(d.nodes.velocity, node) + d.nodes.inverseMass[node] * impulse);
     return;
   }
   const GroupHost host = d.nodes.groupHosts[node / 4];

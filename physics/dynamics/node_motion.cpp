@@ -9,7 +9,7 @@ namespace medulla {
 using Eigen::Vector3d;
 
 Vector3d nodePosition(const WorldData& d, int node) {
-  if (!isSkin(d, node)) return vectorOf(d.nodes.position[node]);
+  if (!isSkin(d, node)) return vectorAt(d.nodes.position, node);
   const GroupHost host = d.nodes.groupHosts[node / 4];
   const NodeGroup& group = d.nodes.groups[node / 4];
   const Anchor anchor =

@@ -3,7 +3,9 @@
 #include <immintrin.h>
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 // Four doubles at a time. The baseline is x86-64-v3 (AVX2 and FMA): a fused multiply-add is always asked for by name
 // and never contracted by the compiler, so that results do not depend on compiler or options. No libm: its variants are
@@ -18,6 +20,13 @@ using Lanes = __m256d;  // + - * / and [] are the compilers' own
 struct Lanes3 {
   Lanes x, y, z;  // a vector in each of the four lanes
 };
+
+// Number by number: g++ 12 copies such a structure through general registers, eight bytes at a time.
+inline void put(const Lanes3& from, Lanes3& to) {
+  to.x = from.x;
+  to.y = from.y;
+  to.z = from.z;
+}
 
 // Four doubles in memory: a vector and a spare, a quaternion x,y,z,w, or one number for each of four objects.
 struct alignas(32) Quad {
@@ -178,6 +187,31 @@ inline Eigen::Vector3d vectorOf(const Quad& q) {
 }
 inline Eigen::Vector3d vectorOf(const Lanes3& a, int lane) {
   return {a.x[lane], a.y[lane], a.z[lane]};
+}
+inline void setLane(Lanes3& to, int lane, const Eigen::Vector3d& a) {
+  to.x[lane] = a.x();
+  to.y[lane] = a.y();
+  to.z[lane] = a.z();
+}
+
+// Vectors four to a group: the i-th of them all.
+inline Eigen::Vector3d vectorAt(const std::vector<Lanes3>& groups, int i) {
+  return vectorOf(groups[i / 4], i % 4);
+}
+inline void setVector(std::vector<Lanes3>& groups, int i, const Eigen::Vector3d& a) {
+  setLane(groups[i / 4], i % 4, a);
+}
+// The four that begin at i between an array of quads and lanes.
+inline Lanes3 gatherFour(const std::vector<Quad>& q, std::size_t i) {
+  return gather(q[i], q[i + 1], q[i + 2], q[i + 3]);
+}
+inline void storeFour(const Lanes3& v, std::vector<Quad>& q, std::size_t i) {
+  Lanes a = v.x, b = v.y, c = v.z, d = splat(0);
+  transpose(a, b, c, d);
+  store(q[i], a);
+  store(q[i + 1], b);
+  store(q[i + 2], c);
+  store(q[i + 3], d);
 }
 
 }  // namespace medulla

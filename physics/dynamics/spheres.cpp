@@ -56,15 +56,13 @@ void storeAngularVelocity(const SphereGroup& g, const Turning& t, Quad* out) {
 }
 
 // Nodes without an inverse mass, fixed or pads, do not fall either.
-void stepNodes(Nodes& n, Lanes gravity, double h) {
-  Quad* v = n.velocity.data();
-  const Quad* f = n.force.data();
-  const double* inverse = n.inverseMass.data();
-  const Lanes fall = splat(h) * gravity, zero = splat(0);
-  for (int i = 0; i < n.dynamicEnd; ++i) {
-    const Lanes perMass = splat(inverse[i]);
-    const Lanes falling = _mm256_and_pd(isLess(zero, perMass), fall);
-    store(v[i], fma(splat(h) * perMass, load(f[i]), load(v[i]) + falling));
+void stepNodes(Nodes& n, const Quad& gravity, double h) {
+  const Lanes zero = splat(0);
+  const Lanes3 fall = splat(h) * splat(gravity);
+  for (int g = 0; g < n.dynamicEnd / 4; ++g) {
+    const Lanes perMass = _mm256_loadu_pd(&n.inverseMass[4 * g]), moves = isLess(zero, perMass);
+    const Lanes3 falling{_mm256_and_pd(moves, fall.x), _mm256_and_pd(moves, fall.y), _mm256_and_pd(moves, fall.z)};
+    put(fma(splat(h) * perMass, n.force[g], n.velocity[g] + falling), n.velocity[g]);
   }
 }
 
@@ -94,7 +92,7 @@ void stepVelocities(WorldData& d) {
     store(s.velocity[i], fma(h * splat(g.inverseMass[i % 4]), load(s.force[i]), load(s.velocity[i])));
     store(s.angularMomentum[i], fma(h * splat(g.freeToTurn[i % 4]), load(s.torque[i]), load(s.angularMomentum[i])));
   }
-  stepNodes(d.nodes, load(d.gravity), d.substep);
+  stepNodes(d.nodes, d.gravity, d.substep);
 }
 
 void stepPositions(WorldData& d) {
@@ -107,10 +105,8 @@ void stepPositions(WorldData& d) {
     storeQuads(t.q.x, t.q.y, t.q.z, t.w, &s.orientation[4 * g]);
   }
   refreshAngularVelocities(d);
-  Quad* x = d.nodes.position.data();
-  const Quad* v = d.nodes.velocity.data();
-  const int count = d.nodes.dynamicEnd;
-  for (int i = 0; i < count; ++i) store(x[i], fma(h, load(v[i]), load(x[i])));
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g)
+    put(fma(h, d.nodes.velocity[g], d.nodes.position[g]), d.nodes.position[g]);
 }
 
 void refreshAngularVelocities(WorldData& d) {

@@ -8,8 +8,7 @@ namespace medulla {
 
 void evaluateLinks(WorldData&);        // link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
 void evaluateAttachments(WorldData&);  // surface.cpp: where every node would be, and the pull on it
-void addEdgeSprings(WorldData&);       // to the nodes' forces
-void returnNodeForces(WorldData&);     // from the anchors to their hosts
+void finishNodeForces(WorldData&);     // edge springs and pressure; from the anchors to their hosts
 void returnLinkForces(WorldData&);     // link_force.cpp: links and what hangs on them, to their two spheres
 void sumSphereForces(WorldData&);      // spheres.cpp
 // Before the forces' share of the velocities, which tools and contacts balance in a body at rest.
@@ -32,8 +31,7 @@ void stepPositions(WorldData&);
 inline void evaluateForces(WorldData& d) {
   evaluateLinks(d);
   evaluateAttachments(d);
-  addEdgeSprings(d);
-  returnNodeForces(d);
+  finishNodeForces(d);
   returnLinkForces(d);
   sumSphereForces(d);
 }
@@ -50,6 +48,6 @@ void refreshAngularVelocities(WorldData&);
 
 // J: elastic energies of the current state.
 double linkEnergy(const WorldData&);
-double surfaceEnergy(const WorldData&);  // edge springs and attachments; needs evaluateLinks at the current state
+double surfaceEnergy(const WorldData&);  // edges, attachments and pressure; of the last evaluateAttachments()
 
 }  // namespace medulla

@@ -8,17 +8,6 @@ namespace {
 Lanes3 gatherMotion(const Motion& m, const std::uint32_t* i, int part) {
   return gather(m[2 * i[0] + part], m[2 * i[1] + part], m[2 * i[2] + part], m[2 * i[3] + part]);
 }
-Lanes3 gatherNodes(const std::vector<Quad>& q, int i) {
-  return gather(q[i], q[i + 1], q[i + 2], q[i + 3]);
-}
-void storeNodes(const Lanes3& v, std::vector<Quad>& q, int i) {
-  Lanes a = v.x, b = v.y, c = v.z, d = splat(0);
-  transpose(a, b, c, d);
-  store(q[i], a);
-  store(q[i + 1], b);
-  store(q[i + 2], c);
-  store(q[i + 3], d);
-}
 
 void setFrameRates(const LinkGroup& g, const Motion& motion, LinkFrame& f) {
   const Lanes3 omega0 = gatherMotion(motion, g.sphere0, 1), omega1 = gatherMotion(motion, g.sphere1, 1);
@@ -92,13 +81,13 @@ void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried)
       const Lanes3 omega = fma(fma(d.nodes.groups[g].twistShare, h.spinAlong, h.spin0), h.n, h.turning);
       const Lanes3& offset = d.nodes.offset[g];
       const Lanes3 base = fma(along, h.lineVelocity, h.originVelocity);
-      storeNodes(fma(h.thicknessRate, offset, base + cross(omega, offset)), carried, 4 * g);
+      storeFour(fma(h.thicknessRate, offset, base + cross(omega, offset)), carried, 4 * g);
     }
   }
   for (const HostRange& range : d.nodes.onSpheres) {
     const Lanes3 v = splat(motion[2 * range.host]), omega = splat(motion[2 * range.host + 1]);
     for (int g = range.firstGroup; g < range.endGroup; ++g)
-      storeNodes(v + cross(omega, d.nodes.offset[g]), carried, 4 * g);
+      storeFour(v + cross(omega, d.nodes.offset[g]), carried, 4 * g);
   }
 }
 
@@ -109,11 +98,6 @@ void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& mot
     f.loadSum = f.loadAlong = f.loadMoment = none;
     f.loadTwist = f.loadThickness = zero;
   }
-  const auto put = [](Lanes3& to, int lane, Lanes from) {
-    to.x[lane] = from[0];
-    to.y[lane] = from[1];
-    to.z[lane] = from[2];
-  };
   for (const HostRange& range : d.nodes.onLinks) {
     LinkFrame& f = d.links.frames[range.host / 4];
     const int lane = range.host % 4;
@@ -123,25 +107,20 @@ void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& mot
     for (int g = range.firstGroup; g < range.endGroup; ++g) {
       const Lanes s = d.nodes.groups[g].along;
       const Lanes3& offset = d.nodes.offset[g];
-      const Lanes3 impulse = gatherNodes(impulses, 4 * g), turn = cross(offset, impulse);
+      const Lanes3 impulse = gatherFour(impulses, 4 * g), turn = cross(offset, impulse);
       sum = sum + impulse;
       along = fma(s, impulse, along);
       moment = moment + turn;
       twist = fma(d.nodes.groups[g].twistShare, dot(n, turn), twist);
       thickness = thickness + dot(offset, impulse);
     }
-    const Lanes first = sumOfLanes(sum, twist), second = sumOfLanes(along, thickness);
-    put(f.loadSum, lane, first);
-    put(f.loadAlong, lane, second);
-    put(f.loadMoment, lane, sumOfLanes(moment, zero));
-    f.loadTwist[lane] = first[3];
-    f.loadThickness[lane] = second[3];
+    setLoads(f, lane, sumOfLanes(sum, twist), sumOfLanes(along, thickness), sumOfLanes(moment, zero));
   }
   returnFromLinks(d, motion);
   for (const HostRange& range : d.nodes.onSpheres) {
     Lanes3 sum = none, moment = none;
     for (int g = range.firstGroup; g < range.endGroup; ++g) {
-      const Lanes3 impulse = gatherNodes(impulses, 4 * g);
+      const Lanes3 impulse = gatherFour(impulses, 4 * g);
       sum = sum + impulse;
       moment = moment + cross(d.nodes.offset[g], impulse);
     }

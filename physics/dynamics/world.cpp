@@ -76,8 +76,8 @@ bool isFinite(const WorldData& d, const BodyRange& r) {
     add(d.spheres.angularMomentum[i]);
   }
   for (int i : r.node) {
-    add(d.nodes.position[i]);
-    add(d.nodes.velocity[i]);
+    add(quadOf(vectorAt(d.nodes.position, i)));
+    add(quadOf(vectorAt(d.nodes.velocity, i)));
   }
   return sum == 0;
 }
@@ -86,11 +86,10 @@ void requireFinite(const WorldData& d, double time) {
   for (std::size_t b = 0; b < d.ranges.size(); ++b) {
     if (isFinite(d, d.ranges[b])) continue;
     const std::string cause =
-        d.substep > d.stableSubstep
+        d.settings.integrator == Integrator::explicitEuler && d.substep > d.stableSubstep
             ? fmt::format(
-                  "the substep of {:.3g} s is above the stable {:.3g} s: use more substeps, or lower Young's modulus "
-                  "or "
-                  "the damping ratio",
+                  "the substep of {:.3g} s is above the stable {:.3g} s: use more substeps, or lower Young's "
+                  "modulus or the damping ratio",
                   d.substep, d.stableSubstep)
             : fmt::format(
                   "it was deformed beyond what substeps of {:.3g} s follow: use more substeps, or lower the tools' "
@@ -200,7 +199,7 @@ void World::readFrame(DynamicsFrame& out) const {
     BodyFrame& f = out.bodies[b];
     f.nodes.resize(r.node.size());
     f.spheres.resize(r.sphereCount);
-    for (std::size_t i = 0; i < r.node.size(); ++i) f.nodes[i] = vectorOf(d.nodes.position[r.node[i]]);
+    for (std::size_t i = 0; i < r.node.size(); ++i) f.nodes[i] = vectorAt(d.nodes.position, r.node[i]);
     for (int i = 0; i < r.sphereCount; ++i) {
       const Quad& q = d.spheres.orientation[r.firstSphere + i];
       f.spheres[i].position = vectorOf(d.spheres.position[r.firstSphere + i]);
@@ -210,6 +209,7 @@ void World::readFrame(DynamicsFrame& out) const {
 }
 
 Energies World::energies() const {
+  evaluateAttachments(*data_);
   const WorldData& d = *data_;
   Energies e;
   e.elastic = linkEnergy(d) + surfaceEnergy(d);
@@ -221,8 +221,8 @@ Energies World::energies() const {
     e.gravity -= mass * g.dot(vectorOf(d.spheres.position[i]));
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
-    e.kinetic += 0.5 * d.nodes.mass[i] * vectorOf(d.nodes.velocity[i]).squaredNorm();
-    e.gravity -= d.nodes.mass[i] * g.dot(vectorOf(d.nodes.position[i]));
+    e.kinetic += 0.5 * d.nodes.mass[i] * vectorAt(d.nodes.velocity, i).squaredNorm();
+    e.gravity -= d.nodes.mass[i] * g.dot(vectorAt(d.nodes.position, i));
   }
   return e;
 }
@@ -230,7 +230,7 @@ Energies World::energies() const {
 double World::volumeRatio(int body) const {
   const BodyRange& r = data_->ranges.at(body);
   double volume = 0;
-  const auto x = [&](int node) { return vectorOf(data_->nodes.position[r.node[node]]); };
+  const auto x = [&](int node) { return vectorAt(data_->nodes.position, r.node[node]); };
   for (const auto& t : data_->bodies[body].model->triangles) volume += x(t[0]).dot(x(t[1]).cross(x(t[2]))) / 6;
   return volume / r.restVolume;
 }
@@ -238,7 +238,7 @@ double World::volumeRatio(int body) const {
 double World::nodeSpeed(int body) const {
   double squared = 0;
   for (int i : data_->ranges.at(body).node)
-    squared = std::max(squared, vectorOf(data_->nodes.velocity[i]).squaredNorm());
+    squared = std::max(squared, vectorAt(data_->nodes.velocity, i).squaredNorm());
   return std::sqrt(squared);
 }
 
@@ -262,8 +262,8 @@ std::uint64_t World::stateHash() const {
     }
     for (int k = r.firstLink; k < r.firstLink + r.linkCount; ++k) hash.add(d.links.unwoundTwist[k / 4].v[k % 4]);
     for (int i : r.node) {
-      hash.add(d.nodes.position[i], 3);
-      hash.add(d.nodes.velocity[i], 3);
+      hash.add(quadOf(vectorAt(d.nodes.position, i)), 3);
+      hash.add(quadOf(vectorAt(d.nodes.velocity, i)), 3);
     }
   }
   for (const CarriedImpulse& c : d.contact.carried) {

@@ -96,9 +96,8 @@ struct NodeGroup {    // constants of four nodes
   Lanes along;        // 0..1 on a link
   Lanes twistShare;   // 0..1 of the link's twist
   Lanes3 restOffset;  // m; on a link (0, component on U, component on V), on a sphere in its frame
-  Lanes3 restNormal;  // unit, in the offset's frame (on a link: along it, on U, on V); 0 on pads
+  Lanes3 restArea;    // m2, outward, in the offset's frame (on a link: along it, on U, on V); 0 on pads
   Lanes stiffness;    // N/m of the attachment; 0 on pads
-  Lanes area;         // m2; 0 on pads
 };
 
 struct HostRange {
@@ -114,13 +113,13 @@ struct GroupHost {
 };
 
 struct Nodes {
-  int count = 0;                          // with pads
-  std::vector<Quad> position, velocity;   // m, m/s
-  std::vector<Quad> force;                // N, of the current substep, weight apart; dynamic nodes only
-  std::vector<Lanes3> offset;             // m, per group: from the anchors' bases to them; of the current substep
-  std::vector<Lanes3> normal;             // of the surface at rest, carried along, per group; of the current substep
-  std::vector<Quad> displaced;            // m, from where the host would carry the node; of the current substep
-  std::vector<double> mass, inverseMass;  // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
+  int count = 0;                           // with pads
+  std::vector<Lanes3> position, velocity;  // m, m/s, per group, as all that a node shares with its host's nodes alone
+  std::vector<Lanes3> force;               // N, of the current substep, weight apart; dynamic nodes only
+  std::vector<Lanes3> offset;              // m, from the anchors' bases to them; of the current substep
+  std::vector<Lanes3> area;                // m2, of the surface at rest, carried along; of the current substep
+  std::vector<Quad> displaced;             // m, per node: from where the host would carry it; of the current substep
+  std::vector<double> mass, inverseMass;   // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
   std::vector<NodeGroup> groups;
   std::vector<GroupHost> groupHosts;
   std::vector<HostRange> onLinks, onSpheres;          // dynamic nodes (SurfaceMode::full), first in the arrays
@@ -128,16 +127,18 @@ struct Nodes {
   int dynamicEnd = 0;                                 // nodes [0, dynamicEnd) are dynamic
 };
 
-// ---- Edge springs between dynamic nodes; the last group is filled up with copies that have no stiffness.
+// ---- Edge springs between dynamic nodes, each listed at both of its nodes: sums without a store, and no spring waits
+// for what another one has just added to its node.
 
-struct SpringGroup {
-  std::uint32_t node0[4], node1[4];  // byte offsets into Nodes::displaced
-  Lanes stiffness;                   // N/m
+struct SpringGroup {       // one spring of each of four nodes of a group
+  std::uint32_t other[4];  // byte offsets into an array of quads, one per node; a node without so many: its own
+  Lanes stiffness;         // N/m; 0 there
 };
 
 struct Springs {
   int count = 0;
   std::vector<SpringGroup> groups;
+  std::vector<int> first;  // of each group of nodes, and one beyond
 };
 
 // ---- A body's share of the arrays.
