@@ -11,6 +11,7 @@ static World makeWorld(const LoadedScene& loaded) {
   WorldSettings settings;
   settings.gravity = scene.gravity;
   settings.ambientDrag = scene.ambientDrag;
+  settings.sleepAfter = scene.sleepAfter;
   settings.frameDuration = 1 / scene.dynamicsRate;
   settings.integrator = scene.integrator;
   settings.order = scene.order;

@@ -258,6 +258,7 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {"frequency=\"2\"", "frequency=\"0\"", R"(x.xml:13: <drive> frequency="0": expected 1 number > 0)"},
       {"ambient_drag=\"0.3\"", "ambient_drag=\"-1\"",
        R"(x.xml:5: <dynamics> ambient_drag="-1": expected 1 number >= 0)"},
+      {"sleep_after=\"0.5\"", "sleep_after=\"-1\"", R"(x.xml:5: <dynamics> sleep_after="-1": expected 1 number >= 0)"},
       {"\"explicit\"", "\"mixed\"",
        R"(x.xml:5: <dynamics> integrator="mixed": unknown value; known: "explicit", "implicit")"},
       {"order=\"1\"", "order=\"3\"", R"(x.xml:5: <dynamics> order="3": unknown value; known: "1", "2")"},

@@ -120,10 +120,8 @@ class LogRecorder {
     const ServoRecord& record = simulation.record();
     row_.bodies.resize(world.bodies().size());
     for (std::size_t b = 0; b < row_.bodies.size(); ++b) {
-      const BodyDescription& body = world.bodies()[b];
       row_.bodies[b].volumeRatio = world.volumeRatio(static_cast<int>(b));
-      row_.bodies[b].dynamicNodes =
-          body.surface == SurfaceMode::full ? static_cast<int>(body.model->restNodes.size()) : 0;
+      row_.bodies[b].dynamicNodes = world.dynamicNodes(static_cast<int>(b));
     }
     row_.energies = world.energies();
     row_.impulseMismatch = simulation.lastImpulseMismatch();

@@ -11,7 +11,7 @@ namespace medulla {
 
 struct LogBody {
   double volumeRatio = 1;  // enclosed volume over rest
-  int dynamicNodes = 0;    // surface nodes that are masses of their own
+  int dynamicNodes = 0;    // surface nodes that are masses of their own, and awake
 };
 
 // One line of the log: the state at one moment. Everything in it follows from scene and trajectory alone, so that two

@@ -92,6 +92,7 @@ void readDynamics(const XmlElement& dynamics, Scene& scene) {
     refuse(dynamics, "order", "expected 1 with integrator=\"explicit\": order 2 needs integrator=\"implicit\"");
   scene.gravity = readVector(dynamics, "gravity", scene.gravity);
   scene.ambientDrag = readNumber(dynamics, "ambient_drag", scene.ambientDrag, notNegative);
+  scene.sleepAfter = readNumber(dynamics, "sleep_after", scene.sleepAfter, notNegative);
   scene.substeps = readInteger(dynamics, "substeps", scene.substeps, {0, 100000});
   constexpr ContactMode modes[] = {ContactMode::none, ContactMode::balls, ContactMode::swept};
   scene.contact = modes[readChoice(dynamics, "contact", {"none", "balls", "swept"}, 1)];

@@ -18,7 +18,7 @@ const XmlRules& sceneRules() {
         {"light", 0, 1},
         {"output", 0, 1}}},
       {"clock", {"duration"}, {"servo", "dynamics"}, {}},
-      {"dynamics", {}, {"integrator", "order", "gravity", "ambient_drag", "substeps", "contact"}, {}},
+      {"dynamics", {}, {"integrator", "order", "gravity", "ambient_drag", "substeps", "contact", "sleep_after"}, {}},
       {"tissue", {"name"}, {"young", "poisson", "density", "damping", "friction"}, {}},
       {"body",
        {"name", "model", "tissue", "look"},

@@ -56,8 +56,9 @@ RigidMotion rigidMotionOf(const Spheres& s, const BodyRange& r) {
 // Implicit, so that no alpha is too much for a step. Spins and nodes follow through links and attachments.
 void dampBodies(WorldData& d) {
   Spheres& s = d.spheres;
-  for (const BodyRange& r : d.ranges) {
-    if (r.massDamping == 0) continue;
+  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
+    const BodyRange& r = d.ranges[b];
+    if (r.massDamping == 0 || d.rest[b].asleep) continue;
     const double lost = 1 - 1 / (1 + d.substep * r.massDamping);
     const Lanes zero = splat(0);
     const RigidMotion motion = r.held ? RigidMotion{zero, zero, zero} : rigidMotionOf(s, r);

@@ -98,6 +98,8 @@ struct ContactData {
 
   // State: the impulses that the last substep ended with, ascending in key; the next one starts from them.
   std::vector<CarriedImpulse> carried;
+  std::vector<CarriedImpulse> resting;  // those of contacts of bodies that sleep, likewise
+  bool listsAreOld = false;             // whatever the balls have moved: bodies fell asleep or woke
 
   PenetrationReport penetration;
   std::vector<BodyOverlap> startOverlaps;

@@ -74,7 +74,7 @@ void findContacts(WorldData& d) {
   ContactData& c = d.contact;
   placeBalls(d);
   double moved = farthestMove(c);
-  if (!(moved <= c.freeMove)) {
+  if (c.listsAreOld || !(moved <= c.freeMove)) {
     listNeighbours(d);
     moved = 0;
   }

@@ -81,8 +81,10 @@ class PairList {  // fills groups of four
 
 }  // namespace
 
-// Pairs of overlapping boxes that may meet, in place; both lists ascend, so that exclusion is one walk.
-static void dropPairsThatNeverMeet(ContactData& c, std::vector<BoxPair>& pairs) {
+// Pairs of overlapping boxes that may meet, now that some bodies sleep, in place; both lists ascend, so that exclusion
+// is one walk.
+static void dropPairsThatNeverMeet(const WorldData& d, std::vector<BoxPair>& pairs) {
+  const ContactData& c = d.contact;
   const std::size_t bodies = c.rootFriction.size();
   std::size_t kept = 0, e = 0;
   std::uint32_t current = 0;
@@ -90,6 +92,7 @@ static void dropPairsThatNeverMeet(ContactData& c, std::vector<BoxPair>& pairs) 
     const Collider &a = c.colliders[p.first], &b = c.colliders[p.second];
     if (p.first != current) e = 0;
     current = p.first;
+    if (d.rest[a.body].asleep && d.rest[b.body].asleep) continue;
     if (a.body == b.body) {
       const std::vector<std::uint32_t>& excluded = c.excluded[p.first];
       while (e < excluded.size() && excluded[e] < p.second) ++e;
@@ -108,7 +111,7 @@ void listNeighbours(WorldData& d) {
   placeBoxes(c);
   findOverlaps(c.boxes, c.broadPhase);
   std::vector<BoxPair>& pairs = c.broadPhase.pairs;
-  dropPairsThatNeverMeet(c, pairs);
+  dropPairsThatNeverMeet(d, pairs);
   PairList list(c.pairs);
   for (std::size_t k = 0; k < pairs.size(); k += 4) {
     PairGroup g{};
@@ -122,7 +125,8 @@ void listNeighbours(WorldData& d) {
     for (std::size_t l = 0; l < count; ++l)
       if (gap[l] <= c.margin) list.add(g.collider0[l], g.collider1[l], gap[l]);
   }
-  listStaticNeighbours(c);
+  listStaticNeighbours(d);
+  c.listsAreOld = false;
 }
 
 }  // namespace medulla

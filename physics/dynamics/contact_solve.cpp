@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "physics/dynamics/contact_stages.h"
+#include "physics/dynamics/stages.h"
 
 // The impulses of contact: damped elastic springs taken implicitly, one after another in a fixed order (sequential
 // impulses; Catto, "Soft constraints", GDC 2011), so that their stiffness does not bound the step. With mass m, omega
@@ -242,6 +243,7 @@ void solveContacts(WorldData& d) {
     kept.key = contact.key;
     store(kept.impulse, impulseOf(contact));
   }
+  wakeTouched(d);
 }
 
 }  // namespace medulla

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <vector>
 
 #include "physics/dynamics/contact_geometry.h"
@@ -16,12 +18,15 @@ void layOutContact(WorldData& d, const std::vector<StaticShape>& statics);
 void placeBalls(WorldData& d);              // ContactData::ball at the current state
 double farthestMove(const ContactData& c);  // m, of any ball since the lists were made
 void listNeighbours(WorldData& d);          // both lists anew, at ContactData::ball
-void listStaticNeighbours(ContactData& c);  // contact_static.cpp: the part of it that concerns static shapes
+void listStaticNeighbours(WorldData& d);    // contact_static.cpp: the part of it that concerns static shapes
 
 // Appends a contact for every pair that overlaps or might before the substep's end; ascending in key. `moved` is
 // farthestMove() or more.
 void findPairContacts(WorldData& d, double moved);    // contact_find.cpp
 void findStaticContacts(WorldData& d, double moved);  // contact_static.cpp
+
+// The body of a contact's first side; of its second side, -1 where that is a static shape.
+std::array<int, 2> bodiesOf(const WorldData& d, std::uint64_t key);
 
 void findContacts(WorldData& d);  // contact_find.cpp: ContactData::contacts at the present state
 

@@ -10,6 +10,14 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr std::uint64_t kStaticKey = std::uint64_t{1} << 63;
+
+int bodyOfSphere(const WorldData& d, std::uint32_t sphere) {
+  const auto after = std::upper_bound(d.ranges.begin(), d.ranges.end(), static_cast<int>(sphere),
+                                      [](int i, const BodyRange& r) { return i < r.firstSphere; });
+  return static_cast<int>(after - d.ranges.begin()) - 1;
+}
+
 struct Nearest {
   double distance;  // m, of the ball's centre from the surface; < 0 behind it
   Vector3d normal;  // unit, world, away from the shape
@@ -112,13 +120,10 @@ Touches touchesOf(const SurfaceTree& tree, const TriangleDistance* begin, const 
 void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int ordinal) {
   ContactData& c = d.contact;
   const Quad& ball = c.ball[n.sphere];
-  const int body = static_cast<int>(std::upper_bound(d.ranges.begin(), d.ranges.end(), static_cast<int>(n.sphere),
-                                                     [](int i, const BodyRange& r) { return i < r.firstSphere; }) -
-                                    d.ranges.begin()) -
-                   1;
+  const int body = bodyOfSphere(d, n.sphere);
   Contact& contact = c.contacts.emplace_back();
-  contact.key = std::uint64_t{1} << 63 | std::uint64_t{n.shape} << 34 | std::uint64_t{n.sphere} << 2 |
-                static_cast<std::uint64_t>(ordinal);
+  contact.key =
+      kStaticKey | std::uint64_t{n.shape} << 34 | std::uint64_t{n.sphere} << 2 | static_cast<std::uint64_t>(ordinal);
   contact.gap = at.distance - ball.v[3];
   contact.smallerRadius = ball.v[3];
   contact.normal = Lanes{at.normal.x(), at.normal.y(), at.normal.z(), 0};
@@ -133,13 +138,20 @@ void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int o
 
 }  // namespace
 
-void listStaticNeighbours(ContactData& c) {
+std::array<int, 2> bodiesOf(const WorldData& d, std::uint64_t key) {
+  const std::vector<Collider>& colliders = d.contact.colliders;
+  if (key & kStaticKey) return {bodyOfSphere(d, static_cast<std::uint32_t>(key >> 2)), -1};
+  return {colliders[key >> 32].body, colliders[key & 0xffffffff].body};
+}
+
+void listStaticNeighbours(WorldData& d) {
+  ContactData& c = d.contact;
   c.staticNeighbours.clear();
   c.nearTriangles.clear();
   for (std::uint32_t k = 0; k < c.statics.size(); ++k) {
     const StaticContactShape& shape = c.statics[k];
     for (std::uint32_t i = 0; i < c.ball.size(); ++i) {
-      if (c.inverseCellMass[i] == 0) continue;  // fixed, or a pad
+      if (c.inverseCellMass[i] == 0 || d.rest[bodyOfSphere(d, i)].asleep) continue;  // fixed or a pad, or asleep
       const Vector3d p = vectorOf(c.ball[i]);
       const double radius = c.ball[i].v[3];
       const int first = static_cast<int>(c.nearTriangles.size());

@@ -271,6 +271,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
   addSprings(d, mechanics);
   for (std::size_t b = 0; b < d.bodies.size(); ++b) addDrives(d, d.bodies[b], d.ranges[b]);
   listSlots(d);
+  layOutRest(d);
   refreshAngularVelocities(d);
   evaluateLinks(d);
   placeSkin(d);

@@ -246,14 +246,14 @@ void storeVectors(const Lanes3& v, Quad& q0, Quad& q1, Quad& q2, Quad& q3) {
 }  // namespace
 
 void evaluateLinks(WorldData& d) {
-  for (std::size_t g = 0; g < d.links.groups.size(); ++g)
+  for (const int g : d.awake.linkGroups)
     evaluateGroup(d.links.groups[g], d.spheres, d.links.unwoundTwist[g], d.links.frames[g]);
 }
 
 // The transpose of the anchors' velocities x' = v0 + s v + (turning + n spin(s)) x r: what a load g at the anchor does
 // per unit of each sphere's velocity. Loads are minus the forces on the nodes.
 void returnLinkForces(WorldData& d) {
-  for (std::size_t g = 0; g < d.links.groups.size(); ++g) {
+  for (const int g : d.awake.linkGroups) {
     const LinkFrame& f = d.links.frames[g];
     const Lanes twistOfNodes = dot(f.n, f.loadMoment);
     const Lanes moment0 = f.twistMoment - (twistOfNodes - f.loadTwist);

@@ -56,10 +56,10 @@ void storeAngularVelocity(const SphereGroup& g, const Turning& t, Quad* out) {
 }
 
 // Nodes without an inverse mass, fixed or pads, do not fall either.
-void stepNodes(Nodes& n, const Quad& gravity, double h) {
+void stepNodes(Nodes& n, const std::vector<int>& groups, const Quad& gravity, double h) {
   const Lanes zero = splat(0);
   const Lanes3 fall = splat(h) * splat(gravity);
-  for (int g = 0; g < n.dynamicEnd / 4; ++g) {
+  for (const int g : groups) {
     const Lanes perMass = _mm256_loadu_pd(&n.inverseMass[4 * g]), moves = isLess(zero, perMass);
     const Lanes3 falling{_mm256_and_pd(moves, fall.x), _mm256_and_pd(moves, fall.y), _mm256_and_pd(moves, fall.z)};
     put(fma(splat(h) * perMass, n.force[g], n.velocity[g] + falling), n.velocity[g]);
@@ -71,7 +71,7 @@ void stepNodes(Nodes& n, const Quad& gravity, double h) {
 void sumSphereForces(WorldData& d) {
   Spheres& s = d.spheres;
   const Lanes gravity = load(d.gravity);
-  for (int i = 0; i < s.count; ++i) {
+  for (const int i : d.awake.spheres) {
     Lanes force = fma(splat(s.groups[i / 4].mass[i % 4]), gravity, load(s.force[i]));
     Lanes torque = load(s.torque[i]);
     for (int k = s.firstSlot[i]; k < s.firstSlot[i + 1]; ++k) {
@@ -87,31 +87,30 @@ void sumSphereForces(WorldData& d) {
 void stepVelocities(WorldData& d) {
   Spheres& s = d.spheres;
   const Lanes h = splat(d.substep);
-  for (int i = 0; i < s.count; ++i) {
+  for (const int i : d.awake.spheres) {
     const SphereGroup& g = s.groups[i / 4];
     store(s.velocity[i], fma(h * splat(g.inverseMass[i % 4]), load(s.force[i]), load(s.velocity[i])));
     store(s.angularMomentum[i], fma(h * splat(g.freeToTurn[i % 4]), load(s.torque[i]), load(s.angularMomentum[i])));
   }
-  stepNodes(d.nodes, d.gravity, d.substep);
+  stepNodes(d.nodes, d.awake.nodeGroups, d.gravity, d.substep);
 }
 
 void stepPositions(WorldData& d) {
   Spheres& s = d.spheres;
   const Lanes h = splat(d.substep);
-  for (int i = 0; i < s.count; ++i) store(s.position[i], fma(h, load(s.velocity[i]), load(s.position[i])));
-  for (std::size_t g = 0; g < s.groups.size(); ++g) {
+  for (const int i : d.awake.spheres) store(s.position[i], fma(h, load(s.velocity[i]), load(s.position[i])));
+  for (const int g : d.awake.sphereGroups) {
     Turning t = readTurning(s, 4 * g);
     turn(s.groups[g], t, h);
     storeQuads(t.q.x, t.q.y, t.q.z, t.w, &s.orientation[4 * g]);
   }
   refreshAngularVelocities(d);
-  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g)
-    put(fma(h, d.nodes.velocity[g], d.nodes.position[g]), d.nodes.position[g]);
+  for (const int g : d.awake.nodeGroups) put(fma(h, d.nodes.velocity[g], d.nodes.position[g]), d.nodes.position[g]);
 }
 
 void refreshAngularVelocities(WorldData& d) {
   Spheres& s = d.spheres;
-  for (std::size_t g = 0; g < s.groups.size(); ++g)
+  for (const int g : d.awake.sphereGroups)
     storeAngularVelocity(s.groups[g], readTurning(s, 4 * g), &s.angularVelocity[4 * g]);
 }
 

@@ -27,6 +27,16 @@ void applyLoads(WorldData&, const Loads& loads, double remaining, std::vector<Ei
 void resolveContacts(WorldData&);
 void stepPositions(WorldData&);
 
+// sleep.cpp
+void layOutRest(WorldData&);  // all bodies awake
+// At the end of a frame: bodies that have kept still for long enough, with all that they touch, fall asleep. `loads`
+// are the frame's: what tools hold stays awake.
+void fallAsleep(WorldData&, const Loads& loads);
+// A body and all that rests on it or bears it; their contacts go on with the impulses they had. No effect on the awake.
+void wake(WorldData&, int body);
+void wakeLoaded(WorldData&, const Loads& loads);  // the bodies that tools touch
+void wakeTouched(WorldData&);                     // those that bodies awake press on in this substep
+
 // All forces of the current state, left in Spheres::force, torque and Nodes::force.
 inline void evaluateForces(WorldData& d) {
   evaluateLinks(d);

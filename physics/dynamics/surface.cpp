@@ -113,14 +113,15 @@ void evaluateAttachments(WorldData& d) {
     store(d.spheres.force[i], zero);
     store(d.spheres.torque[i], zero);
   }
-  for (BodyRange& r : d.ranges) r.swollen = 0;
-  for (const HostRange& range : d.nodes.onLinks) pullOnLink(d, range);
-  for (const HostRange& range : d.nodes.onSpheres) pullOnSphere(d, range);
+  for (std::size_t b = 0; b < d.ranges.size(); ++b)
+    if (!d.rest[b].asleep) d.ranges[b].swollen = 0;
+  for (const HostRange& range : d.awake.onLinks) pullOnLink(d, range);
+  for (const HostRange& range : d.awake.onSpheres) pullOnSphere(d, range);
 }
 
 void finishNodeForces(WorldData& d) {
-  for (const HostRange& range : d.nodes.onLinks) returnToLink(d, range);
-  for (const HostRange& range : d.nodes.onSpheres) returnToSphere(d, range);
+  for (const HostRange& range : d.awake.onLinks) returnToLink(d, range);
+  for (const HostRange& range : d.awake.onSpheres) returnToSphere(d, range);
 }
 
 void placeSkin(WorldData& d) {

@@ -27,6 +27,8 @@ void checkSettings(const WorldSettings& s) {
   if (!(s.frameDuration > 0) || !std::isfinite(s.frameDuration))
     throw std::runtime_error(fmt::format("the dynamics frame lasts {} s: expected more than 0", s.frameDuration));
   if (s.substeps < 0) throw std::runtime_error(fmt::format("{} substeps: expected 0 (automatic) or more", s.substeps));
+  if (!(s.sleepAfter >= 0))
+    throw std::runtime_error(fmt::format("bodies sleep after {} s: expected 0 or more", s.sleepAfter));
   if (!s.gravity.allFinite()) throw std::runtime_error("gravity is not finite");
   if (!(s.ambientDrag >= 0) || !std::isfinite(s.ambientDrag))
     throw std::runtime_error(fmt::format("the ambient drag is {} /s: expected 0 or more", s.ambientDrag));
@@ -44,6 +46,7 @@ void checkLoads(const WorldData& d, const Loads& loads) {
 }
 
 void step(WorldData& d, const Loads& loads, double remaining, FrameReport& report) {
+  if (d.awake.bodies == 0) return;
   if (d.settings.integrator == Integrator::implicit) {
     dragVelocities(d);
     stepImplicitly(d, loads, remaining, report.toolImpulse);
@@ -181,8 +184,10 @@ FrameReport World::advance(const Loads& loads) {
   for (const HeldNode& held : loads.heldNodes) tools = std::max(tools, held.tool + 1);
   report.toolImpulse.assign(tools, Eigen::Vector3d::Zero());
   d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Eigen::Vector3d::Zero());
+  wakeLoaded(d, loads);
   for (int k = 1; k <= d.substeps; ++k) step(d, loads, (d.substeps - k) * d.substep, report);
   ++d.frame;
+  fallAsleep(d, loads);
   // The frames that readers hang nodes on are those of the state at the end.
   evaluateLinks(d);
   placeSkin(d);
@@ -242,6 +247,11 @@ double World::nodeSpeed(int body) const {
   return std::sqrt(squared);
 }
 
+int World::dynamicNodes(int body) const {
+  const bool moves = data_->bodies[body].surface == SurfaceMode::full && !data_->rest[body].asleep;
+  return moves ? static_cast<int>(data_->ranges[body].node.size()) : 0;
+}
+
 PenetrationReport World::penetration() const {
   return data_->contact.penetration;
 }
@@ -266,9 +276,16 @@ std::uint64_t World::stateHash() const {
       hash.add(quadOf(vectorAt(d.nodes.velocity, i)), 3);
     }
   }
-  for (const CarriedImpulse& c : d.contact.carried) {
-    hash.add(std::bit_cast<double>(c.key));
-    hash.add(c.impulse, 3);
+  for (const std::vector<CarriedImpulse>* impulses : {&d.contact.carried, &d.contact.resting}) {
+    for (const CarriedImpulse& c : *impulses) {
+      hash.add(std::bit_cast<double>(c.key));
+      hash.add(c.impulse, 3);
+    }
+  }
+  for (const Rest& r : d.rest) hash.add(r.asleep ? -1.0 : r.stillFrames);
+  for (const StillPlace& place : d.stillPlace) {
+    hash.add(place.position, 3);
+    hash.add(place.orientation, 4);
   }
   return hash.value();
 }

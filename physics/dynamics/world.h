@@ -82,6 +82,10 @@ struct WorldSettings {
   int order = 1;     // of the implicit integrator, 1 or 2
   int substeps = 0;  // per dynamics frame; 0: as many as the stability estimate asks for, implicit: of 5 ms at most
   ContactMode contact = ContactMode::none;
+  // s, >= 0: a body that has kept still for this long, within 1 % of its spheres' mean radius, sleeps, with all that it
+  // touches; it wakes when a tool or a body awake touches it. 0: none ever sleeps, so that what creeps goes on to
+  // creep. Without effect on the implicit integrator.
+  double sleepAfter = 0;
 };
 
 // Sums over one dynamics frame, for logs and tests.
@@ -119,6 +123,7 @@ class World {
   Energies energies() const;
   double volumeRatio(int body) const;  // enclosed by the nodes, over rest
   double nodeSpeed(int body) const;    // m/s, of the fastest node
+  int dynamicNodes(int body) const;    // that moved by themselves in the last frame: none on a skin or asleep
   // What contact has let through so far; who overlapped before anything moved, each pair of bodies once, in order.
   PenetrationReport penetration() const;
   const std::vector<BodyOverlap>& startOverlaps() const;

@@ -154,6 +154,24 @@ struct BodyRange {
   bool held = false;       // some sphere is fixed: deformation is motion against it rather than against a rigid motion
 };
 
+// ---- Bodies at rest sleep: nothing of them is evaluated until they wake.
+
+struct Rest {  // of a body; state
+  bool asleep = false;
+  int stillFrames = 0;  // in a row, with every sphere near where it was at the first of them
+};
+
+struct StillPlace {  // where a sphere was at the first frame of Rest::stillFrames
+  Quad position, orientation;
+};
+
+// What the stages of an explicit step run over: all that belongs to bodies awake, in the arrays' order.
+struct Awake {
+  int bodies = 0;
+  std::vector<int> spheres, sphereGroups, linkGroups, nodeGroups;  // groups: with anything awake in them
+  std::vector<HostRange> onLinks, onSpheres;
+};
+
 // A driven sphere; DrivenSphere with everything in world units.
 struct SphereDrive {
   int sphere = 0;
@@ -179,6 +197,9 @@ struct WorldData {
   Links links;
   Nodes nodes;
   Springs springs;
+  std::vector<Rest> rest;              // per body
+  std::vector<StillPlace> stillPlace;  // per sphere; state
+  Awake awake;
   std::vector<SphereDrive> drives;
   std::vector<NodeForce> deadLoads;  // body after body, as described
   ContactData contact;

@@ -1,0 +1,182 @@
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numeric>
+
+#include "physics/dynamics/contact_stages.h"
+#include "physics/dynamics/stages.h"
+
+// Bodies that have come to rest are left alone, together with all that touches them (islands, as in Box2D): what lies
+// still needs no model. Stillness is one of place, not of speed: contacts that bear a heap chatter by micrometres at
+// millimetres per second.
+namespace medulla {
+
+namespace {
+
+constexpr double kStill = 0.01;  // of the body's mean radius, which no sphere's surface may have moved by
+
+double meanRadius(const SoftBodyModel& m) {
+  double sum = 0;
+  for (const FillingSphere& s : m.spheres) sum += s.radius;
+  return sum / static_cast<double>(m.spheres.size());
+}
+
+// Whether every sphere is where it was at the first of the frames counted so far.
+bool keepsStill(const WorldData& d, std::size_t body) {
+  const BodyRange& r = d.ranges[body];
+  const double within = kStill * meanRadius(*d.bodies[body].model);
+  for (int i = 0; i < r.sphereCount; ++i) {
+    const StillPlace& from = d.stillPlace[r.firstSphere + i];
+    const Lanes moved = load(d.spheres.position[r.firstSphere + i]) - load(from.position);
+    const double cosine = dotProduct(load(d.spheres.orientation[r.firstSphere + i]), load(from.orientation));
+    const double turned = 2 * std::sqrt(std::max(0.0, 1 - cosine * cosine)) * d.bodies[body].model->spheres[i].radius;
+    if (dotProduct(moved, moved) + turned * turned > within * within) return false;
+  }
+  return true;
+}
+
+void countStillFrames(WorldData& d, const std::vector<char>& busy) {
+  for (std::size_t b = 0; b < d.rest.size(); ++b) {
+    Rest& rest = d.rest[b];
+    if (rest.asleep) continue;
+    if (!busy[b] && rest.stillFrames > 0 && keepsStill(d, b)) {
+      ++rest.stillFrames;
+      continue;
+    }
+    rest.stillFrames = busy[b] ? 0 : 1;
+    const BodyRange& r = d.ranges[b];
+    for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i)
+      d.stillPlace[i] = {d.spheres.position[i], d.spheres.orientation[i]};
+  }
+}
+
+// Bodies that something outside acts on.
+std::vector<char> busyBodies(const WorldData& d, const Loads& loads) {
+  std::vector<char> busy(d.bodies.size(), 0);
+  for (std::size_t b = 0; b < d.bodies.size(); ++b)
+    if (!d.bodies[b].driven.empty() || !d.bodies[b].deadLoads.empty()) busy[b] = 1;
+  for (const ToolSpring& t : loads.toolSprings) busy[t.body] = 1;
+  for (const HeldNode& held : loads.heldNodes) busy[held.body] = 1;
+  return busy;
+}
+
+// Per body, the first body of its island: those that contacts join.
+std::vector<int> islandsOf(const WorldData& d, const std::vector<CarriedImpulse>& impulses) {
+  std::vector<int> first(d.bodies.size());
+  std::iota(first.begin(), first.end(), 0);
+  const auto rootOf = [&first](int b) {
+    while (first[b] != b) b = first[b] = first[first[b]];
+    return b;
+  };
+  for (const CarriedImpulse& c : impulses) {
+    const auto [a, b] = bodiesOf(d, c.key);
+    if (b < 0) continue;
+    const int rootA = rootOf(a), rootB = rootOf(b);
+    first[std::max(rootA, rootB)] = std::min(rootA, rootB);
+  }
+  for (std::size_t b = 0; b < first.size(); ++b) first[b] = rootOf(static_cast<int>(b));
+  return first;
+}
+
+void listAwake(WorldData& d) {
+  Awake& a = d.awake;
+  a = {};
+  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
+    const BodyRange& r = d.ranges[b];
+    if (d.rest[b].asleep) continue;
+    ++a.bodies;
+    for (int i = 0; i < r.sphereCount; ++i) {
+      a.spheres.push_back(r.firstSphere + i);
+      const int group = (r.firstSphere + i) / 4;
+      if (a.sphereGroups.empty() || a.sphereGroups.back() != group) a.sphereGroups.push_back(group);
+    }
+    for (int k = 0; k < r.linkCount; ++k) {
+      const int group = (r.firstLink + k) / 4;
+      if (a.linkGroups.empty() || a.linkGroups.back() != group) a.linkGroups.push_back(group);
+    }
+  }
+  const auto list = [&](const std::vector<HostRange>& from, std::vector<HostRange>& to) {
+    for (const HostRange& range : from) {
+      if (d.rest[range.body].asleep) continue;
+      to.push_back(range);
+      for (int g = range.firstGroup; g < range.endGroup; ++g) a.nodeGroups.push_back(g);
+    }
+  };
+  list(d.nodes.onLinks, a.onLinks);
+  list(d.nodes.onSpheres, a.onSpheres);
+  d.contact.listsAreOld = true;
+}
+
+void stop(WorldData& d, const BodyRange& r) {
+  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i)
+    d.spheres.velocity[i] = d.spheres.angularMomentum[i] = d.spheres.angularVelocity[i] = {};
+  for (const int i : r.node) setVector(d.nodes.velocity, i, Eigen::Vector3d::Zero());
+}
+
+// Moves the impulses of contacts of bodies that are `asleep`, or are not. Both lists ascend in key and go on to.
+void moveImpulses(const WorldData& d, bool asleep, std::vector<CarriedImpulse>& from, std::vector<CarriedImpulse>& to) {
+  std::vector<CarriedImpulse> moved, all;
+  std::erase_if(from, [&](const CarriedImpulse& c) {
+    if (d.rest[bodiesOf(d, c.key)[0]].asleep != asleep) return false;
+    moved.push_back(c);
+    return true;
+  });
+  std::merge(to.begin(), to.end(), moved.begin(), moved.end(), std::back_inserter(all),
+             [](const CarriedImpulse& a, const CarriedImpulse& b) { return a.key < b.key; });
+  to = std::move(all);
+}
+
+}  // namespace
+
+void layOutRest(WorldData& d) {
+  d.rest.resize(d.bodies.size());
+  d.stillPlace.resize(d.spheres.position.size());
+  listAwake(d);
+}
+
+void fallAsleep(WorldData& d, const Loads& loads) {
+  if (d.settings.integrator == Integrator::implicit || d.settings.sleepAfter == 0 || d.awake.bodies == 0) return;
+  countStillFrames(d, busyBodies(d, loads));
+  const double enough = d.settings.sleepAfter / d.settings.frameDuration;
+  const auto isTired = [enough](const Rest& r) { return !r.asleep && r.stillFrames > enough; };
+  if (std::none_of(d.rest.begin(), d.rest.end(), isTired)) return;
+  const std::vector<int> island = islandsOf(d, d.contact.carried);
+  std::vector<char> sleeps(d.bodies.size(), 1);  // by the island's first body
+  for (std::size_t b = 0; b < island.size(); ++b)
+    if (!isTired(d.rest[b])) sleeps[island[b]] = 0;
+  bool any = false;
+  for (std::size_t b = 0; b < island.size(); ++b) {
+    if (!sleeps[island[b]]) continue;
+    any = d.rest[b].asleep = true;
+    stop(d, d.ranges[b]);
+  }
+  if (!any) return;
+  moveImpulses(d, true, d.contact.carried, d.contact.resting);
+  evaluateLinks(d);  // once more, for the nodes that hang on them: without speed
+  listAwake(d);
+}
+
+void wake(WorldData& d, int body) {
+  if (!d.rest[body].asleep) return;
+  const std::vector<int> island = islandsOf(d, d.contact.resting);
+  for (std::size_t b = 0; b < island.size(); ++b)
+    if (island[b] == island[body]) d.rest[b] = {};
+  moveImpulses(d, false, d.contact.resting, d.contact.carried);
+  listAwake(d);
+}
+
+void wakeLoaded(WorldData& d, const Loads& loads) {
+  for (const ToolSpring& t : loads.toolSprings) wake(d, t.body);
+  for (const HeldNode& held : loads.heldNodes) wake(d, held.body);
+}
+
+void wakeTouched(WorldData& d) {
+  if (d.awake.bodies == static_cast<int>(d.bodies.size())) return;
+  std::vector<int> touched;
+  for (const CarriedImpulse& c : d.contact.carried)
+    for (const int body : bodiesOf(d, c.key))
+      if (body >= 0 && d.rest[body].asleep) touched.push_back(body);
+  for (const int body : touched) wake(d, body);
+}
+
+}  // namespace medulla
