@@ -195,11 +195,11 @@ inline void setLane(Lanes3& to, int lane, const Eigen::Vector3d& a) {
 }
 
 // Vectors four to a group: the i-th of them all.
-inline Eigen::Vector3d vectorAt(const std::vector<Lanes3>& groups, int i) {
-  return vectorOf(groups[i / 4], i % 4);
+inline Eigen::Vector3d vectorAt(const std::vector<Lanes3>& groups, std::uint32_t i) {
+  return vectorOf(groups[i / 4], static_cast<int>(i % 4));
 }
-inline void setVector(std::vector<Lanes3>& groups, int i, const Eigen::Vector3d& a) {
-  setLane(groups[i / 4], i % 4, a);
+inline void setVector(std::vector<Lanes3>& groups, std::uint32_t i, const Eigen::Vector3d& a) {
+  setLane(groups[i / 4], static_cast<int>(i % 4), a);
 }
 // The four that begin at i between an array of quads and lanes.
 inline Lanes3 gatherFour(const std::vector<Quad>& q, std::size_t i) {

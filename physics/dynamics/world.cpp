@@ -65,13 +65,27 @@ void step(WorldData& d, const Loads& loads, double remaining, FrameReport& repor
 }
 
 // Beyond 1e4 (m, m/s) counts as infinite: a step that diverges passes there within one frame, and nothing downstream
-// is made for such numbers.
-bool isFinite(const WorldData& d, const BodyRange& r) {
+// is made for such numbers. 0, or not a number.
+Lanes zeroIfFinite(Lanes a) {
   constexpr double kOverflow = 1.8e304;
-  double sum = 0;  // of zeros, unless something is not finite
-  const auto add = [&sum](const Quad& q) {
-    for (double v : q.v) sum += 0 * (kOverflow * v);
-  };
+  return splat(0) * (splat(kOverflow) * a);
+}
+
+bool isFinite(const WorldData& d) {
+  const Lanes zero = splat(0);
+  Lanes3 nodes{zero, zero, zero};
+  for (const std::vector<Lanes3>* all : {&d.nodes.position, &d.nodes.velocity})
+    for (const Lanes3& a : *all) nodes = nodes + Lanes3{zeroIfFinite(a.x), zeroIfFinite(a.y), zeroIfFinite(a.z)};
+  Lanes sum = nodes.x + nodes.y + nodes.z;
+  for (const std::vector<Quad>* all :
+       {&d.spheres.position, &d.spheres.velocity, &d.spheres.orientation, &d.spheres.angularMomentum})
+    for (const Quad& q : *all) sum = sum + zeroIfFinite(load(q));
+  return sumOfLanes(sum) == 0;
+}
+
+bool isFinite(const WorldData& d, const BodyRange& r) {
+  Lanes sum = splat(0);
+  const auto add = [&sum](const Quad& q) { sum = sum + zeroIfFinite(load(q)); };
   for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
     add(d.spheres.position[i]);
     add(d.spheres.velocity[i]);
@@ -82,10 +96,11 @@ bool isFinite(const WorldData& d, const BodyRange& r) {
     add(quadOf(vectorAt(d.nodes.position, i)));
     add(quadOf(vectorAt(d.nodes.velocity, i)));
   }
-  return sum == 0;
+  return sumOfLanes(sum) == 0;
 }
 
 void requireFinite(const WorldData& d, double time) {
+  if (isFinite(d)) return;
   for (std::size_t b = 0; b < d.ranges.size(); ++b) {
     if (isFinite(d, d.ranges[b])) continue;
     const std::string cause =
@@ -234,10 +249,12 @@ Energies World::energies() const {
 
 double World::volumeRatio(int body) const {
   const BodyRange& r = data_->ranges.at(body);
+  const auto x = [node = r.node.data(), &positions = data_->nodes.position](int i) {
+    return vectorAt(positions, node[i]);
+  };
   double volume = 0;
-  const auto x = [&](int node) { return vectorAt(data_->nodes.position, r.node[node]); };
-  for (const auto& t : data_->bodies[body].model->triangles) volume += x(t[0]).dot(x(t[1]).cross(x(t[2]))) / 6;
-  return volume / r.restVolume;
+  for (const auto& t : data_->bodies[body].model->triangles) volume += x(t[0]).dot(x(t[1]).cross(x(t[2])));
+  return volume / (6 * r.restVolume);
 }
 
 double World::nodeSpeed(int body) const {
