@@ -297,7 +297,7 @@ TEST(Program, InterruptLeavesNothingHalfWritten) {
   folder.write("video.mp4", "earlier");
   const auto drawn = [&](const std::string& name) {  // in an unfinished folder of pictures
     for (const std::string& entry : folder.contents())
-      if (std::filesystem::exists(folder / (entry + "/" + name))) return true;
+      if (std::filesystem::exists(folder / fmt::format("{}/{}", entry, name))) return true;
     return false;
   };
   ProgramOptions options;

@@ -187,7 +187,7 @@ static int lostTicks(double amplitude, double frequency, double radius) {
   Script r;
   r.shape = ellipsoid(32, 32, 50);
   r.tool.radius = radius;
-  const Vector3d device = touchdown(r.shape, radius) + Vector3d(0, 0, 0.002);
+  Vector3d device = touchdown(r.shape, radius) + Vector3d(0, 0, 0.002);
   const double restHeight = r.shape->restNodes[0].z();
   r.device = [=](double) { return device; };
   r.motion = [=](const Vector3d& x, double t) {
@@ -251,6 +251,7 @@ TEST(Proxy, ATapAtAnySpeedIsFelt) {
 TEST(Proxy, RestsInACornerWithoutJitter) {
   const double h = 0.02;
   std::vector<Vector3d> nodes;
+  nodes.reserve(8);
   for (int i = 0; i < 8; ++i) nodes.emplace_back(i & 1 ? h : -h, i & 2 ? h : -h, i & 4 ? h : -h);
   // Wound to the inside: the tool is in a box.
   Script r;
@@ -389,7 +390,7 @@ TEST(Proxy, ThatStartsInsideIsPutOutside) {
   for (int n = 0; n < 50; ++n) {
     Script r;
     r.shape = ellipsoid(18, 14, 7);
-    const Vector3d start = random.vector(1).cwiseProduct(Vector3d(0.08, 0.04, 0.03));
+    Vector3d start = random.vector(1).cwiseProduct(Vector3d(0.08, 0.04, 0.03));
     r.device = [=](double) { return start; };
     r.duration = 0.05;
     run(r, [&](double t, const ToolState& tool, const BlendedSurface& surface, double alpha) {

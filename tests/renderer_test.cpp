@@ -399,7 +399,7 @@ TEST(Renderer, EveryLookDraws) {
   Picture p = viewFromFront(0.2f);
   renderer.render(p, image);
   for (std::size_t k = 0; k < names.size(); ++k) {
-    const double scale = 64 / 2 / 0.2 / std::tan(glm::radians(20.0));
+    const double scale = 32 / 0.2 / std::tan(glm::radians(20.0));
     const int x = 32 + int(place(k).x * scale), y = 32 - int(place(k).y * scale);
     // Whatever its hue: the brightest of the three channels.
     const std::uint8_t* rgb = &image.pixels[4ul * (std::size_t(y) * 64 + std::size_t(x))];

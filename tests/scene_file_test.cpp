@@ -226,7 +226,7 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {"0.707 0 0.707 0", "0.7 0 0.7 0",
        R"(x.xml:11: <body> orientation="0.7 0 0.7 0": expected a unit quaternion w x y z (length within 1e-3 of 1))"},
       {"\"springs\"", "\"ropes\"", R"(x.xml:11: <body> links="ropes": unknown value; known: "beam", "springs")"},
-      {"\"skin\"", "\"contact\"", R"(x.xml:11: <body> surface="contact": unknown value; known: "full", "skin")"},
+      {"\"skin\"", "\"thin\"", R"(x.xml:11: <body> surface="thin": unknown value; known: "full", "skin", "contact")"},
       {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4\"", R"(x.xml:16: <fix> box="0 1 2 3 4": expected 6 numbers)"},
       {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4 1\"",
        R"(x.xml:16: <fix> box="0 1 2 3 4 1": expected the lower corner first: x0 y0 z0 x1 y1 z1)"},

@@ -27,6 +27,7 @@ struct ChartMethod {
 const std::vector<ChartMethod>& chartMethods() {
   static const std::vector<ChartMethod> methods = {
       {"full", {{"body.*.surface", "full"}}},
+      {"contact", {{"body.*.surface", "contact"}}},
       {"skin", {{"body.*.surface", "skin"}}},
       {"springs", {{"body.*.links", "springs"}}},
       {"implicit", {{"dynamics.integrator", "implicit"}}},

@@ -64,7 +64,8 @@ void addBody(const SceneBody& body, const SoftBodyModel& model, std::vector<Resu
   add("poisson", text(body.tissue.poisson), "");
   add("damping", text(body.tissue.damping), "");
   add("link_model", body.links == LinkModel::beam ? "beam" : "springs", "");
-  add("surface", body.surface == SurfaceMode::full ? "full" : "skin", "");
+  constexpr const char* surfaces[] = {"full", "skin", "contact"};
+  add("surface", surfaces[static_cast<int>(body.surface)], "");
   add("look", body.look, "");
   add("fixed_spheres", text(body.fixed.size()), "");
   add("driven_spheres", text(body.driven.size()), "");

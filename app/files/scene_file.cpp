@@ -269,7 +269,8 @@ void readBodies(const XmlElement& root, Scene& scene) {
     body.look = readText(*e, "look");
     body.tissue = findTissue(*e, tissues);
     body.links = readChoice(*e, "links", {"beam", "springs"}, 0) == 0 ? LinkModel::beam : LinkModel::springs;
-    body.surface = readChoice(*e, "surface", {"full", "skin"}, 0) == 0 ? SurfaceMode::full : SurfaceMode::skin;
+    constexpr SurfaceMode surfaces[] = {SurfaceMode::full, SurfaceMode::skin, SurfaceMode::contact};
+    body.surface = surfaces[readChoice(*e, "surface", {"full", "skin", "contact"}, 0)];
     body.worldFromModel = readPlacement(*e);
     readFixations(*e, scene.path, body);
     body.loads = readLoads(*e, scene.path);

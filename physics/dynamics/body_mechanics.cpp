@@ -326,7 +326,7 @@ void setMasses(const BodyDescription& body, BodyMechanics& out) {
   }
   const std::vector<double> wholeMass = mass;
   const std::vector<Matrix3d> wholeMoment = moment;
-  const bool full = body.surface == SurfaceMode::full;
+  const bool full = body.surface != SurfaceMode::skin;
   for (std::size_t i = 0; i < out.attachments.size(); ++i) {
     const double volume = out.attachments[i].volume;
     require(!full || volume > 0, fmt::format("its model's node {} has volume {}: expected more than 0 m3", i, volume));

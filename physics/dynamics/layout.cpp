@@ -121,17 +121,17 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
 
 NodeOrder orderNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   NodeOrder order;
-  const auto append = [&](SurfaceMode mode, bool onLink, std::vector<HostRange>& ranges) {
+  const auto append = [&](bool skin, bool onLink, std::vector<HostRange>& ranges) {
     for (std::size_t b = 0; b < d.bodies.size(); ++b) {
-      if (d.bodies[b].surface != mode) continue;
+      if ((d.bodies[b].surface == SurfaceMode::skin) != skin) continue;
       appendNodes(order, d, mechanics[b], static_cast<int>(b), onLink, ranges);
     }
   };
-  append(SurfaceMode::full, true, d.nodes.onLinks);
-  append(SurfaceMode::full, false, d.nodes.onSpheres);
+  append(false, true, d.nodes.onLinks);
+  append(false, false, d.nodes.onSpheres);
   d.nodes.dynamicEnd = static_cast<int>(order.node.size());
-  append(SurfaceMode::skin, true, d.nodes.skinOnLinks);
-  append(SurfaceMode::skin, false, d.nodes.skinOnSpheres);
+  append(true, true, d.nodes.skinOnLinks);
+  append(true, false, d.nodes.skinOnSpheres);
   return order;
 }
 
@@ -181,7 +181,7 @@ void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   std::vector<std::vector<SpringEnd>> ends(d.nodes.dynamicEnd);
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     const SoftBodyModel& m = *d.bodies[b].model;
-    if (d.bodies[b].surface != SurfaceMode::full) continue;
+    if (d.bodies[b].surface == SurfaceMode::skin) continue;
     for (std::size_t e = 0; e < m.edges.size(); ++e) {
       const int node0 = d.ranges[b].node[m.edges[e][0]], node1 = d.ranges[b].node[m.edges[e][1]];
       ends[node0].push_back({node1, mechanics[b].edgeStiffness[e]});
@@ -257,7 +257,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.linkCount = static_cast<int>(m.links.size());
     r.node.resize(m.restNodes.size());
     r.restVolume = enclosedVolume(m);
-    r.bulk = mechanics[b].bulk;
+    r.bulk = r.wholeBulk = mechanics[b].bulk;
     r.massDamping = mechanics[b].massDamping;
     r.held = !d.bodies[b].fixed.empty() || !d.bodies[b].fixedNodes.empty();
     d.ranges.push_back(r);
@@ -272,9 +272,10 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
   for (std::size_t b = 0; b < d.bodies.size(); ++b) addDrives(d, d.bodies[b], d.ranges[b]);
   listSlots(d);
   layOutRest(d);
+  layOutSurfaceParts(d, mechanics);
   refreshAngularVelocities(d);
   evaluateLinks(d);
-  placeSkin(d);
+  placeCarriedNodes(d);
   return out;
 }
 

@@ -58,7 +58,7 @@ class RestModel {
         rows_(measureRows(*body.model, mechanics)),
         thinning_(body.links == LinkModel::beam ? body.tissue.poisson : 0),
         spheres_(static_cast<int>(mechanics.sphereMass.size())),
-        nodes_(body.surface == SurfaceMode::full ? static_cast<int>(mechanics.attachments.size()) : 0) {
+        nodes_(body.surface != SurfaceMode::skin ? static_cast<int>(mechanics.attachments.size()) : 0) {
     for (const Matrix3d& i : mechanics.sphereInertia) inverseInertia_.push_back(i.inverse());
   }
 

@@ -78,35 +78,6 @@ std::vector<int> islandsOf(const WorldData& d, const std::vector<CarriedImpulse>
   return first;
 }
 
-void listAwake(WorldData& d) {
-  Awake& a = d.awake;
-  a = {};
-  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
-    const BodyRange& r = d.ranges[b];
-    if (d.rest[b].asleep) continue;
-    ++a.bodies;
-    for (int i = 0; i < r.sphereCount; ++i) {
-      a.spheres.push_back(r.firstSphere + i);
-      const int group = (r.firstSphere + i) / 4;
-      if (a.sphereGroups.empty() || a.sphereGroups.back() != group) a.sphereGroups.push_back(group);
-    }
-    for (int k = 0; k < r.linkCount; ++k) {
-      const int group = (r.firstLink + k) / 4;
-      if (a.linkGroups.empty() || a.linkGroups.back() != group) a.linkGroups.push_back(group);
-    }
-  }
-  const auto list = [&](const std::vector<HostRange>& from, std::vector<HostRange>& to) {
-    for (const HostRange& range : from) {
-      if (d.rest[range.body].asleep) continue;
-      to.push_back(range);
-      for (int g = range.firstGroup; g < range.endGroup; ++g) a.nodeGroups.push_back(g);
-    }
-  };
-  list(d.nodes.onLinks, a.onLinks);
-  list(d.nodes.onSpheres, a.onSpheres);
-  d.contact.listsAreOld = true;
-}
-
 void stop(WorldData& d, const BodyRange& r) {
   for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i)
     d.spheres.velocity[i] = d.spheres.angularMomentum[i] = d.spheres.angularVelocity[i] = {};
@@ -128,10 +99,38 @@ void moveImpulses(const WorldData& d, bool asleep, std::vector<CarriedImpulse>& 
 
 }  // namespace
 
+void listAwake(WorldData& d) {
+  Awake& a = d.awake;
+  a = {};
+  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
+    const BodyRange& r = d.ranges[b];
+    if (d.rest[b].asleep) continue;
+    ++a.bodies;
+    for (int i = 0; i < r.sphereCount; ++i) {
+      a.spheres.push_back(r.firstSphere + i);
+      const int group = (r.firstSphere + i) / 4;
+      if (a.sphereGroups.empty() || a.sphereGroups.back() != group) a.sphereGroups.push_back(group);
+    }
+    for (int k = 0; k < r.linkCount; ++k) {
+      const int group = (r.firstLink + k) / 4;
+      if (a.linkGroups.empty() || a.linkGroups.back() != group) a.linkGroups.push_back(group);
+    }
+  }
+  std::size_t part = 0;
+  const auto list = [&](const std::vector<HostRange>& from, std::vector<HostRange>& to) {
+    for (const HostRange& range : from) {
+      if (!d.surface.parts[part++].moves || d.rest[range.body].asleep) continue;
+      to.push_back(range);
+      for (int g = range.firstGroup; g < range.endGroup; ++g) a.nodeGroups.push_back(g);
+    }
+  };
+  list(d.nodes.onLinks, a.onLinks);
+  list(d.nodes.onSpheres, a.onSpheres);
+}
+
 void layOutRest(WorldData& d) {
   d.rest.resize(d.bodies.size());
   d.stillPlace.resize(d.spheres.position.size());
-  listAwake(d);
 }
 
 void fallAsleep(WorldData& d, const Loads& loads) {
@@ -154,6 +153,7 @@ void fallAsleep(WorldData& d, const Loads& loads) {
   moveImpulses(d, true, d.contact.carried, d.contact.resting);
   evaluateLinks(d);  // once more, for the nodes that hang on them: without speed
   listAwake(d);
+  d.contact.listsAreOld = true;
 }
 
 void wake(WorldData& d, int body) {
@@ -163,6 +163,7 @@ void wake(WorldData& d, int body) {
     if (island[b] == island[body]) d.rest[b] = {};
   moveImpulses(d, false, d.contact.resting, d.contact.carried);
   listAwake(d);
+  d.contact.listsAreOld = true;
 }
 
 void wakeLoaded(WorldData& d, const Loads& loads) {

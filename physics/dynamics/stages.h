@@ -1,5 +1,6 @@
 #pragma once
 
+#include "physics/dynamics/body_mechanics.h"
 #include "physics/dynamics/world_data.h"
 
 // The stages of a substep, in their order, each one loop over arrays. Forces are evaluated at the state at the
@@ -27,7 +28,13 @@ void applyLoads(WorldData&, const Loads& loads, double remaining, std::vector<Ei
 void resolveContacts(WorldData&);
 void stepPositions(WorldData&);
 
+// surface_parts.cpp: which hosts' nodes move by themselves (SurfaceMode::contact).
+void layOutSurfaceParts(WorldData&, const std::vector<BodyMechanics>& mechanics);
+void moveLoadedParts(WorldData&, const Loads& loads);  // at a frame's start: what tools act on, and what is beside it
+void chooseSurfaceParts(WorldData&, const Loads& loads);  // at its end: what has come to rest is carried again
+
 // sleep.cpp
+void listAwake(WorldData&);   // WorldData::awake anew
 void layOutRest(WorldData&);  // all bodies awake
 // At the end of a frame: bodies that have kept still for long enough, with all that they touch, fall asleep. `loads`
 // are the frame's: what tools hold stays awake.
@@ -51,7 +58,7 @@ inline void evaluateForces(WorldData& d) {
 void layOutDeadLoads(WorldData&);
 
 // Skin nodes to where their hosts carry them; needs evaluateLinks at the current state.
-void placeSkin(WorldData&);
+void placeCarriedNodes(WorldData&);
 
 // Angular velocity from orientation and angular momentum.
 void refreshAngularVelocities(WorldData&);

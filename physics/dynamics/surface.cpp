@@ -45,8 +45,8 @@ void pullOnSphere(WorldData& d, const HostRange& range) {
 
 // Linear in the volume between anchors and nodes, up to a tenth of the body's: inside out it would be any number.
 double pressureOf(const BodyRange& r) {
-  constexpr double kMost = 0.1;
-  return r.bulk * std::clamp(r.swollen, -kMost * r.restVolume, kMost * r.restVolume);
+  const double most = 0.1 * r.wholeBulk * r.restVolume;
+  return std::clamp(r.bulk * r.swollen, -most, most);
 }
 
 struct NodeForces {
@@ -124,19 +124,24 @@ void finishNodeForces(WorldData& d) {
   for (const HostRange& range : d.awake.onSpheres) returnToSphere(d, range);
 }
 
-void placeSkin(WorldData& d) {
+void placeCarriedNodes(WorldData& d) {
   const auto place = [&d](const Anchor& anchor, int g) {
-    put(positionOf(anchor), d.nodes.position[g]);
+    put(positionOf(anchor) + gatherFour(d.nodes.displaced, 4 * g), d.nodes.position[g]);
     put(velocityAt(anchor, anchor.offset), d.nodes.velocity[g]);
   };
-  for (const HostRange& range : d.nodes.skinOnLinks) {
+  const auto onLink = [&](const HostRange& range) {
     const LinkHost host = linkHost(d, range.host);
     for (int g = range.firstGroup; g < range.endGroup; ++g) place(anchorOnLink(host, d.nodes.groups[g]), g);
-  }
-  for (const HostRange& range : d.nodes.skinOnSpheres) {
+  };
+  const auto onSphere = [&](const HostRange& range) {
     const SphereHost host = sphereHost(d, range.host);
     for (int g = range.firstGroup; g < range.endGroup; ++g) place(anchorOnSphere(host, d.nodes.groups[g]), g);
-  }
+  };
+  for (const HostRange& range : d.nodes.skinOnLinks) onLink(range);
+  for (const HostRange& range : d.nodes.skinOnSpheres) onSphere(range);
+  const SurfaceParts& parts = d.surface;
+  for (std::size_t k = 0; k < parts.carried.size(); ++k)
+    k < parts.firstOnSphere ? onLink(parts.carried[k]) : onSphere(parts.carried[k]);
 }
 
 double surfaceEnergy(const WorldData& d) {

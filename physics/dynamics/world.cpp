@@ -11,6 +11,7 @@
 #include "physics/dynamics/contact_stages.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/layout.h"
+#include "physics/dynamics/node_motion.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/dynamics/stages.h"
 
@@ -200,12 +201,14 @@ FrameReport World::advance(const Loads& loads) {
   report.toolImpulse.assign(tools, Eigen::Vector3d::Zero());
   d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Eigen::Vector3d::Zero());
   wakeLoaded(d, loads);
+  moveLoadedParts(d, loads);
   for (int k = 1; k <= d.substeps; ++k) step(d, loads, (d.substeps - k) * d.substep, report);
   ++d.frame;
+  chooseSurfaceParts(d, loads);
   fallAsleep(d, loads);
   // The frames that readers hang nodes on are those of the state at the end.
   evaluateLinks(d);
-  placeSkin(d);
+  placeCarriedNodes(d);
   requireFinite(d, time());
   return report;
 }
@@ -265,8 +268,11 @@ double World::nodeSpeed(int body) const {
 }
 
 int World::dynamicNodes(int body) const {
-  const bool moves = data_->bodies[body].surface == SurfaceMode::full && !data_->rest[body].asleep;
-  return moves ? static_cast<int>(data_->ranges[body].node.size()) : 0;
+  const WorldData& d = *data_;
+  if (d.rest[body].asleep) return 0;
+  int count = 0;
+  for (const int i : d.ranges[body].node) count += !isSkin(d, i) && d.surface.parts[d.surface.ofGroup[i / 4]].moves;
+  return count;
 }
 
 PenetrationReport World::penetration() const {
@@ -299,6 +305,8 @@ std::uint64_t World::stateHash() const {
       hash.add(c.impulse, 3);
     }
   }
+  for (const SurfacePart& p : d.surface.parts)
+    if (!p.always) hash.add(p.moves ? p.quietFrames : -1.0);
   for (const Rest& r : d.rest) hash.add(r.asleep ? -1.0 : r.stillFrames);
   for (const StillPlace& place : d.stillPlace) {
     hash.add(place.position, 3);

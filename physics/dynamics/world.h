@@ -33,8 +33,10 @@ struct LinkFactors {
 enum class LinkModel { springs, beam };
 
 enum class SurfaceMode {
-  full,  // every node is a mass of its own (paper 2.3)
-  skin,  // nodes follow the skeleton without mass: tools then load the skeleton through the attachments
+  full,     // every node is a mass of its own (paper 2.3)
+  skin,     // nodes follow the skeleton without mass: tools then load the skeleton through the attachments
+  contact,  // full where tools and loads act and where it still moves against the skeleton, skin elsewhere; under the
+            // implicit integrator full
 };
 
 enum class FixedFreedom { translation, all };

@@ -122,7 +122,7 @@ struct Nodes {
   std::vector<double> mass, inverseMass;   // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
   std::vector<NodeGroup> groups;
   std::vector<GroupHost> groupHosts;
-  std::vector<HostRange> onLinks, onSpheres;          // dynamic nodes (SurfaceMode::full), first in the arrays
+  std::vector<HostRange> onLinks, onSpheres;          // dynamic nodes, first in the arrays
   std::vector<HostRange> skinOnLinks, skinOnSpheres;  // massless nodes, behind them
   int dynamicEnd = 0;                                 // nodes [0, dynamicEnd) are dynamic
 };
@@ -148,10 +148,42 @@ struct BodyRange {
   int firstLink = 0, linkCount = 0;
   std::vector<int> node;   // index in Nodes of every model node
   double restVolume = 0;   // m3, enclosed by the rest nodes
-  double bulk = 0;         // N/m5, pressure per volume between anchors and dynamic nodes
+  double wholeBulk = 0;    // N/m5, pressure per volume between anchors and nodes
+  double bulk = 0;         // N/m5, the same where only some nodes are there to give way; of the current frame
   double swollen = 0;      // m3, that volume; of the current substep
   double massDamping = 0;  // 1/s, Rayleigh's alpha
   bool held = false;       // some sphere is fixed: deformation is motion against it rather than against a rigid motion
+};
+
+// ---- SurfaceMode::contact: the nodes of a host move by themselves, or they are carried and their mass is the
+// spheres'.
+
+struct SurfacePart {            // of one host; part k is that of Nodes::onLinks[k], those on spheres follow
+  bool moves = true;            // state
+  int quietFrames = 0;          // in a row, in which nothing asked for it; state
+  bool always = true;           // there is no choice: another surface mode, or something acts on it all the time
+  std::vector<int> neighbours;  // parts that edges join to this one
+  double give = 0;              // m5/N, volume that carried nodes would give way by per pressure
+  double unrest = 0;            // m: nodes farther than this from where they hang at rest set neighbours moving
+};
+
+// A sphere without any node's mass, kg and kg m2 in its frame; what a carried node adds.
+struct BareSphere {
+  double mass = 0;
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+};
+struct CarriedNode {
+  int part, sphere;
+  BareSphere mass;
+};
+
+struct SurfaceParts {
+  std::vector<SurfacePart> parts;
+  std::vector<int> ofGroup;  // per group of dynamic nodes
+  std::vector<BareSphere> spheres;
+  std::vector<CarriedNode> nodes;  // of parts that have the choice; by sphere
+  std::vector<HostRange> carried;  // those that do not move now, on links and, from firstOnSphere on, on spheres
+  std::size_t firstOnSphere = 0;
 };
 
 // ---- Bodies at rest sleep: nothing of them is evaluated until they wake.
@@ -197,6 +229,7 @@ struct WorldData {
   Links links;
   Nodes nodes;
   Springs springs;
+  SurfaceParts surface;
   std::vector<Rest> rest;              // per body
   std::vector<StillPlace> stillPlace;  // per sphere; state
   Awake awake;

@@ -1,0 +1,159 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/dynamics_states.h"
+#include "tests/synthetic_model.h"
+
+// SurfaceMode::contact: nodes are masses of their own where something acts on them, and nobody can tell.
+namespace medulla {
+
+using namespace states;
+
+namespace {
+
+constexpr double kRadius = 0.012;
+
+BodyDescription tube(SurfaceMode surface, bool held) {
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(8, 0.16, kRadius, 24, 12)), 5e3);
+  b.name = "tube";
+  b.surface = surface;
+  b.tissue.damping = 0.5;
+  if (held) b.fixed = {{0, FixedFreedom::all}, {1, FixedFreedom::all}, {6, FixedFreedom::all}, {7, FixedFreedom::all}};
+  return b;
+}
+
+World worldOf(const BodyDescription& body, const Vector3d& gravity) {
+  WorldSettings s;
+  s.gravity = gravity;
+  return World(s, {body});
+}
+
+Loads holding(const World& world, int node, const Vector3d& shift) {
+  HeldNode held;
+  held.node = node;
+  held.anchor = world.bodies()[0].model->restNodes[node] + shift;
+  held.stiffness = 100;
+  held.damping = 0.1;
+  Loads loads;
+  loads.heldNodes = {held};
+  return loads;
+}
+
+bool isCarried(const WorldData& d, int node) {
+  return !d.surface.parts[d.surface.ofGroup[node / 4]].moves;
+}
+
+// Of spheres and of the nodes that are masses of their own now.
+Vector3d linearMomentum(const WorldData& d, double* mass = nullptr) {
+  Vector3d sum = Vector3d::Zero();
+  double total = 0;
+  const auto add = [&](double m, const Vector3d& v) {
+    sum += m * v;
+    total += m;
+  };
+  for (int i = 0; i < d.spheres.count; ++i) add(sphereMass(d, i), vectorOf(d.spheres.velocity[i]));
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+    if (!isCarried(d, i)) add(d.nodes.mass[i], vectorAt(d.nodes.velocity, i));
+  if (mass != nullptr) *mass = total;
+  return sum;
+}
+
+constexpr int kNode = 200;  // at about two thirds of the length
+
+}  // namespace
+
+TEST(SurfaceParts, NothingMovesWhereNothingActs) {
+  World world = worldOf(tube(SurfaceMode::contact, true), {0, -9.81, 0});
+  const World full = worldOf(tube(SurfaceMode::full, true), {0, -9.81, 0});
+  for (int k = 0; k < 20; ++k) {
+    world.advance({});
+    EXPECT_EQ(world.dynamicNodes(0), 0);
+  }
+  double mass = 0, expected = 0;
+  linearMomentum(world.data(), &mass);
+  linearMomentum(full.data(), &expected);
+  EXPECT_NEAR(mass, expected, 1e-12 * expected);
+}
+
+TEST(SurfaceParts, AToolFeelsAFullSurfaceThoughMostOfItIsCarried) {
+  World part = worldOf(tube(SurfaceMode::contact, true), Vector3d::Zero()),
+        full = worldOf(tube(SurfaceMode::full, true), Vector3d::Zero());
+  double squaredError = 0, squared = 0;
+  int most = 0;
+  for (int k = 0; k < 60; ++k) {
+    const Loads loads = holding(full, kNode, std::min(1.0, k / 40.0) * Vector3d(0, 0.001, 0.003));
+    const Vector3d felt = part.advance(loads).toolImpulse.at(0), expected = full.advance(loads).toolImpulse.at(0);
+    squaredError += (felt - expected).squaredNorm();
+    squared += expected.squaredNorm();
+    most = std::max(most, part.dynamicNodes(0));
+  }
+  EXPECT_LT(std::sqrt(squaredError / squared), 0.02);
+  EXPECT_GT(most, 20);
+  EXPECT_LT(most, full.dynamicNodes(0) * 3 / 4);
+}
+
+TEST(SurfaceParts, PartsLeaveAgainOnceWhatTheyWereAskedForIsOver) {
+  World part = worldOf(tube(SurfaceMode::contact, true), Vector3d::Zero()),
+        full = worldOf(tube(SurfaceMode::full, true), Vector3d::Zero());
+  const auto both = [&](const Loads& loads) {
+    part.advance(loads);
+    full.advance(loads);
+  };
+  for (int k = 0; k < 40; ++k) both(holding(full, kNode, k / 40.0 * Vector3d(0, 0.004, 0)));
+  EXPECT_GT(part.dynamicNodes(0), 0);
+  DynamicsFrame frame, expected;
+  double farthest = 0;
+  for (int k = 0; k < 150; ++k) {
+    both({});
+    part.readFrame(frame);
+    full.readFrame(expected);
+    for (std::size_t i = 0; i < frame.bodies[0].nodes.size(); ++i)
+      farthest = std::max(farthest, (frame.bodies[0].nodes[i] - expected.bodies[0].nodes[i]).norm());
+  }
+  EXPECT_EQ(part.dynamicNodes(0), 0);
+  EXPECT_LT(farthest, 0.02 * kRadius);
+}
+
+// A free tube is pulled along: what the tool gives is what spheres and moving nodes have, while nodes join and leave.
+// Not to rounding: what edges pull at carried nodes is nobody's until these join, a frame later.
+TEST(SurfaceParts, JoiningAndLeavingKeepMomentum) {
+  World world = worldOf(tube(SurfaceMode::contact, false), Vector3d::Zero());
+  Vector3d given = Vector3d::Zero();
+  for (int k = 0; k < 10; ++k) given += world.advance(holding(world, kNode, {0.0002 * k, 0, 0})).toolImpulse.at(0);
+  EXPECT_GT(world.dynamicNodes(0), 0);
+  EXPECT_LT((linearMomentum(world.data()) - given).norm(), 0.01 * given.norm());
+  for (int k = 0; k < 100 && world.dynamicNodes(0) > 0; ++k) world.advance({});
+  EXPECT_EQ(world.dynamicNodes(0), 0);
+  EXPECT_LT((linearMomentum(world.data()) - given).norm(), 0.01 * given.norm());
+}
+
+TEST(SurfaceParts, ADeadLoadKeepsItsNodesMoving) {
+  BodyDescription loaded = tube(SurfaceMode::contact, true);
+  loaded.deadLoads = {{kNode, {0, 0, 1e-3}, 0, 0.1}};
+  World world = worldOf(loaded, Vector3d::Zero());
+  for (int k = 0; k < 50; ++k) world.advance({});
+  EXPECT_FALSE(isCarried(world.data(), world.data().ranges[0].node[kNode]));
+}
+
+TEST(SurfaceParts, TwiceTheSameAndFullWhereImplicit) {
+  std::uint64_t hash[2];
+  for (std::uint64_t& h : hash) {
+    World world = worldOf(tube(SurfaceMode::contact, true), {0, -9.81, 0});
+    for (int k = 0; k < 10; ++k) world.advance(holding(world, kNode, {0, 0.004, 0}));
+    for (int k = 0; k < 30; ++k) world.advance({});
+    h = world.stateHash();
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+  WorldSettings s;
+  s.integrator = Integrator::implicit;
+  World contact(s, {tube(SurfaceMode::contact, true)}), full(s, {tube(SurfaceMode::full, true)});
+  for (int k = 0; k < 5; ++k) {
+    contact.advance({});
+    full.advance({});
+  }
+  EXPECT_EQ(contact.dynamicNodes(0), full.dynamicNodes(0));
+  EXPECT_EQ(contact.energies().elastic, full.energies().elastic);
+}
+
+}  // namespace medulla
