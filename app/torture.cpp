@@ -53,7 +53,7 @@ void disturb(WorldData& d, const std::function<Vector3d(const Vector3d&)>& move,
     const Vector3d x = vectorOf(d.spheres.position[i]);
     if (d.spheres.groups[i / 4].freeToTurn[i % 4] > 0) {
       Quad& q = d.spheres.orientation[i];
-      const Quaterniond out = (turn(x) * Quaterniond(q.v[3], q.v[0], q.v[1], q.v[2])).normalized();
+      const Quaterniond out = (turn(x) * quaternionOf(q)).normalized();
       q = {{out.x(), out.y(), out.z(), out.w()}};
     }
     if (d.spheres.groups[i / 4].inverseMass[i % 4] > 0) d.spheres.position[i] = quadOf(move(x));

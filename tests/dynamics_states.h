@@ -33,8 +33,7 @@ class Random {  // xorshift64*
 };
 
 inline Quaterniond orientation(const WorldData& d, int i) {
-  const Quad& q = d.spheres.orientation[i];
-  return {q.v[3], q.v[0], q.v[1], q.v[2]};
+  return quaternionOf(d.spheres.orientation[i]);
 }
 inline void setOrientation(WorldData& d, int i, const Quaterniond& q) {
   d.spheres.orientation[i] = {{q.x(), q.y(), q.z(), q.w()}};
@@ -45,12 +44,8 @@ inline void turnBy(WorldData& d, int i, const Vector3d& rotation) {
 }
 
 inline Eigen::Matrix3d inertia(const WorldData& d, int i) {  // world frame
-  const Lanes* e = d.spheres.groups[i / 4].inverseInertia;
-  const int l = i % 4;
-  Eigen::Matrix3d inverse;
-  inverse << e[0][l], e[3][l], e[4][l], e[3][l], e[1][l], e[5][l], e[4][l], e[5][l], e[2][l];
   const Eigen::Matrix3d r = orientation(d, i).toRotationMatrix();
-  return r * inverse.inverse() * r.transpose();
+  return r * inverseInertiaOf(d.spheres.groups[i / 4], i % 4).inverse() * r.transpose();
 }
 inline void setAngularVelocity(WorldData& d, int i, const Vector3d& omega) {
   d.spheres.angularMomentum[i] = quadOf(inertia(d, i) * omega);

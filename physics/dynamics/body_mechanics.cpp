@@ -366,4 +366,10 @@ BodyMechanics bodyMechanics(const BodyDescription& body) {
   return out;
 }
 
+double meanRadius(const SoftBodyModel& model) {
+  double sum = 0;
+  for (const FillingSphere& s : model.spheres) sum += s.radius;
+  return sum / static_cast<double>(model.spheres.size());
+}
+
 }  // namespace medulla

@@ -50,4 +50,6 @@ struct BodyMechanics {
 // Throws std::runtime_error, without the body's name, where the description cannot be simulated.
 BodyMechanics bodyMechanics(const BodyDescription& body);
 
+double meanRadius(const SoftBodyModel& model);  // m, of its balls
+
 }  // namespace medulla

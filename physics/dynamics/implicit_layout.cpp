@@ -41,10 +41,7 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
     const int l = i % 4;
     s.freedom.push_back(all(g.inverseMass[l] > 0));
     s.freedom.push_back(all(g.freeToTurn[l] > 0));
-    const Lanes* e = g.inverseInertia;
-    Eigen::Matrix3d inverse;
-    inverse << e[0][l], e[3][l], e[4][l], e[3][l], e[1][l], e[5][l], e[4][l], e[5][l], e[2][l];
-    s.inertia.push_back(inverse.inverse());
+    s.inertia.push_back(inverseInertiaOf(g, l).inverse());
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) s.freedom.push_back(all(d.nodes.inverseMass[i] > 0));
   layOutNodes(d, s);

@@ -22,10 +22,6 @@ using Eigen::Vector3d;
 
 constexpr double kGamma = 0.29289321881345248;  // 1 - 1/sqrt(2)
 
-Quaterniond quaternionOf(const Quad& q) {
-  return {q.v[3], q.v[0], q.v[1], q.v[2]};
-}
-
 // exp(turn) q
 Quad turned(const Quad& q, const Vector3d& turn) {
   const double angle = turn.norm();

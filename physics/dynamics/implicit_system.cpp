@@ -149,8 +149,7 @@ void addScaled(double f, const Motion& b, Motion& a) {
 void assembleSystem(WorldData& d, ImplicitData& s) {
   for (int i = 0; i < d.spheres.count; ++i) {
     Block6& b = s.diagonal[i];
-    const Quad& q = d.spheres.orientation[i];
-    const Eigen::Matrix3d r = Eigen::Quaterniond(q.v[3], q.v[0], q.v[1], q.v[2]).toRotationMatrix();
+    const Eigen::Matrix3d r = quaternionOf(d.spheres.orientation[i]).toRotationMatrix();
     b.setZero();
     b.topLeftCorner<3, 3>().diagonal().setConstant(d.spheres.groups[i / 4].mass[i % 4]);
     b.bottomRightCorner<3, 3>() = r * s.inertia[i] * r.transpose();

@@ -35,10 +35,7 @@ void addSpheres(WorldData& d, const BodyDescription& body, const BodyMechanics& 
     g.mass[l] = mechanics.sphereMass[i];
     g.inverseMass[l] = mechanics.moves[i] ? 1 / mechanics.sphereMass[i] : 0;
     g.freeToTurn[l] = mechanics.turns[i] ? 1 : 0;
-    const Eigen::Matrix3d inverse = mechanics.sphereInertia[i].inverse();
-    const double entries[6] = {inverse(0, 0), inverse(1, 1), inverse(2, 2),
-                               inverse(0, 1), inverse(0, 2), inverse(1, 2)};
-    for (int e = 0; e < 6; ++e) g.inverseInertia[e][l] = entries[e];
+    setInverseInertia(g, l, mechanics.sphereInertia[i].inverse());
   }
 }
 

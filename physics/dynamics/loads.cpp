@@ -29,13 +29,9 @@ void add(Quad& q, const Vector3d& a) {
 
 // Angular velocity after stepVelocities: new momentum, orientation of the substep's beginning.
 Vector3d angularVelocity(const WorldData& d, int sphere) {
-  const Quad& q = d.spheres.orientation[sphere];
-  const Eigen::Matrix3d r = Eigen::Quaterniond(q.v[3], q.v[0], q.v[1], q.v[2]).toRotationMatrix();
-  const Lanes* i = d.spheres.groups[sphere / 4].inverseInertia;
-  const int l = sphere % 4;
-  Eigen::Matrix3d inverse;
-  inverse << i[0][l], i[3][l], i[4][l], i[3][l], i[1][l], i[5][l], i[4][l], i[5][l], i[2][l];
-  return r * (inverse * (r.transpose() * vectorOf(d.spheres.angularMomentum[sphere])));
+  const Eigen::Matrix3d r = quaternionOf(d.spheres.orientation[sphere]).toRotationMatrix();
+  return r * (inverseInertiaOf(d.spheres.groups[sphere / 4], sphere % 4) *
+              (r.transpose() * vectorOf(d.spheres.angularMomentum[sphere])));
 }
 
 void addImpulse(WorldData& d, int sphere, const Vector3d& linear, const Vector3d& angular) {

@@ -15,12 +15,6 @@ namespace {
 
 constexpr double kStill = 0.01;  // of the body's mean radius, which no sphere's surface may have moved by
 
-double meanRadius(const SoftBodyModel& m) {
-  double sum = 0;
-  for (const FillingSphere& s : m.spheres) sum += s.radius;
-  return sum / static_cast<double>(m.spheres.size());
-}
-
 // Whether every sphere is where it was at the first of the frames counted so far.
 bool keepsStill(const WorldData& d, std::size_t body) {
   const BodyRange& r = d.ranges[body];

@@ -30,12 +30,6 @@ Vector3d sagOf(const WorldData& d, int node) {
   return d.nodes.mass[node] / d.nodes.groups[node / 4].stiffness[node % 4] * vectorOf(d.gravity);
 }
 
-double meanRadius(const SoftBodyModel& m) {
-  double sum = 0;
-  for (const FillingSphere& s : m.spheres) sum += s.radius;
-  return sum / static_cast<double>(m.spheres.size());
-}
-
 // Nothing turns or moves what the part hangs on, so that nodes which hold it have nothing to hold.
 bool isHeld(const WorldData& d, const BodyMechanics& mechanics, std::size_t part) {
   const HostRange& range = rangeOf(d, part);
@@ -96,11 +90,8 @@ void setMass(WorldData& d, int sphere, const BareSphere& mass) {
   const int l = sphere % 4;
   g.mass[l] = mass.mass;
   if (g.inverseMass[l] > 0) g.inverseMass[l] = 1 / mass.mass;
-  const Matrix3d inverse = mass.inertia.inverse();
-  const double entries[6] = {inverse(0, 0), inverse(1, 1), inverse(2, 2), inverse(0, 1), inverse(0, 2), inverse(1, 2)};
-  for (int e = 0; e < 6; ++e) g.inverseInertia[e][l] = entries[e];
-  const Quad& q = d.spheres.orientation[sphere];
-  const Matrix3d r = Eigen::Quaterniond(q.v[3], q.v[0], q.v[1], q.v[2]).toRotationMatrix();
+  setInverseInertia(g, l, mass.inertia.inverse());
+  const Matrix3d r = quaternionOf(d.spheres.orientation[sphere]).toRotationMatrix();
   d.spheres.angularMomentum[sphere] =
       quadOf(r * mass.inertia * r.transpose() * vectorOf(d.spheres.angularVelocity[sphere]));
 }

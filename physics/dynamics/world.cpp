@@ -224,9 +224,8 @@ void World::readFrame(DynamicsFrame& out) const {
     f.spheres.resize(r.sphereCount);
     for (std::size_t i = 0; i < r.node.size(); ++i) f.nodes[i] = vectorAt(d.nodes.position, r.node[i]);
     for (int i = 0; i < r.sphereCount; ++i) {
-      const Quad& q = d.spheres.orientation[r.firstSphere + i];
       f.spheres[i].position = vectorOf(d.spheres.position[r.firstSphere + i]);
-      f.spheres[i].worldFromSphere = Eigen::Quaterniond(q.v[3], q.v[0], q.v[1], q.v[2]);
+      f.spheres[i].worldFromSphere = quaternionOf(d.spheres.orientation[r.firstSphere + i]);
     }
   }
 }

@@ -20,6 +20,19 @@ struct SphereGroup {        // constants of four spheres
   Lanes inverseInertia[6];  // 1/(kg m2), sphere frame: xx, yy, zz, xy, xz, yz
 };
 
+inline Eigen::Matrix3d inverseInertiaOf(const SphereGroup& g, int lane) {
+  const Lanes* e = g.inverseInertia;
+  const double xx = e[0][lane], yy = e[1][lane], zz = e[2][lane], xy = e[3][lane], xz = e[4][lane], yz = e[5][lane];
+  return (Eigen::Matrix3d() << xx, xy, xz, xy, yy, yz, xz, yz, zz).finished();
+}
+inline void setInverseInertia(SphereGroup& g, int lane, const Eigen::Matrix3d& inverse) {
+  const double entries[6] = {inverse(0, 0), inverse(1, 1), inverse(2, 2), inverse(0, 1), inverse(0, 2), inverse(1, 2)};
+  for (int e = 0; e < 6; ++e) g.inverseInertia[e][lane] = entries[e];
+}
+inline Eigen::Quaterniond quaternionOf(const Quad& q) {
+  return {q.v[3], q.v[0], q.v[1], q.v[2]};
+}
+
 inline Lanes3 timesInverseInertia(const SphereGroup& g, const Lanes3& l) {
   const Lanes* i = g.inverseInertia;
   return {fma(i[4], l.z, fma(i[3], l.y, i[0] * l.x)), fma(i[5], l.z, fma(i[1], l.y, i[3] * l.x)),
