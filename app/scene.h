@@ -77,7 +77,7 @@ struct Scene {
   double duration = 1;                         // s, > 0, <= 86400
   Eigen::Vector3d gravity{0, -9.81, 0};        // m/s2
   double ambientDrag = 0;                      // 1/s, >= 0
-  double sleepAfter = 0;                     // s, >= 0, of keeping still; 0: never
+  double sleepAfter = 0;                       // s, >= 0, of keeping still; 0: never
   int substeps = 0;                            // per dynamics frame; 0: as many as the stability estimate asks for
   Integrator integrator = Integrator::explicitEuler;
   int order = 1;  // 1, or 2 of the implicit integrator

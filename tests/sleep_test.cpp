@@ -47,7 +47,7 @@ World stackedRods(double sleepAfter) {
 }
 
 void run(World& world, double time) {
-  for (int k = 0; k < static_cast<int>(time / 0.01 + 0.5); ++k) world.advance({});
+  for (long k = std::lround(time / 0.01); k > 0; --k) world.advance({});
 }
 
 int bodiesAwake(const World& world) {
