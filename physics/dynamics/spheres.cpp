@@ -8,19 +8,24 @@ namespace medulla {
 namespace {
 
 struct Turning {
-  Rotation rotation;
   Lanes3 q;
   Lanes w;
-  Lanes3 bodyMomentum;
+  Lanes3 momentum;
+  Rotation rotation;    // of (q, w)
+  Lanes3 bodyMomentum;  // the momentum as the sphere sees it
 };
+
+MEDULLA_INLINE void orient(Turning& t) {
+  t.rotation = rotationOf(t.q, t.w);
+  t.bodyMomentum = rotateBack(t.rotation, t.momentum);
+}
 
 Turning readTurning(const Spheres& s, std::size_t i) {
   Turning t;
   t.q = gather(s.orientation[i], s.orientation[i + 1], s.orientation[i + 2], s.orientation[i + 3], t.w);
-  t.rotation = rotationOf(t.q, t.w);
-  const Lanes3 momentum =
+  t.momentum =
       gather(s.angularMomentum[i], s.angularMomentum[i + 1], s.angularMomentum[i + 2], s.angularMomentum[i + 3]);
-  t.bodyMomentum = rotateBack(t.rotation, momentum);
+  orient(t);
   return t;
 }
 
@@ -103,8 +108,9 @@ void stepPositions(WorldData& d) {
     Turning t = readTurning(s, 4 * g);
     turn(s.groups[g], t, h);
     storeQuads(t.q.x, t.q.y, t.q.z, t.w, &s.orientation[4 * g]);
+    orient(t);
+    storeAngularVelocity(s.groups[g], t, &s.angularVelocity[4 * g]);
   }
-  refreshAngularVelocities(d);
   for (const int g : d.awake.nodeGroups) put(fma(h, d.nodes.velocity[g], d.nodes.position[g]), d.nodes.position[g]);
 }
 
