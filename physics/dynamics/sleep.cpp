@@ -150,7 +150,8 @@ void fallAsleep(WorldData& d, const Loads& loads) {
   d.contact.listsAreOld = true;
 }
 
-void wake(WorldData& d, int body) {
+// No effect on the awake.
+static void wake(WorldData& d, int body) {
   if (!d.rest[body].asleep) return;
   const std::vector<int> island = islandsOf(d, d.contact.resting);
   for (std::size_t b = 0; b < island.size(); ++b)

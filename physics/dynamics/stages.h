@@ -39,8 +39,7 @@ void layOutRest(WorldData&);  // all bodies awake
 // At the end of a frame: bodies that have kept still for long enough, with all that they touch, fall asleep. `loads`
 // are the frame's: what tools hold stays awake.
 void fallAsleep(WorldData&, const Loads& loads);
-// A body and all that rests on it or bears it; their contacts go on with the impulses they had. No effect on the awake.
-void wake(WorldData&, int body);
+// With all that rests on them or bears them; their contacts go on with the impulses they had.
 void wakeLoaded(WorldData&, const Loads& loads);  // the bodies that tools touch
 void wakeTouched(WorldData&);                     // those that bodies awake press on in this substep
 
@@ -57,7 +56,8 @@ inline void evaluateForces(WorldData& d) {
 // on no node, not finite, or ends before it begins.
 void layOutDeadLoads(WorldData&);
 
-// Skin nodes to where their hosts carry them; needs evaluateLinks at the current state.
+// Nodes of a skin, and others that do not move by themselves, to where their hosts carry them; needs evaluateLinks at
+// the current state.
 void placeCarriedNodes(WorldData&);
 
 // Angular velocity from orientation and angular momentum.

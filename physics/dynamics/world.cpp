@@ -243,6 +243,7 @@ Energies World::energies() const {
     e.gravity -= mass * g.dot(vectorOf(d.spheres.position[i]));
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
+    if (!d.surface.parts[d.surface.ofGroup[i / 4]].moves) continue;  // its mass is its spheres'
     e.kinetic += 0.5 * d.nodes.mass[i] * vectorAt(d.nodes.velocity, i).squaredNorm();
     e.gravity -= d.nodes.mass[i] * g.dot(vectorAt(d.nodes.position, i));
   }
