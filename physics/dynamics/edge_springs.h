@@ -9,13 +9,15 @@ namespace medulla {
 MEDULLA_INLINE void pullOfEdges(const Springs& springs, const Quad* displaced, int g, Lanes* sum) {
   const char* bytes = reinterpret_cast<const char*>(displaced);
   const Quad* own = displaced + 4 * static_cast<std::ptrdiff_t>(g);
+  const auto at = [bytes](std::uint32_t offset) { return load(*reinterpret_cast<const Quad*>(bytes + offset)); };
   for (int k = 0; k < 4; ++k) sum[k] = splat(0);
   for (int e = springs.first[g]; e < springs.first[g + 1]; ++e) {
     const SpringGroup& s = springs.groups[e];
-    for (int k = 0; k < 4; ++k) {
-      const Lanes other = load(*reinterpret_cast<const Quad*>(bytes + s.other[k]));
-      sum[k] = fma(splat(s.stiffness[k]), other - load(own[k]), sum[k]);
-    }
+    const Lanes stiffness = _mm256_cvtps_pd(_mm_load_ps(s.stiffness));
+    sum[0] = fma(splatLane<0>(stiffness), at(s.other[0]) - load(own[0]), sum[0]);
+    sum[1] = fma(splatLane<1>(stiffness), at(s.other[1]) - load(own[1]), sum[1]);
+    sum[2] = fma(splatLane<2>(stiffness), at(s.other[2]) - load(own[2]), sum[2]);
+    sum[3] = fma(splatLane<3>(stiffness), at(s.other[3]) - load(own[3]), sum[3]);
   }
 }
 

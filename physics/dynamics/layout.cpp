@@ -195,7 +195,7 @@ void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
       for (int l = 0; l < 4; ++l) {
         const SpringEnd end = k < ends[i + l].size() ? ends[i + l][k] : SpringEnd{i + l, 0};
         g.other[l] = static_cast<std::uint32_t>(end.other * sizeof(Quad));
-        g.stiffness[l] = end.stiffness;
+        g.stiffness[l] = static_cast<float>(end.stiffness);
       }
     }
     s.first.push_back(static_cast<int>(s.groups.size()));
