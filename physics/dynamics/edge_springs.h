@@ -14,10 +14,10 @@ MEDULLA_INLINE void pullOfEdges(const Springs& springs, const Quad* displaced, i
   for (int e = springs.first[g]; e < springs.first[g + 1]; ++e) {
     const SpringGroup& s = springs.groups[e];
     const Lanes stiffness = _mm256_cvtps_pd(_mm_load_ps(s.stiffness));
-    sum[0] = fma(splatLane<0>(stiffness), at(s.other[0]) - load(own[0]), sum[0]);
-    sum[1] = fma(splatLane<1>(stiffness), at(s.other[1]) - load(own[1]), sum[1]);
-    sum[2] = fma(splatLane<2>(stiffness), at(s.other[2]) - load(own[2]), sum[2]);
-    sum[3] = fma(splatLane<3>(stiffness), at(s.other[3]) - load(own[3]), sum[3]);
+    sum[0] = fnma(splatLane<0>(stiffness), load(own[0]) - at(s.other[0]), sum[0]);
+    sum[1] = fnma(splatLane<1>(stiffness), load(own[1]) - at(s.other[1]), sum[1]);
+    sum[2] = fnma(splatLane<2>(stiffness), load(own[2]) - at(s.other[2]), sum[2]);
+    sum[3] = fnma(splatLane<3>(stiffness), load(own[3]) - at(s.other[3]), sum[3]);
   }
 }
 

@@ -12,7 +12,11 @@
 // benchmark's `substep` counter.
 namespace medulla {
 
-static void runSubsteps(benchmark::State& state, std::vector<BodyDescription> bodies) {
+using Scene = std::vector<BodyDescription> (*)();
+
+static void runSubsteps(benchmark::State& state, Scene scene, LinkModel links) {
+  std::vector<BodyDescription> bodies = scene();
+  for (BodyDescription& body : bodies) body.links = links;
   World world({}, std::move(bodies));
   for (int i = 0; i < 3; ++i) world.advance({});
   for ([[maybe_unused]] auto _ : state) world.advance({});
@@ -27,22 +31,26 @@ static void runSubsteps(benchmark::State& state, std::vector<BodyDescription> bo
       world.substepsPerFrame(), benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
-static void gallbladderSubstep(benchmark::State& state) {
-  runSubsteps(state, synthetic::gallbladderScene());
-}
-static void abdomenSubstep(benchmark::State& state) {
-  runSubsteps(state, synthetic::abdomenScene());
-}
 // Of many short runs the quickest is the one that nothing else disturbed.
 static double quickest(const std::vector<double>& times) {
   return *std::min_element(times.begin(), times.end());
 }
-BENCHMARK(gallbladderSubstep)
-    ->MinTime(0.02)
-    ->Repetitions(50)
-    ->ReportAggregatesOnly()
-    ->ComputeStatistics("min", quickest);
-BENCHMARK(abdomenSubstep)->MinTime(0.02)->Repetitions(50)->ReportAggregatesOnly()->ComputeStatistics("min", quickest);
+static void quickestOfMany(benchmark::internal::Benchmark* b) {
+  b->MinTime(0.02)->Repetitions(50)->ReportAggregatesOnly()->ComputeStatistics("min", quickest);
+}
+constexpr Scene kGallbladder = synthetic::gallbladderScene, kAbdomen = synthetic::abdomenScene;
+BENCHMARK_CAPTURE(runSubsteps, , kGallbladder, LinkModel::beam)->Name("gallbladderSubstep")->Apply(quickestOfMany);
+BENCHMARK_CAPTURE(runSubsteps, , kAbdomen, LinkModel::beam)->Name("abdomenSubstep")->Apply(quickestOfMany);
+BENCHMARK_CAPTURE(runSubsteps, , kGallbladder, LinkModel::springs)
+    ->Name("gallbladderSubstepSprings")
+    ->Apply(quickestOfMany);
+BENCHMARK_CAPTURE(runSubsteps, , kAbdomen, LinkModel::springs)->Name("abdomenSubstepSprings")->Apply(quickestOfMany);
+
+// Few frames, to count instructions: valgrind --tool=callgrind --toggle-collect='medulla::World::advance*'.
+BENCHMARK_CAPTURE(runSubsteps, , kGallbladder, LinkModel::beam)->Name("gallbladderFrames")->Iterations(1);
+BENCHMARK_CAPTURE(runSubsteps, , kAbdomen, LinkModel::beam)->Name("abdomenFrames")->Iterations(1);
+BENCHMARK_CAPTURE(runSubsteps, , kGallbladder, LinkModel::springs)->Name("gallbladderFramesSprings")->Iterations(1);
+BENCHMARK_CAPTURE(runSubsteps, , kAbdomen, LinkModel::springs)->Name("abdomenFramesSprings")->Iterations(1);
 
 // Implicit steps of 10 ms of the larger scene while it sags; `solve` is the time per linear system, assembled,
 // factorised and solved, the forces around it included.
