@@ -207,8 +207,10 @@ struct BuildArguments {
 BuildOptions buildOptions(const BuildArguments& a) {
   BuildOptions options = a.options;
   options.settings.method = a.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
-  if (options.settings.gap > 0 && options.settings.method != BuildMethod::cover)
-    usageError("--gap", fmt::format("{}", options.settings.gap), "together with --method cover");
+  const BuildSettings& s = options.settings;
+  for (const auto& [name, value] : {std::pair("--gap", s.gap), std::pair("--overshoot", s.overshoot)})
+    if (value > 0 && s.method != BuildMethod::cover)
+      usageError(name, fmt::format("{}", value), "together with --method cover");
   if (!options.fine.empty() && options.fine.size() != options.meshes.size())
     usageError("--fine", options.fine.back(),
                fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
@@ -237,6 +239,13 @@ Verb addBuild(CLI::App& app) {
       ->check(CLI::Range(0.01, 99.0))
       ->type_name("PERCENT")
       ->excludes(spheres);
+  c->add_option(
+       "--overshoot", a.options.settings.overshoot,
+       "how far spheres may stick out of the surface, in % of the bounding box's diagonal: they fill more, and "
+       "bodies touch by so much too early instead of sinking in by the gap")
+      ->check(CLI::Range(0.0, 5.0))
+      ->type_name("PERCENT")
+      ->capture_default_str();
   c->add_option("--method", a.method, "cover: inscribed balls chosen to fill the body; skeleton: the raw edge collapse")
       ->check(CLI::IsMember({"cover", "skeleton"}))
       ->capture_default_str();

@@ -172,6 +172,31 @@ TEST(ModelBuild, BallsAreInscribed) {
   }
 }
 
+// Largest gap and share of the volume in balls, %, that the chosen overshoot is to reach.
+struct Filling {
+  const char* mesh;
+  int spheres;
+  double overshoot, gap, cover;
+};
+
+TEST(ModelBuild, BallsThatMayStickOutFillMoreAndStickOutNoFurther) {
+  for (const Filling& f :
+       {Filling{"gallbladder/gallbladder.obj", 7, 0.8, 3.5, 87},
+        Filling{"gallbladder/gallbladder.obj", 50, 0.2, 0.9, 97}, Filling{"stomach/stomach.obj", 25, 0.8, 1.2, 95}}) {
+    SCOPED_TRACE(std::string(f.mesh) + " " + std::to_string(f.spheres));
+    BuildSettings settings;
+    settings.spheres = f.spheres;
+    settings.overshoot = f.overshoot;
+    BuildReport report;
+    const SoftBodyModel model = build(assetMesh(f.mesh), settings, report);
+    expectSound(model, report);
+    EXPECT_EQ(report.spheres, f.spheres);
+    EXPECT_LE(report.overshootMax, f.overshoot * (1 + 1e-9));
+    EXPECT_LE(report.gapMax, f.gap);
+    EXPECT_GE(report.cover, f.cover);
+  }
+}
+
 // A ring in the plane of x and z.
 static TriangleMesh torusMesh(double ringRadius, double tubeRadius, int around, int across) {
   constexpr double pi = 3.14159265358979;

@@ -123,6 +123,9 @@ TEST(Program, BuildsToAGap) {
                 {"--gap", "--spheres"});
   expectRefusal(runProgram({"build", mesh, "-o", folder / "n.xml", "--gap", "6", "--method", "skeleton"}), 2,
                 {"--gap", "cover"});
+  expectRefusal(runProgram({"build", mesh, "-o", folder / "n.xml", "--overshoot", "1", "--method", "skeleton"}), 2,
+                {"--overshoot", "cover"});
+  expectRefusal(runProgram({"build", mesh, "-o", folder / "n.xml", "--overshoot", "6"}), 2, {"--overshoot", "5"});
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"m.xml"});
 }
 

@@ -103,7 +103,8 @@ void readMeshes(double scale, std::vector<BuildJob>& jobs) {
 void divideSpheres(std::vector<BuildJob>& jobs) {
   std::vector<BodyShape> shapes;
   shapes.reserve(jobs.size());
-  for (const BuildJob& job : jobs) shapes.push_back(naming(job.meshPath, [&] { return measureShape(job.mesh.mesh); }));
+  for (const BuildJob& job : jobs)
+    shapes.push_back(naming(job.meshPath, [&] { return measureShape(job.mesh.mesh, job.settings.overshoot); }));
   const std::vector<int> counts = shareSpheres(shapes, jobs[0].settings.spheres);
   for (std::size_t j = 0; j < jobs.size(); ++j) jobs[j].settings.spheres = counts[j];
 }

@@ -31,6 +31,7 @@ std::vector<Result> buildResults(const BuildReport& r) {
           {"gap_max", numberText(r.gapMax), "%"},
           {"gap_mean", numberText(r.gapMean), "%"},
           {"gap_cones_max", numberText(r.gapConesMax), "%"},
+          {"overshoot_max", numberText(r.overshootMax), "%"},
           {"cover", numberText(r.cover), "%"},
           {"cover_cones", numberText(r.coverCones), "%"},
           {"mass_error", numberText(r.massError), "%"},

@@ -14,9 +14,10 @@ namespace medulla {
 
 using Progress = std::function<void(double)>;
 
-BodyShape measureShape(const TriangleMesh& mesh) {
+BodyShape measureShape(const TriangleMesh& mesh, double overshoot) {
   if (mesh.triangles.empty()) throw std::runtime_error("the mesh has no triangles; expected a closed surface");
   BodyShape shape{mesh, makeSurfaceTree(mesh), massProperties(mesh), boundsDiagonal(mesh)};
+  shape.overshoot = overshoot / 100 * shape.diagonal;
   if (!(shape.exact.volume > 0)) throw std::runtime_error("the mesh encloses no volume; expected an outward surface");
   return shape;
 }
@@ -29,12 +30,14 @@ static std::vector<Ball> candidatesOf(const BodyShape& shape, int count) {
         fmt::format("too thin: the mesh holds {} inscribed balls of 0.4 % of its diagonal or more; {} were asked for",
                     medial.size(), count));
   }
+  for (Ball& ball : medial) ball.radius += shape.overshoot;
   return medial;
 }
 
 static CoverTargets targetsOf(const BodyShape& shape, int count) {
   CoverTargets targets;
   targets.diagonal = shape.diagonal;
+  targets.overshoot = shape.overshoot;
   for (const SurfaceSample& s : sampleSurface(shape.mesh, std::max(3000, 3 * count), 2)) {
     targets.surface.push_back(s.point);
   }

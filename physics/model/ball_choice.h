@@ -15,10 +15,12 @@ struct BodyShape {
   SurfaceTree tree;
   MassProperties exact;  // volume > 0
   double diagonal = 0;   // m, of the bounding box
+  double overshoot = 0;  // m, that balls may stick out of the surface
 };
 
-// Keeps a reference to the mesh. Throws std::runtime_error on a mesh without triangles or volume.
-BodyShape measureShape(const TriangleMesh& mesh);
+// Keeps a reference to the mesh; the overshoot is in % of the diagonal. Throws std::runtime_error on a mesh without
+// triangles or volume.
+BodyShape measureShape(const TriangleMesh& mesh, double overshoot);
 
 // `count` balls that fill the body (ball_cover.h). Throws std::runtime_error where fewer inscribed balls are to be had.
 std::vector<Ball> chooseBalls(const BodyShape& shape, int count, CoverGoal goal,

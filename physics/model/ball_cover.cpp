@@ -163,14 +163,16 @@ bool swapPass(const Reach& candidates, const GapTable& leastGaps, const Weights&
 }
 
 // A ball near `ball`: the largest about a displaced centre, or in turn the medial ball that touches where it does.
-bool displacedBall(const SurfaceTree& tree, const Ball& ball, const Eigen::Vector3d& by, bool medial, double diagonal,
-                   Ball& out) {
+bool displacedBall(const SurfaceTree& tree, const Ball& ball, const Eigen::Vector3d& by, bool medial,
+                   const ScaledTargets& targets, Ball& out) {
   const Eigen::Vector3d centre = ball.centre + by;
   if (!isInside(tree, centre)) return false;
   const SurfacePoint nearestPoint = closestPoint(tree, centre);
-  out = {centre, nearestPoint.distance};
+  out = {centre, nearestPoint.distance + targets.overshoot};
   if (!medial || nearestPoint.distance <= 0) return true;
-  out = shrinkBall(tree, nearestPoint.point, (centre - nearestPoint.point) / nearestPoint.distance, 0.6 * diagonal);
+  out = shrinkBall(tree, nearestPoint.point, (centre - nearestPoint.point) / nearestPoint.distance,
+                   0.6 * targets.diagonal);
+  out.radius += targets.overshoot;
   return isInside(tree, out.centre);
 }
 
@@ -216,7 +218,7 @@ void movePass(const SurfaceTree& tree, const ScaledTargets& targets, int pass, i
     double step = 0.4 * ball.radius / (pass + 1);
     for (int trial = 0; trial < trials; ++trial) {
       Ball moved;
-      if (!displacedBall(tree, ball, step * random.normal(), trial % 2 == 1, targets.diagonal, moved)) continue;
+      if (!displacedBall(tree, ball, step * random.normal(), trial % 2 == 1, targets, moved)) continue;
       const float cost = open.cost(targets, moved, weights);
       if (cost < best) {
         best = cost;

@@ -13,6 +13,7 @@ struct CoverTargets {
   std::vector<Eigen::Vector3d> surface;  // points of the surface, spread over its area
   std::vector<Eigen::Vector3d> volume;   // points inside, spread over the volume
   double diagonal = 0;                   // of the bounding box
+  double overshoot = 0;                  // that balls stick out of the surface; the candidates do so already
 };
 
 // Gap: the largest gap from the surface to the nearest ball alone. Gap and volume: as much volume inside the balls as
@@ -21,7 +22,8 @@ struct CoverTargets {
 enum class CoverGoal { gap, gapAndVolume };
 
 // Chooses `count` of the candidate balls, then lets them leave the candidates: greedy set cover under a bisected
-// tolerance, filling up to `count`, swaps with any better candidate, small random moves. The balls stay inscribed.
+// tolerance, filling up to `count`, swaps with any better candidate, small random moves. The balls stay inscribed but
+// for the overshoot.
 // Cost: mean over the surface of (gap / scale)^6 and, for both goals, twice the open share of the volume; the scale is
 // the largest gap that the gap alone has led to. A hundredth of the surface at 1.3 times that gap then weighs as much
 // as 2.5 % of the volume. Less weight for the volume leaves bulky bodies bare, more gives up fins and ducts. 1 <= count

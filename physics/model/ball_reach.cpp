@@ -37,7 +37,7 @@ static Eigen::Matrix3Xf scaled(const std::vector<Eigen::Vector3d>& points, doubl
 ScaledTargets scaled(const CoverTargets& points) {
   std::vector<Eigen::Vector3d> surface = points.surface;
   orderByPlace(surface, 0, surface.size());
-  return {scaled(surface, points.diagonal), scaled(points.volume, points.diagonal), points.diagonal};
+  return {scaled(surface, points.diagonal), scaled(points.volume, points.diagonal), points.diagonal, points.overshoot};
 }
 
 Gaps gapsTo(const ScaledTargets& targets, const Ball& ball) {

@@ -18,7 +18,7 @@ constexpr Eigen::Index blockSize = 64;  // surface points that lie together and 
 // The points in single precision, in % of the diagonal; those of the surface in blocks that lie together.
 struct ScaledTargets {
   Eigen::Matrix3Xf surface, volume;
-  double diagonal = 0;  // m
+  double diagonal = 0, overshoot = 0;  // m
 };
 ScaledTargets scaled(const CoverTargets& targets);
 

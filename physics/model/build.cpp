@@ -41,6 +41,9 @@ void checkSettings(const BuildSettings& s) {
   if (!(s.gap >= 0 && s.gap < 100)) {
     throw std::runtime_error(fmt::format("a gap of {} % asked for; expected more than 0 and less than 100", s.gap));
   }
+  if (!(s.overshoot >= 0 && s.overshoot <= 5)) {
+    throw std::runtime_error(fmt::format("an overshoot of {} % asked for; expected 0 to 5", s.overshoot));
+  }
   if (!(s.surfaceMassFraction >= 0 && s.surfaceMassFraction <= 0.4)) {
     throw std::runtime_error(fmt::format("surface mass fraction {}; expected 0 to 0.4", s.surfaceMassFraction));
   }
@@ -153,8 +156,9 @@ std::string describeSettings(const BuildSettings& s) {
     return fmt::format("--method skeleton --surface-mass {} --render-levels {}", s.surfaceMassFraction, s.renderLevels);
   }
   const std::string resolution = s.gap > 0 ? fmt::format("--gap {}", s.gap) : fmt::format("--spheres {}", s.spheres);
-  return fmt::format("--method cover {} --surface-mass {} --render-levels {}", resolution, s.surfaceMassFraction,
-                     s.renderLevels);
+  const std::string overshoot = s.overshoot > 0 ? fmt::format(" --overshoot {}", s.overshoot) : "";
+  return fmt::format("--method cover {}{} --surface-mass {} --render-levels {}", resolution, overshoot,
+                     s.surfaceMassFraction, s.renderLevels);
 }
 
 SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine, const BuildSettings& settings,
@@ -164,7 +168,7 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
     if (progress) progress(part);
   };
   checkSettings(settings);
-  const BodyShape shape = measureShape(repaired.mesh);
+  const BodyShape shape = measureShape(repaired.mesh, settings.overshoot);
 
   SoftBodyModel model;
   model.meshHash = hashMesh(repaired.mesh);

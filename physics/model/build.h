@@ -12,7 +12,7 @@ namespace medulla {
 
 enum class BuildMethod {
   skeleton,  // the paper's raw result: Li's edge collapse, nodes become spheres (2.1)
-  cover,     // inscribed medial balls chosen by set cover
+  cover,     // medial balls, inscribed but for `overshoot`, chosen by set cover
 };
 
 constexpr int spheresMax = 2000;  // the choice of balls needs spheres^2 memory and time
@@ -21,6 +21,7 @@ struct BuildSettings {
   BuildMethod method = BuildMethod::cover;
   int spheres = 7;  // 1..spheresMax; cover only: the skeleton's node count follows from the mesh
   double gap = 0;   // % of the diagonal; if > 0, cover takes the fewest spheres that leave no larger gap, not `spheres`
+  double overshoot = 0;  // % of the diagonal, 0..5; cover only: how far a ball may stick out of the surface
   double surfaceMassFraction =
       0.2;               // of the body's mass, carried by the surface nodes, 0..0.4; more allows larger substeps
   int renderLevels = 2;  // 0..4 Loop subdivisions of the physics mesh for the drawn surface
@@ -31,6 +32,7 @@ struct BuildReport {
   int triangles = 0, skeletonNodes = 0, skeletonLinks = 0, spheres = 0, links = 0;
   double gapMax = 0, gapMean = 0;                           // surface to the nearest ball
   double gapConesMax = 0;                                   // surface to the nearest ball or link cone
+  double overshootMax = 0;                                  // of a ball, out of the surface
   double cover = 0, coverCones = 0;                         // % of the volume inside balls; inside balls and cones
   double massError = 0, centreError = 0, inertiaError = 0;  // %, model against mesh (centre: of the diagonal)
   int components = 0, centresOutside = 0, attachmentsCrossing = 0;

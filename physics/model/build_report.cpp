@@ -124,6 +124,8 @@ BuildReport measureModel(const SoftBodyModel& model) {
   measureMasses(model, exact, diagonal, report);
   measureGraph(model, report);
   for (const FillingSphere& s : model.spheres) {
+    const double sticksOut = s.radius - inscribedRadius(tree, s.restBallCentre);
+    report.overshootMax = std::max(report.overshootMax, sticksOut / diagonal * 100);
     report.centresOutside += isInside(tree, s.restBallCentre) && isInside(tree, s.restFrame) ? 0 : 1;
   }
   report.attachmentsCrossing = countCrossings(mesh, tree, model.attachments, model.spheres, model.links);
