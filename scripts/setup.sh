@@ -68,11 +68,12 @@ installPackages() {
   aptInstall || { say "installing failed; apt-get said:" && tail -n 20 "$aptLog" >&2 && return 1; }
 }
 
-# aptInstall: the call itself; reads `as` and `missing` of its caller. What apt and dpkg say goes to $aptLog.
+# aptInstall: the call itself; reads `as` and `missing` of its caller. What apt and dpkg say goes to $aptLog. Without a
+# terminal of its own, which dpkg cannot have in a root where /dev/pts is not mounted: packages' scripts then fail to print.
 aptInstall() {
   aptLog=$(mktemp -t medulla_apt.XXXXXX)
   "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-    -o DPkg::Lock::Timeout=300 -o APT::Status-Fd=1 "${missing[@]}" 2>&1 < /dev/null |
+    -o DPkg::Lock::Timeout=300 -o Dpkg::Use-Pty=0 -o APT::Status-Fd=1 "${missing[@]}" 2>&1 < /dev/null |
     tee "$aptLog" | grep --line-buffered -E '^(dl|pm)status:' | showProgress "installing"
 }
 
