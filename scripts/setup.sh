@@ -68,13 +68,15 @@ installPackages() {
   aptInstall || { say "installing failed; apt-get said:" && tail -n 20 "$aptLog" >&2 && return 1; }
 }
 
-# aptInstall: the call itself; reads `as` and `missing` of its caller. What apt and dpkg say goes to $aptLog. Without a
-# terminal of its own, which dpkg cannot have in a root where /dev/pts is not mounted: packages' scripts then fail to print.
+# aptInstall: the call itself; reads `as` and `missing` of its caller. What apt and dpkg say goes to $aptLog, and their
+# progress to a descriptor of its own, opened behind sudo, which closes those it is given: on the standard output of
+# packages' scripts it makes their writing fail where /dev/pts is not mounted and apt cannot give them a terminal.
 aptInstall() {
   aptLog=$(mktemp -t medulla_apt.XXXXXX)
-  "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-    -o DPkg::Lock::Timeout=300 -o Dpkg::Use-Pty=0 -o APT::Status-Fd=1 "${missing[@]}" 2>&1 < /dev/null |
-    tee "$aptLog" | grep --line-buffered -E '^(dl|pm)status:' | showProgress "installing"
+  # shellcheck disable=SC2016
+  "${as[@]}" env DEBIAN_FRONTEND=noninteractive sh -c 'exec apt-get install -y -qq --no-install-recommends \
+    -o DPkg::Lock::Timeout=300 -o APT::Status-Fd=3 "$@" 3>&1 >&2' apt-get "${missing[@]}" 2> "$aptLog" < /dev/null |
+    grep --line-buffered -E '^(dl|pm)status:' | showProgress "installing"
 }
 
 # build PRESET TARGET [NINJA OPTION...]: configures when that was not done or the presets changed, and builds. ninja sees
