@@ -11,8 +11,8 @@ namespace medulla {
 // A fused a b + c differs from the product and sum it stands for in the last bit, so that hashes would hang on compiler
 // and options. The program's own multiply-adds are asked for by name and never of this kind.
 TEST(Contraction, NoInstructionFusesWhatTheSourceDoesNot) {
-  const std::unique_ptr<FILE, int (*)(FILE*)> listing(popen("objdump -dC --no-show-raw-insn " MEDULLA_PROGRAM, "r"),
-                                                      pclose);
+  const std::unique_ptr<FILE, int (*)(FILE*)> listing(
+      popen("objdump -dC --no-show-raw-insn '" MEDULLA_PROGRAM "'", "r"), pclose);
   ASSERT_NE(listing, nullptr);
   std::array<char, 4096> line;
   std::string function, fused;
