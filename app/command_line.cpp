@@ -208,7 +208,7 @@ BuildOptions buildOptions(const BuildArguments& a) {
   BuildOptions options = a.options;
   options.settings.method = a.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
   const BuildSettings& s = options.settings;
-  for (const auto& [name, value] : {std::pair("--gap", s.gap), std::pair("--overshoot", s.overshoot)})
+  for (const auto& [name, value] : {std::pair("--gap", s.gap), std::pair("--overshoot", s.overshoot.value_or(0))})
     if (value > 0 && s.method != BuildMethod::cover)
       usageError(name, fmt::format("{}", value), "together with --method cover");
   if (!options.fine.empty() && options.fine.size() != options.meshes.size())
@@ -227,9 +227,10 @@ Verb addBuild(CLI::App& app) {
       ->type_name("MODEL.xml|DIR")
       ->required();
   CLI::Option* spheres =
-      c->add_option("--spheres", a.options.settings.spheres,
-                    "number of filling spheres; of several meshes together: each next sphere goes to the body whose "
-                    "largest gap, in metres, is largest")
+      c->add_option(
+           "--spheres", a.options.settings.spheres,
+           "number of filling spheres; of several meshes together: shared out so that the largest gap, in metres, "
+           "is about the same for all")
           ->check(CLI::Range(1, spheresMax))
           ->capture_default_str();
   c->add_option(
@@ -242,10 +243,9 @@ Verb addBuild(CLI::App& app) {
   c->add_option(
        "--overshoot", a.options.settings.overshoot,
        "how far spheres may stick out of the surface, in % of the bounding box's diagonal: they fill more, and "
-       "bodies touch by so much too early instead of sinking in by the gap")
+       "bodies touch by so much too early instead of sinking in by the gap [4.2 / sqrt(spheres), or half the gap]")
       ->check(CLI::Range(0.0, 5.0))
-      ->type_name("PERCENT")
-      ->capture_default_str();
+      ->type_name("PERCENT");
   c->add_option("--method", a.method, "cover: inscribed balls chosen to fill the body; skeleton: the raw edge collapse")
       ->check(CLI::IsMember({"cover", "skeleton"}))
       ->capture_default_str();

@@ -25,6 +25,7 @@ std::shared_ptr<const SoftBodyModel> modelOf(const Result& result, int spheres) 
   if (model) return model;
   BuildSettings settings;
   settings.spheres = spheres;
+  settings.overshoot = 0;  // as the scenes' models are
   settings.renderLevels = 0;
   BuildReport report;
   const TriangleMesh mesh = readMesh(std::string(MEDULLA_SOURCE_DIR "/") + result.text("mesh"));

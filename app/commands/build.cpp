@@ -103,8 +103,10 @@ void readMeshes(double scale, std::vector<BuildJob>& jobs) {
 void divideSpheres(std::vector<BuildJob>& jobs) {
   std::vector<BodyShape> shapes;
   shapes.reserve(jobs.size());
+  BuildSettings average = jobs[0].settings;
+  average.spheres = std::max(1, average.spheres / static_cast<int>(jobs.size()));
   for (const BuildJob& job : jobs)
-    shapes.push_back(naming(job.meshPath, [&] { return measureShape(job.mesh.mesh, job.settings.overshoot); }));
+    shapes.push_back(naming(job.meshPath, [&] { return measureShape(job.mesh.mesh, overshootOf(average)); }));
   const std::vector<int> counts = shareSpheres(shapes, jobs[0].settings.spheres);
   for (std::size_t j = 0; j < jobs.size(); ++j) jobs[j].settings.spheres = counts[j];
 }

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <optional>
+#include <numeric>
 #include <stdexcept>
 
 #include "physics/model/greedy_cover.h"
@@ -80,7 +80,7 @@ std::vector<Ball> fewestBalls(const BodyShape& shape, double gap, int most, cons
     best = std::move(balls);
     return true;
   };
-  int high = std::clamp(greedyCount(candidatesOf(shape, 1), targetsOf(shape, 1), gap), 1, most), low = 0;
+  int high = std::clamp(GreedyCount(candidatesOf(shape, 1), targetsOf(shape, 1))(gap), 1, most), low = 0;
   const int first = high;
   report(0.1);
   while (!reaches(high)) {
@@ -116,17 +116,35 @@ std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count) {
   if (count < bodies) {
     throw std::runtime_error(fmt::format("{} spheres for {} bodies; expected one each at least", count, bodies));
   }
-  std::vector<GreedyFilling> fillings;
+  std::vector<GreedyCount> greedy;
+  double high = 0;  // m
   for (const BodyShape& shape : shapes) {
-    fillings.emplace_back(candidatesOf(shape, 1), targetsOf(shape, 1));
-    fillings.back().add();
+    greedy.emplace_back(candidatesOf(shape, 1), targetsOf(shape, 1));
+    high = std::max(high, shape.diagonal);
   }
-  std::vector<int> counts(bodies, 1);
-  for (int spheres = bodies; spheres < count; ++spheres) {
-    const auto widest = std::max_element(fillings.begin(), fillings.end(),
-                                         [](const auto& a, const auto& b) { return a.largestGap() < b.largestGap(); });
-    widest->add();
-    ++counts[widest - fillings.begin()];
+  const auto countsFor = [&](double gap) {
+    std::vector<int> counts;
+    for (int b = 0; b < bodies; ++b) counts.push_back(greedy[b](100 * gap / shapes[b].diagonal));
+    return counts;
+  };
+  // Gaps that bring the sum just under and just over what was asked for.
+  std::vector<int> counts(bodies, 1), more = countsFor(0);
+  double low = 0;
+  for (int step = 0; step < 16; ++step) {
+    const std::vector<int> probe = countsFor((low + high) / 2);
+    const bool fits = std::accumulate(probe.begin(), probe.end(), 0) <= count;
+    (fits ? high : low) = (low + high) / 2;
+    (fits ? counts : more) = probe;
+  }
+  // What is left goes, one each in turn, to those that the smaller gap gives more; then to all.
+  for (int left = count - std::accumulate(counts.begin(), counts.end(), 0); left > 0;) {
+    const bool all = counts == more;
+    for (int b = 0; b < bodies && left > 0; ++b) {
+      if (!all && counts[b] >= more[b]) continue;
+      ++counts[b];
+      if (all) ++more[b];
+      --left;
+    }
   }
   return counts;
 }

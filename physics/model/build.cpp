@@ -41,8 +41,8 @@ void checkSettings(const BuildSettings& s) {
   if (!(s.gap >= 0 && s.gap < 100)) {
     throw std::runtime_error(fmt::format("a gap of {} % asked for; expected more than 0 and less than 100", s.gap));
   }
-  if (!(s.overshoot >= 0 && s.overshoot <= 5)) {
-    throw std::runtime_error(fmt::format("an overshoot of {} % asked for; expected 0 to 5", s.overshoot));
+  if (s.overshoot && !(*s.overshoot >= 0 && *s.overshoot <= 5)) {
+    throw std::runtime_error(fmt::format("an overshoot of {} % asked for; expected 0 to 5", *s.overshoot));
   }
   if (!(s.surfaceMassFraction >= 0 && s.surfaceMassFraction <= 0.4)) {
     throw std::runtime_error(fmt::format("surface mass fraction {}; expected 0 to 0.4", s.surfaceMassFraction));
@@ -151,14 +151,18 @@ std::uint64_t hashMesh(const TriangleMesh& mesh) {
   return hash;
 }
 
+double overshootOf(const BuildSettings& s) {
+  if (s.overshoot) return *s.overshoot;
+  return s.gap > 0 ? std::min(s.gap / 2, 5.0) : 4.2 / std::sqrt(s.spheres);
+}
+
 std::string describeSettings(const BuildSettings& s) {
   if (s.method == BuildMethod::skeleton) {
     return fmt::format("--method skeleton --surface-mass {} --render-levels {}", s.surfaceMassFraction, s.renderLevels);
   }
   const std::string resolution = s.gap > 0 ? fmt::format("--gap {}", s.gap) : fmt::format("--spheres {}", s.spheres);
-  const std::string overshoot = s.overshoot > 0 ? fmt::format(" --overshoot {}", s.overshoot) : "";
-  return fmt::format("--method cover {}{} --surface-mass {} --render-levels {}", resolution, overshoot,
-                     s.surfaceMassFraction, s.renderLevels);
+  return fmt::format("--method cover {} --overshoot {} --surface-mass {} --render-levels {}", resolution,
+                     overshootOf(s), s.surfaceMassFraction, s.renderLevels);
 }
 
 SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine, const BuildSettings& settings,
@@ -168,7 +172,7 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
     if (progress) progress(part);
   };
   checkSettings(settings);
-  const BodyShape shape = measureShape(repaired.mesh, settings.overshoot);
+  const BodyShape shape = measureShape(repaired.mesh, overshootOf(settings));
 
   SoftBodyModel model;
   model.meshHash = hashMesh(repaired.mesh);

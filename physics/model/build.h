@@ -21,7 +21,9 @@ struct BuildSettings {
   BuildMethod method = BuildMethod::cover;
   int spheres = 7;  // 1..spheresMax; cover only: the skeleton's node count follows from the mesh
   double gap = 0;   // % of the diagonal; if > 0, cover takes the fewest spheres that leave no larger gap, not `spheres`
-  double overshoot = 0;  // % of the diagonal, 0..5; cover only: how far a ball may stick out of the surface
+  // % of the diagonal, 0..5; cover only: how far balls may stick out of the surface. More fills more, and bodies touch
+  // by so much too early instead of sinking in by the gap. Without a value: overshootOf.
+  std::optional<double> overshoot;
   double surfaceMassFraction =
       0.2;               // of the body's mass, carried by the surface nodes, 0..0.4; more allows larger substeps
   int renderLevels = 2;  // 0..4 Loop subdivisions of the physics mesh for the drawn surface
@@ -44,6 +46,10 @@ struct BuildReport {
 
 // FNV-1a over the bits of vertices and triangles. A model records that of its input file, before repair.
 std::uint64_t hashMesh(const TriangleMesh& mesh);
+
+// Half the gap where a gap is asked for, else 4.2 % / sqrt(spheres): what balls leave between them shrinks with their
+// distance on the surface, and by this much of it they fill best without standing out further than they fall short.
+double overshootOf(const BuildSettings& settings);
 
 // The settings as options of the build command that repeat them.
 std::string describeSettings(const BuildSettings& settings);

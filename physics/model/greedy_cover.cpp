@@ -112,25 +112,14 @@ std::vector<int> chooseGreedily(const GapTable& gaps, int count) {
   return chosen;
 }
 
-int greedyCount(const std::vector<Ball>& candidates, const CoverTargets& points, double gap) {
-  const GapTable gaps = gapTable(scaled(points), candidates);
-  const Gaps tolerance = gaps.rowwise().minCoeff().max(static_cast<float>(gap));
-  const int samples = static_cast<int>(gaps.rows()), all = static_cast<int>(gaps.cols());
+GreedyCount::GreedyCount(const std::vector<Ball>& candidates, const CoverTargets& points)
+    : gaps_(gapTable(scaled(points), candidates)), reachable_(gaps_.rowwise().minCoeff()) {}
+
+int GreedyCount::operator()(double gap) const {
+  const int samples = static_cast<int>(gaps_.rows()), all = static_cast<int>(gaps_.cols());
   bool covered = false;
-  return static_cast<int>(greedyCover(CoverBits(gaps, tolerance), samples, all, all, covered).size());
-}
-
-GreedyFilling::GreedyFilling(const std::vector<Ball>& candidates, const CoverTargets& points)
-    : diagonal_(points.diagonal),
-      gaps_(gapTable(scaled(points), candidates)),
-      least_(Gaps::Constant(gaps_.rows(), 200)) {}
-
-void GreedyFilling::add() {
-  least_ = least_.min(gaps_.col(bestAddition(gaps_, least_, std::vector<char>(gaps_.cols(), 0))));
-}
-
-double GreedyFilling::largestGap() const {
-  return least_.maxCoeff() * diagonal_ / 100;
+  const CoverBits bits(gaps_, reachable_.max(static_cast<float>(gap)));
+  return static_cast<int>(greedyCover(bits, samples, all, all, covered).size());
 }
 
 }  // namespace medulla

@@ -11,21 +11,16 @@ namespace medulla {
 // they suffice, then filling up. `gaps`: surface points x candidates, % of the diagonal.
 std::vector<int> chooseGreedily(const Eigen::ArrayXXf& gaps, int count);
 
-// How many candidates greedy set cover takes until every surface point lies within `gap` (% of the diagonal) of one, or
-// as near as the candidates come.
-int greedyCount(const std::vector<Ball>& candidates, const CoverTargets& targets, double gap);
-
-// Balls added one after the other, each the candidate that lowers the cost of the gaps most.
-class GreedyFilling {
+// How many candidates greedy set cover takes until every surface point lies within a gap of one, or as near as the
+// candidates come.
+class GreedyCount {
  public:
-  GreedyFilling(const std::vector<Ball>& candidates, const CoverTargets& targets);
-  void add();
-  double largestGap() const;  // m; more than the diagonal before the first ball
+  GreedyCount(const std::vector<Ball>& candidates, const CoverTargets& targets);
+  int operator()(double gap) const;  // % of the diagonal, >= 0
 
  private:
-  double diagonal_;
   Eigen::ArrayXXf gaps_;  // surface points x candidates, % of the diagonal
-  Eigen::ArrayXf least_;
+  Eigen::ArrayXf reachable_;
 };
 
 }  // namespace medulla
