@@ -10,6 +10,10 @@ namespace medulla {
 namespace {
 
 using Cell = std::array<std::int32_t, 3>;
+// Comparing arrays calls memcmp.
+bool same(const Cell& a, const Cell& b) {
+  return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
 
 constexpr double kFarthest = 1e4;  // m
 // A box much larger than the mean would fill very many cells: the largest fills at most about this many per axis.
@@ -107,7 +111,7 @@ void findOverlaps(const std::vector<AxisBox>& boxes, BroadPhase& phase) {
         const BroadPhase::Entry& e = phase.entries[k];
         if (e.box <= i) break;  // ascending: the rest is below i too
         std::array<double, 3> corner;
-        if (e.cell == c && sharedCorner(boxes[i], boxes[e.box], corner) && grid.cellOf(corner) == c)
+        if (same(e.cell, c) && sharedCorner(boxes[i], boxes[e.box], corner) && same(grid.cellOf(corner), c))
           phase.pairs.push_back({i, e.box});
       }
     });

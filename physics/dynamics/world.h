@@ -21,11 +21,13 @@ struct Tissue {
   double density = 1040;  // kg/m3, > 0
   double damping = 0.1;   // ratio to critical of the body's lowest bending mode, >= 0; 0 swings for ever
   double friction = 0.2;  // Coulomb's, >= 0, sticking and sliding; a pair has the geometric mean of its two sides
+  bool operator==(const Tissue&) const = default;
 };
 
 // Dimensionless steering of the three ways a link deforms (paper 2.2); 1 keeps the material's value.
 struct LinkFactors {
   double elongation = 1, flexion = 1, torsion = 1;  // > 0
+  bool operator==(const LinkFactors&) const = default;
 };
 
 // How a link answers. springs: six independent damped springs (paper 2.2). beam: the flexion angles of its two ends are
@@ -43,6 +45,7 @@ enum class FixedFreedom { translation, all };
 struct FixedSphere {
   int sphere = 0;
   FixedFreedom freedom = FixedFreedom::all;
+  bool operator==(const FixedSphere&) const = default;
 };
 
 // A sphere led along a path, whatever pulls at it: rest + velocity t + ramp(t) amplitude sin(2 pi frequency t + phase)
