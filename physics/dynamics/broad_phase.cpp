@@ -37,7 +37,8 @@ double cellSize(const std::vector<AxisBox>& boxes) {
 
 struct Grid {
   double inverse;
-  std::uint32_t mask;
+  std::uint32_t mask = 0;  // of hashes; 0: a bucket for every cell from `first` on, `size` many per axis
+  Cell first{}, size{};
 
   Cell cellOf(const std::array<double, 3>& p) const {
     Cell c;
@@ -45,6 +46,8 @@ struct Grid {
     return c;
   }
   std::uint32_t bucketOf(const Cell& c) const {
+    if (mask == 0)  // boxes that lie together are counted together: no walk through all of memory
+      return static_cast<std::uint32_t>(c[0] - first[0] + size[0] * (c[1] - first[1] + size[1] * (c[2] - first[2])));
     // Teschner et al. (2003); the upper bits are folded in, because strides of a power of two repeat the lower ones.
     const std::uint32_t h = (static_cast<std::uint32_t>(c[0]) * 73856093u) ^
                             (static_cast<std::uint32_t>(c[1]) * 19349663u) ^
@@ -63,16 +66,27 @@ struct Grid {
 
 // Counting sort of (cell, box) by bucket; within a bucket boxes ascend.
 Grid fillGrid(const std::vector<AxisBox>& boxes, double size, BroadPhase& phase) {
-  Grid grid{1 / size, 0};
+  Grid grid{1 / size};
   std::size_t count = 0;
+  grid.first = grid.cellOf(boxes[0].low);
+  Cell last = grid.first;
   for (const AxisBox& b : boxes) {
     const Cell low = grid.cellOf(b.low), high = grid.cellOf(b.high);
     std::size_t cells = 1;
-    for (int a = 0; a < 3; ++a) cells *= high[a] - low[a] + 1;
+    for (int a = 0; a < 3; ++a) {
+      cells *= high[a] - low[a] + 1;
+      grid.first[a] = std::min(grid.first[a], low[a]);
+      last[a] = std::max(last[a], high[a]);
+    }
     count += cells;
   }
-  const std::size_t buckets = std::bit_ceil(2 * count);
-  grid.mask = static_cast<std::uint32_t>(buckets - 1);
+  double all = 1;
+  for (int a = 0; a < 3; ++a) all *= grid.size[a] = last[a] - grid.first[a] + 1;
+  std::size_t buckets = static_cast<std::size_t>(all);
+  if (all > 4.0 * static_cast<double>(count)) {
+    buckets = std::bit_ceil(2 * count);
+    grid.mask = static_cast<std::uint32_t>(buckets - 1);
+  }
   phase.begin.assign(buckets + 1, 0);
   phase.entries.resize(count);
   for (const AxisBox& b : boxes) grid.forEachCell(b, [&](const Cell& c) { ++phase.begin[grid.bucketOf(c)]; });

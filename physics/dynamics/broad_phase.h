@@ -4,7 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-// Which boxes overlap, in time proportional to their number: a hashed uniform grid.
+// Which boxes overlap, in time proportional to their number: a uniform grid, hashed where it would be mostly
+// empty.
 namespace medulla {
 
 struct AxisBox {

@@ -46,13 +46,13 @@ struct Contact {
   std::uint64_t key;  // which pair: what ties it to the substep before
   int ends = 0;
   std::array<std::uint32_t, 4> sphere;
-  std::array<double, 4> weight;      // < 0 on the side that the normal points away from
-  Lanes lever[4];                    // m, from the sphere's frame to the point of contact, moved along with its side
-  Lanes normal, tangent0, tangent1;  // unit, into the second side; w = 0
-  double gap = 0;                    // m
-  double smallerRadius = 0;          // m, of the two in contact
-  Lanes mobility[3];                 // 1/kg: relative velocity per impulse along normal, tangent0, tangent1
-  double normalMobility = 0;         // 1/kg: mobility[0] along the normal
+  std::array<double, 4> weight;  // < 0 on the side that the normal points away from
+  Lanes lever[4];                // m, from the sphere's frame to the point of contact, moved along with its side
+  Lanes normal, tangent0;        // unit, into the second side, and across; w = 0
+  double gap = 0;                // m
+  double smallerRadius = 0;      // m, of the two in contact
+  Lanes mobility;                // 1/kg: relative velocity per impulse along the normal
+  double normalMobility = 0;     // 1/kg: its part along the normal
   double inverseTangent[3] = {0, 0, 0};  // kg: inverse of the mobility in the tangent plane: 00, 11, 01
   double softness = 0;                   // 1/kg, gamma
   double bias = 0;                       // m/s

@@ -101,15 +101,20 @@ Lanes mobilityAlong(const WorldData& d, const Contact& c, Lanes a) {
   return sum;
 }
 
-// Two directions across the normal: the coordinate axis least along it, and what completes the frame.
-void chooseTangents(Contact& c) {
+// What completes the frame of normal and tangent0. Not kept: contacts of a heap outgrow the second-level cache, and all
+// are read in every pass.
+MEDULLA_INLINE Lanes tangent1(const Contact& c) {
+  return crossProduct(c.normal, c.tangent0);
+}
+
+// A direction across the normal, in the plane of it and the coordinate axis least along it.
+void chooseTangent(Contact& c) {
   const Lanes size = magnitude(c.normal);
   const int axis = size[0] <= size[1] && size[0] <= size[2] ? 0 : size[1] <= size[2] ? 1 : 2;
   Lanes unit = splat(0);
   unit[axis] = 1;
   const Lanes across = crossProduct(c.normal, unit);
   c.tangent0 = across / splat(std::sqrt(dotProduct(across, across)));
-  c.tangent1 = crossProduct(c.normal, c.tangent0);
 }
 
 // False where nothing can move, or where the two part or are too slow to meet within the substep.
@@ -119,15 +124,15 @@ bool prepare(const WorldData& d, Contact& c) {
   const ContactLaw law = contactLaw(d, c, h);
   c.bias = law.bias;
   if (!(c.gap > 0)) c.softness = law.softness;  // until they touch: no further than that, and hard
-  c.mobility[0] = mobilityAlong(d, c, c.normal);
-  c.normalMobility = dotProduct(c.mobility[0], c.normal);
+  c.mobility = mobilityAlong(d, c, c.normal);
+  c.normalMobility = dotProduct(c.mobility, c.normal);
   if (!(c.normalMobility > 0)) return false;
-  chooseTangents(c);
+  chooseTangent(c);
   if (c.friction == 0) return true;
-  c.mobility[1] = mobilityAlong(d, c, c.tangent0);
-  c.mobility[2] = mobilityAlong(d, c, c.tangent1);
-  const double k00 = dotProduct(c.mobility[1], c.tangent0), k11 = dotProduct(c.mobility[2], c.tangent1),
-               k01 = dotProduct(c.mobility[1], c.tangent1), determinant = k00 * k11 - k01 * k01;
+  const Lanes across = tangent1(c), mobility0 = mobilityAlong(d, c, c.tangent0),
+              mobility1 = mobilityAlong(d, c, across);
+  const double k00 = dotProduct(mobility0, c.tangent0), k11 = dotProduct(mobility1, across),
+               k01 = dotProduct(mobility0, across), determinant = k00 * k11 - k01 * k01;
   if (!(determinant > 0)) {
     c.friction = 0;
     return true;
@@ -149,7 +154,7 @@ void limitFriction(Contact& c) {
 
 Lanes impulseOf(const Contact& c) {
   return fma(splat(c.normalImpulse), c.normal,
-             fma(splat(c.tangentImpulse0), c.tangent0, splat(c.tangentImpulse1) * c.tangent1));
+             fma(splat(c.tangentImpulse0), c.tangent0, splat(c.tangentImpulse1) * tangent1(c)));
 }
 
 // The impulse of the substep before, along the directions of now. Both lists ascend in key.
@@ -162,7 +167,7 @@ void startFrom(WorldData& d, const std::vector<CarriedImpulse>& carried) {
     c.normalImpulse = std::max(0.0, dotProduct(impulse, c.normal));
     if (c.friction > 0) {
       c.tangentImpulse0 = dotProduct(impulse, c.tangent0);
-      c.tangentImpulse1 = dotProduct(impulse, c.tangent1);
+      c.tangentImpulse1 = dotProduct(impulse, tangent1(c));
       limitFriction(c);
     }
     apply(d, c, impulseOf(c));
@@ -180,14 +185,15 @@ double settle(WorldData& d, Contact& c) {
   Lanes impulse = splat(change) * c.normal;
   double size = std::abs(change);
   if (c.friction > 0) {
-    v = fma(splat(change), c.mobility[0], v);
-    const double v0 = dotProduct(v, c.tangent0), v1 = dotProduct(v, c.tangent1);
+    v = fma(splat(change), c.mobility, v);
+    const Lanes across = tangent1(c);
+    const double v0 = dotProduct(v, c.tangent0), v1 = dotProduct(v, across);
     const double before0 = c.tangentImpulse0, before1 = c.tangentImpulse1;
     c.tangentImpulse0 -= c.inverseTangent[0] * v0 + c.inverseTangent[2] * v1;
     c.tangentImpulse1 -= c.inverseTangent[2] * v0 + c.inverseTangent[1] * v1;
     limitFriction(c);
     const double change0 = c.tangentImpulse0 - before0, change1 = c.tangentImpulse1 - before1;
-    impulse = fma(splat(change0), c.tangent0, fma(splat(change1), c.tangent1, impulse));
+    impulse = fma(splat(change0), c.tangent0, fma(splat(change1), across, impulse));
     size = std::max(size, std::abs(change0) + std::abs(change1));
   }
   if (size > 0) apply(d, c, impulse);
