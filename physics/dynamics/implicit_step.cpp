@@ -33,9 +33,10 @@ Quad turned(const Quad& q, const Vector3d& turn) {
   return {{out.x(), out.y(), out.z(), out.w()}};
 }
 
-Matrix3d worldInertia(const ImplicitData& s, const Quad& orientation, int sphere) {
+Vector3d angularMomentum(const ImplicitData& s, const Quad& orientation, int sphere, const Vector3d& omega) {
   const Matrix3d r = quaternionOf(orientation).toRotationMatrix();
-  return r * s.inertia[sphere] * r.transpose();
+  const Vector3d inSphere = s.inertia[sphere] * (r.transpose() * omega);
+  return r * inSphere;
 }
 
 // out = a + f b, three numbers each
@@ -83,7 +84,7 @@ void balanceForces(WorldData& d, const ImplicitData& s, Motion& out) {
     const double mass = d.spheres.groups[i / 4].mass[i % 4];
     const Vector3d v = vectorOf(s.motion[2 * i]) - vectorOf(s.start.motion[2 * i]);
     out[2 * i] = quadOf(mass * v - t * vectorOf(d.spheres.force[i]));
-    out[2 * i + 1] = quadOf(worldInertia(s, d.spheres.orientation[i], i) * vectorOf(s.motion[2 * i + 1]) -
+    out[2 * i + 1] = quadOf(angularMomentum(s, d.spheres.orientation[i], i, vectorOf(s.motion[2 * i + 1])) -
                             vectorOf(s.start.angularMomentum[i]) - t * vectorOf(d.spheres.torque[i]));
   }
   const Vector3d gravity = vectorOf(d.gravity);
@@ -207,7 +208,7 @@ void beginSecondStage(WorldData& d, ImplicitData& s, double late) {
   const double gain = (1 - kGamma) / kGamma;  // p1 - p0 is the force times the first stage's duration
   for (int i = 0; i < d.spheres.count; ++i) {
     Quad& start = s.start.angularMomentum[i];
-    const Vector3d end = worldInertia(s, d.spheres.orientation[i], i) * vectorOf(s.motion[2 * i + 1]);
+    const Vector3d end = angularMomentum(s, d.spheres.orientation[i], i, vectorOf(s.motion[2 * i + 1]));
     start = quadOf(vectorOf(start) + gain * (end - vectorOf(start)));
   }
   place(d, s, late);
@@ -228,7 +229,7 @@ double kineticEnergy(const WorldData& d, const ImplicitData& s) {
   for (int i = 0; i < d.spheres.count; ++i) {
     const Vector3d omega = vectorOf(d.spheres.angularVelocity[i]);
     kinetic += d.spheres.groups[i / 4].mass[i % 4] * vectorOf(d.spheres.velocity[i]).squaredNorm() +
-               omega.dot(worldInertia(s, d.spheres.orientation[i], i) * omega);
+               omega.dot(angularMomentum(s, d.spheres.orientation[i], i, omega));
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) kinetic += d.nodes.mass[i] * vectorAt(d.nodes.velocity, i).squaredNorm();
   return 0.5 * kinetic;
@@ -304,7 +305,8 @@ bool attempt(WorldData& d, ImplicitData& s, std::size_t level, const Loads& load
   addToolImpulses(d, s.duration, s.toolImpulses);
   if (!settled && level <= kMustSettle) return false;
   for (int i = 0; i < d.spheres.count; ++i)
-    d.spheres.angularMomentum[i] = quadOf(worldInertia(s, d.spheres.orientation[i], i) * vectorOf(s.motion[2 * i + 1]));
+    d.spheres.angularMomentum[i] =
+        quadOf(angularMomentum(s, d.spheres.orientation[i], i, vectorOf(s.motion[2 * i + 1])));
   // Backward Euler loses energy where the potential is convex; elsewhere this decides. Order 2 swings about it.
   const double given = workOf(d, s), elastic = elasticEnergy(d), kinetic = kineticEnergy(d, s);
   const double scale = energyBefore + std::abs(given), allowed = energyBefore + given - elastic;

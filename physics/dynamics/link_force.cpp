@@ -276,22 +276,27 @@ void returnLinkForces(WorldData& d) {
   }
 }
 
+// J, of the link in one lane.
+static double energyOf(const LinkGroup& link, const LinkMeasures& m, const Flexion& q0, const Flexion& q1, Lanes twice,
+                       int lane) {
+  const double rest = link.restLength[lane], length = m.length[lane], linear = 0.5 * (length - rest) * (length - rest);
+  return 0.5 * twice[lane] + foldEnergy(m.end0, q0, link.flexionU0 + link.flexionV0, lane) +
+         foldEnergy(m.end1, q1, link.flexionU1 + link.flexionV1, lane) +
+         link.elongation[lane] * (link.neoHookean[lane] > 0 ? rest * rest * neoHookeanEnergy(length / rest) : linear);
+}
+
 double linkEnergy(const WorldData& d) {
   double sum = 0;
-  for (int k = 0; k < d.links.count; ++k) {
-    const LinkGroup& link = d.links.groups[k / 4];
-    const int lane = k % 4;
+  for (std::size_t g = 0; g < d.links.groups.size(); ++g) {
+    const LinkGroup& link = d.links.groups[g];
     const LinkMeasures m =
         measure(link, gatherSpheres(d.spheres, link.sphere0, link.restArm0, link.hasArms),
-                gatherSpheres(d.spheres, link.sphere1, link.restArm1, link.hasArms), load(d.links.unwoundTwist[k / 4]));
+                gatherSpheres(d.spheres, link.sphere1, link.restArm1, link.hasArms), load(d.links.unwoundTwist[g]));
     const Flexion q0 = flexionOf(m.end0), q1 = flexionOf(m.end1);
     const Flexion m0 = momentsAt0(link, m, q0, q1), m1 = momentsAt1(link, m, q0, q1);
     const Lanes twice = q0.a * m0.a + q0.b * m0.b + q1.a * m1.a + q1.b * m1.b + link.torsion * m.twist * m.twist;
-    const double rest = link.restLength[lane], length = m.length[lane],
-                 linear = 0.5 * (length - rest) * (length - rest);
-    sum += 0.5 * twice[lane] + foldEnergy(m.end0, q0, link.flexionU0 + link.flexionV0, lane) +
-           foldEnergy(m.end1, q1, link.flexionU1 + link.flexionV1, lane) +
-           link.elongation[lane] * (link.neoHookean[lane] > 0 ? rest * rest * neoHookeanEnergy(length / rest) : linear);
+    const int lanes = std::min(4, d.links.count - 4 * static_cast<int>(g));
+    for (int lane = 0; lane < lanes; ++lane) sum += energyOf(link, m, q0, q1, twice, lane);
   }
   return sum;
 }

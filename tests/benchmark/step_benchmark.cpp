@@ -65,8 +65,8 @@ static void implicitStep(benchmark::State& state, SurfaceMode surface) {
   state.counters["solves_per_step"] = solves / static_cast<double>(state.iterations());
   state.counters["solve"] = benchmark::Counter(solves, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
-BENCHMARK_CAPTURE(implicitStep, spheres, SurfaceMode::skin);
-BENCHMARK_CAPTURE(implicitStep, full, SurfaceMode::full);
+BENCHMARK_CAPTURE(implicitStep, spheres, SurfaceMode::skin)->Iterations(60);
+BENCHMARK_CAPTURE(implicitStep, full, SurfaceMode::full)->Iterations(20);
 
 static void runStage(benchmark::State& state, void (*stage)(WorldData&)) {
   World world({}, synthetic::abdomenScene());
