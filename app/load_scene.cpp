@@ -62,6 +62,12 @@ static void resolveLoads(const Scene& scene, const SoftBodyModel& model, SceneBo
   }
 }
 
+static Reference loadReference(const Scene& scene, const SceneBody& body, const SoftBodyModel& model) {
+  if (body.referencePath.empty()) return {};
+  requireFile(scene, body.line, "reference", body.referencePath);
+  return readReference(body.referencePath, model);
+}
+
 static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene& scene) {
   std::vector<std::shared_ptr<const SoftBodyModel>> models;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
@@ -116,6 +122,7 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     resolveFixes(scene, *loaded.models[b], scene.bodies[b]);
     resolveLoads(scene, *loaded.models[b], scene.bodies[b]);
+    loaded.references.push_back(loadReference(scene, scene.bodies[b], *loaded.models[b]));
   }
   for (const SceneStatic& item : scene.statics) {
     if (!item.look.empty()) requireLook(scene, item.line, item.look);

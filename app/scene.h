@@ -37,6 +37,7 @@ struct SceneBody {
   SurfaceMode surface = SurfaceMode::full;
   LinkModel links = LinkModel::beam;
   std::string name, modelPath, look;
+  std::string referencePath;  // where another program puts its vertices at the end; empty: none
   Tissue tissue;
   LinkFactors factors;
   std::vector<FixedSphere> fixed;  // by number; loadScene() adds those that fixed nodes hold

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "app/files/reference_file.h"
 #include "app/scene.h"
 #include "haptics/servo.h"
 #include "physics/dynamics/world.h"
@@ -18,6 +19,7 @@ struct LoadedScene {
   std::vector<std::shared_ptr<const SoftBodyModel>> models;  // one per body
   std::vector<TriangleMesh> statics;                         // one per static, in its frame; what is drawn
   std::vector<Trajectory> trajectories;                      // one per tool
+  std::vector<Reference> references;                         // one per body; without displacements where none is named
 };
 
 // `trajectories` replaces tools' files, by tool name. Throws std::runtime_error with file and line; a file that is

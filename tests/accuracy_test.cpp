@@ -115,9 +115,13 @@ INSTANTIATE_TEST_SUITE_P(
         StaticCase{"gallbladder_axial", 7, 9.4, 4.1, 0.8}, StaticCase{"gallbladder_torsion", 7, 12.1, 4.1, 0.1},
         StaticCase{"gallbladder_poke_small", 7, 37.2, 12, 0.3},
         StaticCase{"gallbladder_poke_large", 7, 41.2, 23.3, 0.8}, StaticCase{"liver_tip", 35, 20.2, 7, 0.1},
+        StaticCase{"cylinder_tip_large", 25, 2.5, 1.1, 0.1}, StaticCase{"gallbladder_tip_large", 25, 7.2, 3.4, 0.3},
         StaticCase{"liver_tip_in_plane", 35, 21.4, 10.2, 0.3}, StaticCase{"liver_mid", 35, 36.4, 11, 0.4},
         StaticCase{"liver_axial", 35, 35.1, 18.2, 1.6}),
-    [](const auto& tested) { return tested.param.name; });
+    [](const auto& tested) {
+      const StaticCase& c = tested.param;
+      return c.spheres == 25 ? c.name + std::string("_of_25") : std::string(c.name);
+    });
 
 // The loaded vertices' mean displacement along the load swings about where it ends: its extremes give the first mode's
 // frequency and damping ratio.

@@ -18,7 +18,7 @@ inline constexpr const char* completeScene = R"(<?xml version="1.0"?>
   <tissue name="liver"/>
   <body name="gallbladder" model="../assets/gallbladder.model.xml" tissue="bile_sac" look="gallbladder"
         position="0.1 0.2 0.3"
-        orientation="0.707 0 0.707 0" links="springs" surface="skin">
+        orientation="0.707 0 0.707 0" links="springs" surface="skin" reference="fem.txt">
     <fix spheres="0 1" dof="translation"/>
     <fix spheres="4" dof="all"/> <drive sphere="2" axis="0 1 1" amplitude="0.1" frequency="2" phase="0.5" velocity="1 0 0"/>
     <links select="all" elongation="2" flexion="3" torsion="0.5"/><neighbours names="second"/>

@@ -241,7 +241,6 @@ static TriangleMesh torusMesh(double ringRadius, double tubeRadius, int around, 
 
 TEST(ModelBuild, RingStaysClosed) {
   const TriangleMesh mesh = torusMesh(0.05, 0.01, 48, 16);
-  EXPECT_EQ(countHandles(mesh), 1);
   BuildReport report;
   BuildSettings settings;
   settings.spheres = 12;

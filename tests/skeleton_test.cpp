@@ -38,15 +38,6 @@ TEST(Skeleton, GallbladderIsOneTree) {
   EXPECT_EQ(countComponents(static_cast<int>(skeleton.nodes.size()), linksOf(skeleton)), 1);
 }
 
-TEST(Skeleton, TellsTubesFromBulkyBodies) {
-  const auto tubular = [](const TriangleMesh& mesh) {
-    return isTubular(mesh, makeSurfaceTree(mesh), collapseEdges(mesh));
-  };
-  EXPECT_TRUE(tubular(cylinderMesh(0.1, 0.01, 12, 30)));
-  EXPECT_TRUE(tubular(assetMesh("gallbladder/gallbladder.obj")));
-  EXPECT_FALSE(tubular(assetMesh("liver/liver.obj")));
-}
-
 TEST(Skeleton, SphereAndEqualLengthsGiveOneAnswer) {
   const TriangleMesh mesh = ellipsoidMesh(2, {1, 1, 1});
   const Skeleton a = collapseEdges(mesh), b = collapseEdges(mesh);

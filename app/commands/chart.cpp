@@ -6,12 +6,15 @@
 #include <map>
 #include <set>
 
+#include "app/commands/chart_errors.h"
 #include "app/commands/commands.h"
 #include "app/files/chart_file.h"
 #include "app/files/gnuplot.h"
 #include "app/files/output_file.h"
+#include "app/files/sphere_chart.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
+#include "physics/model/build_report.h"
 
 namespace medulla {
 
@@ -90,7 +93,8 @@ void requireSameMeshes(const LoadedScene& a, const LoadedScene& b) {
                                            b.scene.bodies[k].modelPath, a.scene.bodies[k].modelPath));
 }
 
-// Every run of the chart; the reference last: the first method on the most spheres, at half of the smallest step.
+// Every run of the chart. Where the scene names no reference there is one more, the reference, last: the first method
+// on the most spheres, at half of the smallest step.
 std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& base) {
   std::vector<std::vector<SceneOverride>> models;
   for (const std::string& model : options.models) models.push_back({modelOverride(model, base.scene)});
@@ -120,14 +124,16 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
       for (const int count : substeps) add(run, count);
     }
   }
-  add(reference, 2 * *substeps.rbegin());
+  if (!namesReference(base)) add(reference, 2 * *substeps.rbegin());
   return runs;
 }
 
-// Where a run is compared: at the scene's golden times and at the end.
-std::vector<RecordedFrame> framesToRecord(const Scene& scene) {
+// Where a run is compared: at the scene's golden times and at the end; with a reference at the end alone.
+std::vector<RecordedFrame> framesToRecord(const LoadedScene& loaded) {
+  const Scene& scene = loaded.scene;
   std::vector<RecordedFrame> out;
-  for (const double time : scene.goldenTimes) out.push_back({time, {}});
+  if (!namesReference(loaded))
+    for (const double time : scene.goldenTimes) out.push_back({time, {}});
   if (out.empty() || out.back().time < scene.duration) out.push_back({scene.duration, {}});
   return out;
 }
@@ -138,7 +144,7 @@ Outcome execute(const ChartRun& run, const std::function<void(double)>& progress
   out.point.curve = run.curve;
   out.point.spheres = run.spheres;
   out.point.step = run.step;
-  out.moments = framesToRecord(loaded.scene);
+  out.moments = framesToRecord(loaded);
   Simulation simulation(loaded);
   const double start = processCpuSeconds();
   while (!simulation.finished() && !out.point.failedAt) {
@@ -150,6 +156,11 @@ Outcome execute(const ChartRun& run, const std::function<void(double)>& progress
       out.point.failedAt = simulation.totals().simulated;
     }
     progress(simulation.totals().simulated);
+  }
+  for (int b = 0; b < static_cast<int>(loaded.models.size()); ++b) {
+    const double ratio = simulation.world().volumeRatio(b);
+    if (!out.point.volumeRatio || std::abs(ratio - 1) > std::abs(*out.point.volumeRatio - 1))
+      out.point.volumeRatio = ratio;
   }
   out.point.cpu = (processCpuSeconds() - start) / simulation.totals().simulated;
   return out;
@@ -169,76 +180,56 @@ Outcome executeQuickest(const ChartRun& run, double duration, const std::functio
   return out;
 }
 
-// m, of the node that is farthest from where it lies at rest.
-double largestDisplacement(const LoadedScene& loaded, const std::vector<RecordedFrame>& moments) {
-  double squared = 0;
-  for (const RecordedFrame& m : moments)
-    for (std::size_t b = 0; b < m.frame.bodies.size(); ++b)
-      for (std::size_t i = 0; i < m.frame.bodies[b].nodes.size(); ++i) {
-        const Eigen::Vector3d rest = loaded.scene.bodies[b].worldFromModel * loaded.models[b]->restNodes[i];
-        squared = std::max(squared, (m.frame.bodies[b].nodes[i] - rest).squaredNorm());
-      }
-  return std::sqrt(squared);
-}
-
-struct Deviation {
-  double largest = 0, sum = 0;  // m, m2
-  std::size_t count = 0;
-  void add(const DynamicsFrame& a, const DynamicsFrame& b) {
-    for (std::size_t k = 0; k < a.bodies.size(); ++k)
-      for (std::size_t i = 0; i < a.bodies[k].nodes.size(); ++i) {
-        const double squared = (a.bodies[k].nodes[i] - b.bodies[k].nodes[i]).squaredNorm();
-        largest = std::max(largest, std::sqrt(squared));
-        sum += squared;
-        ++count;
-      }
-  }
-  double rms() const { return std::sqrt(sum / static_cast<double>(count)); }
-};
-
-void measureErrors(Outcome& run, const Outcome& reference, double displacement) {
-  if (run.point.failedAt) return;
-  Deviation all, end;
-  for (std::size_t k = 0; k < run.moments.size(); ++k) all.add(run.moments[k].frame, reference.moments[k].frame);
-  end.add(run.moments.back().frame, reference.moments.back().frame);
-  const double percent = 100 / displacement;
-  run.point.errorMax = percent * all.largest;
-  run.point.errorRms = percent * all.rms();
-  run.point.endErrorMax = percent * end.largest;
-  run.point.endErrorRms = percent * end.rms();
-}
-
-std::vector<ChartPoint> executeAll(const std::vector<ChartRun>& runs, const LoadedScene& base, double& displacement) {
-  Progress progress("chart", base.scene.duration * static_cast<double>(runs.size()), "s");
-  double done = 0;
-  const auto update = [&](double simulated) { progress.update(done + simulated); };
-  const Outcome reference = execute(runs.back(), update);
+// The run that all others are measured against, the last one planned, leaves the list.
+ChartTruth runReference(std::vector<ChartRun>& runs, const LoadedScene& base,
+                        const std::function<void(double)>& progress) {
+  const ChartRun run = runs.back();
+  runs.pop_back();
+  const Outcome reference = execute(run, progress);
   if (reference.point.failedAt)
     throw std::runtime_error(
         fmt::format("the reference run with substeps of {:.3g} ms is not finite at {:.6g} s: use "
                     "smaller --steps",
-                    1e3 * runs.back().step, *reference.point.failedAt));
-  displacement = largestDisplacement(base, reference.moments);
-  if (!(displacement > 0)) throw std::runtime_error("nothing moves in this scene: no error can be stated");
-  std::vector<ChartPoint> points;
-  for (std::size_t k = 0; k + 1 < runs.size(); ++k) {
+                    1e3 * run.step, *reference.point.failedAt));
+  ChartTruth truth = truthOfRun(base, reference.moments);
+  truth.step = run.step;
+  truth.spheres = run.spheres;
+  return truth;
+}
+
+std::vector<ChartPoint> executeAll(std::vector<ChartRun> runs, const LoadedScene& base, ChartTruth& truth) {
+  Progress progress("chart", base.scene.duration * static_cast<double>(runs.size()), "s");
+  double done = 0;
+  const auto update = [&](double simulated) { progress.update(done + simulated); };
+  if (namesReference(base)) {
+    truth = truthOfReferences(base);
+  } else {
+    truth = runReference(runs, base, update);
     done += base.scene.duration;
-    Outcome run = executeQuickest(runs[k], base.scene.duration, update);
-    measureErrors(run, reference, displacement);
-    points.push_back(run.point);
   }
+  std::vector<ChartPoint> points;
+  for (const ChartRun& run : runs) {
+    Outcome out = executeQuickest(run, base.scene.duration, update);
+    done += base.scene.duration;
+    if (truth.cost == ChartCost::ofTheCase) out.point.cpu *= base.scene.duration;
+    if (!out.point.failedAt) measureErrors(base, truth, out.moments, out.point);
+    points.push_back(out.point);
+  }
+  points.insert(points.end(), truth.ownRuns.begin(), truth.ownRuns.end());
   markFront(points);
   return points;
 }
 
-std::vector<Result> chartResults(const std::vector<ChartPoint>& points, const ChartRun& reference,
-                                 double displacement) {
+std::vector<Result> chartResults(const std::vector<ChartPoint>& points, const ChartTruth& truth) {
   const auto failed = std::count_if(points.begin(), points.end(), [](const ChartPoint& p) { return bool(p.failedAt); });
-  std::vector<Result> results = {{"runs", fmt::format("{}", points.size()), ""},
-                                 {"failed", fmt::format("{}", failed), ""},
-                                 {"reference_step", fmt::format("{:.4g}", reference.step), "s"},
-                                 {"reference_spheres", fmt::format("{}", reference.spheres), ""},
-                                 {"largest_displacement", fmt::format("{:.4g}", displacement), "m"}};
+  const bool perSecond = truth.cost == ChartCost::perSimulatedSecond;
+  std::vector<Result> results = {{"runs", fmt::format("{}", points.size() - truth.ownRuns.size()), ""},
+                                 {"failed", fmt::format("{}", failed), ""}};
+  if (perSecond) {
+    results.push_back({"reference_step", fmt::format("{:.4g}", truth.step), "s"});
+    results.push_back({"reference_spheres", fmt::format("{}", truth.spheres), ""});
+  }
+  results.push_back({"largest_displacement", fmt::format("{:.4g}", truth.displacement), "m"});
   // Time at equal accuracy: the cheapest run of each curve that is good enough.
   for (const double percent : {1.0, 2.0, 5.0, 10.0}) {
     std::map<std::string, double> cheapest;
@@ -248,9 +239,42 @@ std::vector<Result> chartResults(const std::vector<ChartPoint>& points, const Ch
       if (!isNew) known->second = std::min(known->second, p.cpu);
     }
     for (const auto& [curve, cpu] : cheapest)
-      results.push_back({fmt::format("{}.cpu_at_{}%", curve, percent), fmt::format("{:.4g}", cpu), "s/s"});
+      results.push_back(
+          {fmt::format("{}.cpu_at_{}%", curve, percent), fmt::format("{:.4g}", cpu), perSecond ? "s/s" : "s"});
   }
   return results;
+}
+
+// Per model how well its balls fit, and the cheapest run of the first method at its smallest step.
+std::vector<SphereChartRow> sphereRows(const ChartOptions& options, const LoadedScene& base,
+                                       const std::vector<ChartPoint>& points) {
+  std::vector<SphereChartRow> rows;
+  for (const std::string& model : options.models) {
+    RunOptions run = options.run;
+    run.overrides.push_back(modelOverride(model, base.scene));
+    const LoadedScene loaded = loadRun(run);
+    SphereChartRow row;
+    row.spheres = spheresOf(loaded);
+    for (const auto& m : loaded.models) {
+      const BuildReport report = measureModel(*m);
+      row.gapMax = std::max(row.gapMax, report.gapMax);
+      row.gapMean = std::max(row.gapMean, report.gapMean);
+    }
+    const ChartPoint* finest = nullptr;
+    for (const ChartPoint& p : points)
+      if (p.curve.starts_with(options.methods[0] + "_") && p.spheres == row.spheres && !p.failedAt &&
+          (!finest || p.step < finest->step))
+        finest = &p;
+    if (finest) {
+      row.step = finest->step;
+      row.cpu = finest->cpu;
+      row.errorMax = finest->errorMax;
+      row.errorRms = finest->errorRms;
+    }
+    rows.push_back(row);
+  }
+  std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.spheres < b.spheres; });
+  return rows;
 }
 
 }  // namespace
@@ -261,28 +285,40 @@ std::vector<std::string> chartMethodNames() {
   return out;
 }
 
+// The picture that gnuplot makes of a script, and the script itself.
+static void draw(const std::string& stem, const std::string& text) {
+  const std::string script = stem + ".gnuplot", picture = stem + ".svg";
+  writeText(script, text);
+  if (const std::optional<std::string> svg = runGnuplot(script)) {
+    writeText(picture, *svg);
+  } else {
+    fmt::print(stderr, "no {}: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {} > {}\n",
+               fs::path(picture).filename().string(), script, picture);
+  }
+}
+
 int runChart(const ChartOptions& options) {
   const LoadedScene base = loadRun(options.run);
-  const std::string csv = (fs::path(options.folder) / "chart.csv").string(),
-                    script = (fs::path(options.folder) / "chart.gnuplot").string(),
-                    picture = (fs::path(options.folder) / "chart.svg").string();
+  const std::string chart = (fs::path(options.folder) / "chart").string(),
+                    spheres = (fs::path(options.folder) / "spheres").string();
   std::error_code error;
   const bool made = fs::create_directories(options.folder, error);
   if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", options.folder, error.message()));
   try {
-    requireDistinctOutputs(base, options.run, {csv, script, picture});
-    const std::vector<ChartRun> runs = planRuns(options, base);
-    double displacement = 0;
-    const std::vector<ChartPoint> points = executeAll(runs, base, displacement);
-    writeChart(csv, points);
-    writeText(script, chartScript(base.scene.name, points));
-    if (const std::optional<std::string> svg = runGnuplot(script)) {
-      writeText(picture, *svg);
-    } else {
-      fmt::print(stderr, "no chart.svg: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {} > {}\n",
-                 script, picture);
+    std::vector<std::string> outputs;
+    for (const std::string& stem : {chart, spheres})
+      for (const char* ending : {".csv", ".gnuplot", ".svg"}) outputs.push_back(stem + ending);
+    requireDistinctOutputs(base, options.run, outputs);
+    ChartTruth truth;
+    const std::vector<ChartPoint> points = executeAll(planRuns(options, base), base, truth);
+    writeChart(chart + ".csv", points, truth.cost);
+    draw(chart, chartScript(base.scene.name, points, truth.cost));
+    if (options.models.size() > 1) {
+      const std::vector<SphereChartRow> rows = sphereRows(options, base, points);
+      writeSphereChart(spheres + ".csv", rows, truth.cost);
+      draw(spheres, sphereChartScript(base.scene.name, rows, truth.cost));
     }
-    printResults(chartResults(points, runs.back(), displacement));
+    printResults(chartResults(points, truth));
   } catch (...) {
     if (made) fs::remove(options.folder, error);  // if it is empty again
     throw;

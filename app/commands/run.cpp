@@ -148,7 +148,7 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
                             const std::vector<std::string>& pictures) {
   const Scene& scene = loaded.scene;
   std::vector<std::string> inputs{options.scene}, outputs = pictures;
-  for (const SceneBody& body : scene.bodies) inputs.push_back(body.modelPath);
+  for (const SceneBody& body : scene.bodies) inputs.insert(inputs.end(), {body.modelPath, body.referencePath});
   for (const SceneStatic& item : scene.statics)
     if (!item.meshPath.empty()) inputs.push_back(item.meshPath);
   for (const SceneTool& tool : scene.tools) inputs.push_back(tool.trajectoryPath);

@@ -18,14 +18,14 @@ bool atRim(const ChartPoint& p) {
   return p.failedAt || !(p.errorMax < kRim);
 }
 
-// The points of a plot as a here-document: cost, error, and the step in ms as a label.
+// The points of a plot as a here-document: cost, error, and the step in ms as a label; of other programs, the nodes.
 template <typename Wanted>
 std::string dataBlock(const std::string& name, const std::vector<ChartPoint>& points, const Wanted& wanted) {
   std::string out = fmt::format("${} << EOD\n", name);
   for (const ChartPoint& p : points) {
     if (!wanted(p)) continue;
     const double error = atRim(p) ? kRim : std::max(kLeastShown, p.errorMax);
-    out += fmt::format("{:.6g} {:.6g} {:.3g}\n", p.cpu, error, 1e3 * p.step);
+    out += fmt::format("{:.6g} {:.6g} {:.3g}\n", p.cpu, error, p.nodes > 0 ? p.nodes : 1e3 * p.step);
   }
   return out + "EOD\n";
 }
@@ -45,7 +45,7 @@ std::string ticks(double low, double high) {
   return fmt::format("set xtics ({})\n", list);
 }
 
-std::string axes(const std::string& title, const std::vector<ChartPoint>& points) {
+std::string axes(const std::string& title, const std::vector<ChartPoint>& points, ChartCost cost) {
   double low = points[0].cpu, high = low, least = kRim;
   for (const ChartPoint& p : points) {
     low = std::min(low, p.cpu);
@@ -63,15 +63,16 @@ std::string axes(const std::string& title, const std::vector<ChartPoint>& points
       "set format '%g'\n"
       "set ytics add ('0.001 or less' 0.001)\n"
       "set key outside right top Left reverse samplen 2 spacing 1.3\n"
-      "set xlabel 'CPU seconds per simulated second'\n"
       "set ylabel 'largest error of a surface node, % of the largest displacement'\n";
+  out += cost == ChartCost::ofTheCase ? "set xlabel 'CPU seconds of the whole load case'\n"
+                                      : "set xlabel 'CPU seconds per simulated second'\n";
   out += ticks(low, high);
   out += fmt::format("set title '{}'\n", title);
   out += fmt::format("set xrange [{:.6g}:{:.6g}]\n", low, high);
   out += fmt::format("set yrange [{:.6g}:{:.6g}]\n",
                      least > kLeastShown ? std::pow(10, std::floor(std::log10(least))) : 0.7 * kLeastShown, 1.6 * kRim);
   out += fmt::format("set arrow 1 from graph 0, first {0} to graph 1, first {0} nohead lc '#bb4444' dt 3\n", kRim);
-  if (low < 1 && high > 1)
+  if (cost == ChartCost::perSimulatedSecond && low < 1 && high > 1)
     out +=
         "set arrow 2 from first 1, graph 0 to first 1, graph 1 nohead lc '#888888' dt 2\n"
         "set label 2 'real time' at first 1, graph 0.02 offset 0.5,0 tc '#888888' font ',11'\n";
@@ -89,29 +90,35 @@ void markFront(std::vector<ChartPoint>& points) {
   }
 }
 
-void writeChart(const std::string& path, const std::vector<ChartPoint>& points) {
+void writeChart(const std::string& path, const std::vector<ChartPoint>& points, ChartCost cost) {
   OutputFile file(path);
+  const auto cell = [](const std::optional<double>& value) { return value ? fmt::format("{:.4g},", *value) : ","; };
   file.write(
-      "curve,spheres,step[s],cpu[s/s],error_max[%],error_rms[%],end_error_max[%],end_error_rms[%],failed_at[s],"
-      "on_front\n");
+      fmt::format("curve,spheres,step[s],cpu[{}],error_max[%],error_rms[%],end_error_max[%],end_error_rms[%],"
+                  "loaded_error_max[%],loaded_error_rms[%],rest_error_max[%],rest_error_rms[%],volume_ratio,nodes,"
+                  "failed_at[s],on_front\n",
+                  cost == ChartCost::ofTheCase ? "s" : "s/s"));
   for (const ChartPoint& p : points) {
     file.write(fmt::format("{},{},{:.6g},{:.4g},", p.curve, p.spheres, p.step, p.cpu));
     if (p.failedAt) {
-      file.write(fmt::format(",,,,{:.6g},0\n", *p.failedAt));
+      file.write(fmt::format(",,,,,,,,,,{:.6g},0\n", *p.failedAt));
     } else {
-      file.write(fmt::format("{:.4g},{:.4g},{:.4g},{:.4g},,{:d}\n", p.errorMax, p.errorRms, p.endErrorMax,
-                             p.endErrorRms, p.onFront));
+      file.write(fmt::format("{:.4g},{:.4g},{:.4g},{:.4g},", p.errorMax, p.errorRms, p.endErrorMax, p.endErrorRms));
+      for (const std::optional<double>& value :
+           {p.loadedErrorMax, p.loadedErrorRms, p.restErrorMax, p.restErrorRms, p.volumeRatio})
+        file.write(cell(value));
+      file.write(fmt::format("{},,{:d}\n", p.nodes > 0 ? fmt::format("{}", p.nodes) : "", p.onFront));
     }
   }
   file.commit();
 }
 
-std::string chartScript(const std::string& title, const std::vector<ChartPoint>& points) {
+std::string chartScript(const std::string& title, const std::vector<ChartPoint>& points, ChartCost cost) {
   // Okabe and Ito (2008): told apart by all kinds of eyes.
   constexpr const char* kColours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                       "#e69f00", "#56b4e9", "#000000", "#999933"};
   const std::vector<std::string> curves = curvesOf(points);
-  std::string out = axes(title, points), plot = "plot ";
+  std::string out = axes(title, points, cost), plot = "plot ";
   std::vector<ChartPoint> sorted = points;
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const ChartPoint& a, const ChartPoint& b) { return a.cpu < b.cpu; });
@@ -136,7 +143,9 @@ std::string chartScript(const std::string& title, const std::vector<ChartPoint>&
         ", \\\n  ${0}failed using 1:2:3 with labels offset 0,-0.9 font ',10' tc '{1}' notitle",
         name, colour, 5 + 2 * (k % 5), legend);
   }
-  out += "set label 3 'numbers: substep, ms' at graph 1.02, graph 0 left tc '#888888' font ',11'\n";
+  const bool others = std::any_of(points.begin(), points.end(), [](const ChartPoint& p) { return p.nodes > 0; });
+  out += fmt::format("set label 3 'numbers: substep, ms{}' at graph 1.02, graph 0 left tc '#888888' font ',11'\n",
+                     others ? "; of FEM, nodes" : "");
   plot += ", \\\n  NaN with points pt 2 ps 1 lw 2 lc '#555555' title 'failed, or 100 % wrong'";
   return out + plot + "\n";
 }

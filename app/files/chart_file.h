@@ -11,21 +11,28 @@ struct ChartPoint {
   std::string curve;  // of the method, and of the model where there are several
   int spheres = 0;    // of all bodies
   double step = 0;    // s, of a substep
-  double cpu = 0;     // CPU seconds per simulated second
+  int nodes = 0;      // of a run of the reference's own program; 0: a run of this one
+  double cpu = 0;     // CPU seconds, as ChartCost says
   // Distance of surface nodes from the reference, % of its largest displacement: over all moments, and at the end.
   double errorMax = 0, errorRms = 0, endErrorMax = 0, endErrorRms = 0;
-  std::optional<double> failedAt;  // s, where the state stopped being finite; errors are then of no account
-  bool onFront = false;            // no other run is both cheaper and more accurate
+  // The same at the end, of the nodes that dead loads act on and of the rest; none where there are no such nodes.
+  std::optional<double> loadedErrorMax, loadedErrorRms, restErrorMax, restErrorRms;
+  std::optional<double> volumeRatio;  // at the end, of the body whose volume has changed most
+  std::optional<double> failedAt;     // s, where the state stopped being finite; errors are then of no account
+  bool onFront = false;               // no other run is both cheaper and more accurate
 };
+
+// What a run costs: a scene goes on, a load case with a reference is done at its end.
+enum class ChartCost { perSimulatedSecond, ofTheCase };
 
 // Marks the Pareto front of cost against largest error.
 void markFront(std::vector<ChartPoint>& points);
 
 // CSV, a row per run. Errors are those of OutputFile.
-void writeChart(const std::string& path, const std::vector<ChartPoint>& points);
+void writeChart(const std::string& path, const std::vector<ChartPoint>& points, ChartCost cost);
 
 // The picture as a script for gnuplot that writes SVG to standard output: cost across, largest error upwards, both
 // logarithmic; a curve per method; what failed or is wrong by 100 % and more on the upper rim.
-std::string chartScript(const std::string& title, const std::vector<ChartPoint>& points);
+std::string chartScript(const std::string& title, const std::vector<ChartPoint>& points, ChartCost cost);
 
 }  // namespace medulla

@@ -272,6 +272,7 @@ void readBodies(const XmlElement& root, Scene& scene) {
     constexpr SurfaceMode surfaces[] = {SurfaceMode::full, SurfaceMode::skin, SurfaceMode::contact};
     body.surface = surfaces[readChoice(*e, "surface", {"full", "skin", "contact"}, 0)];
     body.worldFromModel = readPlacement(*e);
+    if (e->find("reference")) body.referencePath = readPath(*e, "reference", scene.path);
     readFixations(*e, scene.path, body);
     body.loads = readLoads(*e, scene.path);
     body.driven = readDrivenSpheres(*e, body.fixed);

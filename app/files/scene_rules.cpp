@@ -22,7 +22,7 @@ const XmlRules& sceneRules() {
       {"tissue", {"name"}, {"young", "poisson", "density", "damping", "friction"}, {}},
       {"body",
        {"name", "model", "tissue", "look"},
-       {"position", "orientation", "links", "surface"},
+       {"position", "orientation", "links", "surface", "reference"},
        {{"fix", 0, many}, {"drive", 0, many}, {"load", 0, many}, {"links", 0, 1}, {"neighbours", 0, 1}}},
       {"fix", {}, {"sphere", "spheres", "box", "plane", "vertices", "dof"}, {}},
       {"drive", {"sphere", "axis", "amplitude", "frequency"}, {"phase", "velocity"}, {}},

@@ -95,15 +95,13 @@ SpheresAndLinks spheresOfSkeleton(const BodyShape& shape, const Skeleton& skelet
   return s;
 }
 
-SpheresAndLinks spheresByCover(const BodyShape& shape, const Skeleton& skeleton, std::vector<Ball> balls) {
+SpheresAndLinks spheresByCover(const BodyShape& shape, std::vector<Ball> balls) {
   SpheresAndLinks s;
   s.balls = std::move(balls);
   const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, voxelsFor(static_cast<int>(s.balls.size())));
   s.cells = divideByPower(voxels, s.balls, shape.exact);
   dropEmptyCells(voxels, shape.exact, s);
-  // A ring is no tree: handles need the links that close them.
-  const bool treeOnly = countHandles(shape.mesh) == 0 && isTubular(shape.mesh, shape.tree, skeleton);
-  s.links = linkCells(shape.tree, s.cells, s.balls, treeOnly);
+  s.links = linkCells(shape.tree, s.cells, s.balls);
   return s;
 }
 
@@ -189,9 +187,9 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
   if (settings.method == BuildMethod::skeleton) {
     s = spheresOfSkeleton(shape, model.skeleton);
   } else if (settings.gap > 0) {
-    s = spheresByCover(shape, model.skeleton, fewestBalls(shape, settings.gap, spheresMax, choosing));
+    s = spheresByCover(shape, fewestBalls(shape, settings.gap, spheresMax, choosing));
   } else {
-    s = spheresByCover(shape, model.skeleton, chooseBalls(shape, settings.spheres, CoverGoal::gapAndVolume, choosing));
+    s = spheresByCover(shape, chooseBalls(shape, settings.spheres, CoverGoal::gapAndVolume, choosing));
   }
   done(0.7);
   hangNodesAndShareMass(shape, s, settings.surfaceMassFraction, model);

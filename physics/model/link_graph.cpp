@@ -4,9 +4,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "physics/model/mesh_topology.h"
-#include "physics/model/plane_section.h"
-
 namespace medulla {
 
 namespace {
@@ -56,8 +53,7 @@ std::vector<Candidate> candidatesOf(const SurfaceTree& tree, const PowerCells& c
 
 }  // namespace
 
-SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const std::vector<Ball>& balls, bool treeOnly,
-                      int degreeMax) {
+SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const std::vector<Ball>& balls, int degreeMax) {
   constexpr double contactRatioMin = 0.15;  // cells that only share a corner or an edge fall below
   const std::vector<Candidate> candidates = candidatesOf(tree, cells);
   SphereLinks links;
@@ -71,7 +67,7 @@ SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const st
   for (const Candidate& c : candidates) {
     if (unite(parent, c.spheres[0], c.spheres[1])) {
       add(c.spheres);
-    } else if (c.score > contactRatioMin && !treeOnly) {
+    } else if (c.score > contactRatioMin) {
       further.push_back(c);
     }
   }
@@ -113,31 +109,6 @@ int countComponents(int spheres, const SphereLinks& links) {
   int components = spheres;
   for (const std::array<int, 2>& link : links) components -= unite(parent, link[0], link[1]) ? 1 : 0;
   return components;
-}
-
-bool isTubular(const TriangleMesh& mesh, const SurfaceTree& tree, const Skeleton& skeleton) {
-  constexpr double fillMin = 0.65;  // measured: gallbladder, stomach and guts .72 to .81; livers .47 to .56
-  constexpr int stations = 5;
-  // The part nearest to the link's own ends: other windings of a gut cross the same plane.
-  const std::size_t nodes = skeleton.nodes.size();
-  const PowerSites nearest{skeleton.nodes, std::vector<double>(nodes, 0),
-                           std::vector<double>(nodes, boundsDiagonal(mesh))};
-  std::vector<double> fills;
-  for (const std::array<int, 2>& link : skeleton.links) {
-    const Eigen::Vector3d a = skeleton.nodes[link[0]], along = skeleton.nodes[link[1]] - a;
-    if (along.norm() == 0) continue;
-    for (int k = 0; k < stations; ++k) {
-      const Plane plane = planeAcross(a + (k + 0.5) / stations * along, along.normalized());
-      const SectionMoments section = planeSection(mesh, plane, &nearest, {link[0], link[1]});
-      if (section.area <= 0) continue;
-      const double radius =
-          inscribedRadius(tree, plane.origin + section.centroid.x() * plane.u + section.centroid.y() * plane.v);
-      fills.push_back(3.14159265358979 * radius * radius / section.area);
-    }
-  }
-  if (fills.empty()) return false;
-  std::nth_element(fills.begin(), fills.begin() + fills.size() / 2, fills.end());
-  return fills[fills.size() / 2] > fillMin;
 }
 
 }  // namespace medulla

@@ -183,12 +183,4 @@ double windingNumber(const TriangleMesh& mesh, const Eigen::Vector3d& point) {
   return sum / (4 * std::numbers::pi);
 }
 
-int countHandles(const TriangleMesh& mesh) {
-  int components = 0;
-  componentOfTriangles(mesh, components);
-  // Euler and Poincare: vertices - edges + triangles = 2 components - 2 handles; 3 triangles have 2 edges each.
-  const int vertices = static_cast<int>(mesh.vertices.size()), triangles = static_cast<int>(mesh.triangles.size());
-  return components - (vertices - triangles / 2) / 2;
-}
-
 }  // namespace medulla

@@ -65,7 +65,4 @@ double solidAngle(const TriangleMesh& mesh, const std::array<int, 3>& triangle, 
 // O(triangles).
 double windingNumber(const TriangleMesh& mesh, const Eigen::Vector3d& point);
 
-// Genus summed over the components of a closed mesh: 0 of a ball, 1 of a ring.
-int countHandles(const TriangleMesh& mesh);
-
 }  // namespace medulla
