@@ -6,6 +6,8 @@
 #include <sstream>
 
 #include "app/files/chart_file.h"
+#include "app/files/mesh_file.h"
+#include "app/files/reference_file.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 
@@ -79,7 +81,7 @@ TEST_F(ChartCommand, SmallerStepsComeNearerAndTooLargeOnesFail) {
   // Runs are ordered by method, then by step from large to small.
   EXPECT_EQ(rows[1][0], "full");
   EXPECT_EQ(rows[1][2], "0.02");
-  EXPECT_EQ(rows[1][4], "");  // no error
+  EXPECT_EQ(rows[1][4], "");   // no error
   EXPECT_NE(rows[1][14], "");  // but a time of failure
   EXPECT_EQ(rows[2][2], "0.0005");
   EXPECT_EQ(rows[3][2], "0.00025");
@@ -92,6 +94,66 @@ TEST_F(ChartCommand, SmallerStepsComeNearerAndTooLargeOnesFail) {
   EXPECT_GT(std::stod(rows[6][4]), coarse);  // another model of the same body
   const std::string script = readFile(folder / "out/chart.gnuplot");
   EXPECT_NE(script.find("title 'skin'"), std::string::npos);
+}
+
+// The case's own result as its reference: the finer the step, the nearer; the errors are those at the end alone.
+TEST_F(ChartCommand, ReferenceOfTheSceneIsWhatErrorsAreAgainst) {
+  const std::string scene = folder / "case.xml", shape = folder / "end.obj";
+  ASSERT_EQ(runProgram({"replay", scene, "--surface-at", "end", shape}).exitCode, 0);
+  const std::string mesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj";
+  const TriangleMesh rest = readMesh(mesh), end = readMesh(shape);
+  std::string rows = "# a remark\n# unit 1e-3 m\n";
+  for (std::size_t v = 0; v < rest.vertices.size(); ++v) {
+    const Eigen::Vector3d moved = 1e3 * (end.vertices[v] - rest.vertices[v]);
+    rows += fmt::format("{:.12g} {:.12g} {:.12g}\n", moved.x(), moved.y(), moved.z());
+  }
+  folder.write("fem.txt", rows);
+  folder.write("fem.time", "case 2000 12.5 3 1\n");
+  const ProgramResult r =
+      chart({"--steps", "0.5,1", "--methods", "full", "--set", "body.pear.reference=" + (folder / "fem.txt")});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_TRUE(r.out.starts_with("runs 2\nfailed 0\nlargest_displacement ")) << r.out;
+  const auto table = rowsOf(folder / "out/chart.csv");
+  ASSERT_EQ(table.size(), 4u);
+  EXPECT_EQ(table[0][3], "cpu[s]");
+  EXPECT_LT(std::stod(table[1][4]), 3);  // %: the scene picks a step between
+  EXPECT_NE(table[1][8], "");            // loaded nodes apart
+  EXPECT_NEAR(std::stod(table[1][12]), 1, 0.02);
+  EXPECT_EQ(table[3][0], "FEM");
+  EXPECT_EQ(table[3][3], "12.5");
+  EXPECT_EQ(table[3][13], "2000");
+  // Twice the displacements: half of them is the error.
+  folder.write("twice.txt", "# unit 2e-3 m\n" + rows.substr(rows.find("m\n") + 2));
+  ASSERT_EQ(
+      chart({"--steps", "0.5", "--methods", "full", "--set", "body.pear.reference=" + (folder / "twice.txt")}).exitCode,
+      0);
+  EXPECT_NEAR(std::stod(rowsOf(folder / "out/chart.csv")[1][4]), 50, 1.5);
+}
+
+TEST(ReferenceFile, MistakesAreRefusedWithTheLine) {
+  SoftBodyModel model;
+  model.restNodes.resize(2);
+  model.nodeOfInputVertex = {1, -1, 0};
+  const auto complaint = [&](const char* text) -> std::string {
+    try {
+      parseReference(text, "r.txt", model);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(complaint("# unit 1e-3 m\n1 0 0\n2 0 0\n3 0 0\n"), "");
+  EXPECT_EQ(parseReference("# unit 1e-3 m\n1 0 0\n2 0 0\n3 0 0\n", "r.txt", model).displacement[0]->x(), 3e-3);
+  EXPECT_EQ(complaint("1 0 0\n2 0\n3 0 0\n"), "r.txt:2: 2 words in this row, expected a displacement: x y z");
+  EXPECT_EQ(complaint("1 0 0\n2 0 nan\n3 0 0\n"), "r.txt:2: expected a finite number, found 'nan'");
+  EXPECT_EQ(complaint("1 0 0\n"), "r.txt: 1 rows, expected one for each of the mesh's 3 vertices");
+  EXPECT_EQ(complaint("1 0 0\n1 0 0\n1 0 0\n1 0 0\n"), "r.txt:4: more rows than the mesh has vertices: 3");
+  EXPECT_EQ(complaint("0 0 0\n0 0 0\n0 0 0\n"), "r.txt: nothing moves: no error can be stated in % of it");
+  EXPECT_EQ(complaint("1 0 0\n# unit 3 mm\n"),
+            "r.txt:2: expected # unit NUMBER m, with a number of metres greater than 0");
+  EXPECT_EQ(complaint("# unit -3 m\n"), "r.txt:1: expected # unit NUMBER m, with a number of metres greater than 0");
+  EXPECT_THROW(parseReferenceRuns("case 0 1 1 1\n", "r.time"), std::runtime_error);
+  EXPECT_THROW(parseReferenceRuns("case 10 1 1\n", "r.time"), std::runtime_error);
 }
 
 TEST_F(ChartCommand, GnuplotDrawsIt) {
@@ -108,6 +170,12 @@ TEST_F(ChartCommand, GnuplotDrawsIt) {
   EXPECT_TRUE(svg.starts_with("<?xml")) << svg.substr(0, 100);
   EXPECT_NE(svg.find("full 3 spheres"), std::string::npos);
   EXPECT_NE(svg.find("skin 7 spheres"), std::string::npos);
+  const auto spheres = rowsOf(folder / "out/spheres.csv");
+  ASSERT_EQ(spheres.size(), 3u);
+  EXPECT_EQ(spheres[1][0], "3");
+  EXPECT_GT(std::stod(spheres[1][1]), std::stod(spheres[2][1]));  // gap
+  EXPECT_GT(std::stod(spheres[1][5]), std::stod(spheres[2][5]));  // error
+  EXPECT_NE(readFile(folder / "out/spheres.svg").find("largest gap"), std::string::npos);
   EXPECT_TRUE(svg.ends_with("</svg>\n\n") || svg.ends_with("</svg>\n")) << svg.substr(svg.size() - 20);
 }
 
@@ -126,6 +194,7 @@ TEST_F(ChartCommand, BadInputIsRefusedInOneLineAndLeavesNoFolder) {
   refused(chart({"--models", folder / "none.xml"}), 1, "none.xml does not exist");
   refused(chart({"--models", std::string(MEDULLA_SOURCE_DIR) + "/assets/stomach/stomach.model.xml"}), 1,
           "is of another mesh");
+  refused(chart({"--set", "body.pear.reference=none.txt"}), 1, "reference \"");
   refused(chart({"--models", "apple=" + (folder / "case.xml")}), 1, "body.apple.model");
   refused(chart({"--set", "body.pear.fix.plane=0 -1 0 1", "--steps", "1"}), 1, "nothing moves");
   refused(chart({"--steps", "40"}), 1, "the reference run with substeps of 10 ms is not finite at ");

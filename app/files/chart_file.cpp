@@ -25,7 +25,8 @@ std::string dataBlock(const std::string& name, const std::vector<ChartPoint>& po
   for (const ChartPoint& p : points) {
     if (!wanted(p)) continue;
     const double error = atRim(p) ? kRim : std::max(kLeastShown, p.errorMax);
-    out += fmt::format("{:.6g} {:.6g} {:.3g}\n", p.cpu, error, p.nodes > 0 ? p.nodes : 1e3 * p.step);
+    const std::string label = p.nodes > 0 ? fmt::format("{}", p.nodes) : fmt::format("{:.3g}", 1e3 * p.step);
+    out += fmt::format("{:.6g} {:.6g} {}\n", p.cpu, error, label);
   }
   return out + "EOD\n";
 }
@@ -35,14 +36,6 @@ std::vector<std::string> curvesOf(const std::vector<ChartPoint>& points) {
   for (const ChartPoint& p : points)
     if (std::find(out.begin(), out.end(), p.curve) == out.end()) out.push_back(p.curve);
   return out;
-}
-
-// Within a decade or two gnuplot would label a tick or two alone.
-std::string ticks(double low, double high) {
-  std::string list;
-  for (int exponent = static_cast<int>(std::floor(std::log10(low))); std::pow(10, exponent) <= high; ++exponent)
-    for (const int digit : {1, 2, 5}) list += fmt::format("{}{}e{}", list.empty() ? "" : ", ", digit, exponent);
-  return fmt::format("set xtics ({})\n", list);
 }
 
 std::string axes(const std::string& title, const std::vector<ChartPoint>& points, ChartCost cost) {
@@ -66,7 +59,7 @@ std::string axes(const std::string& title, const std::vector<ChartPoint>& points
       "set ylabel 'largest error of a surface node, % of the largest displacement'\n";
   out += cost == ChartCost::ofTheCase ? "set xlabel 'CPU seconds of the whole load case'\n"
                                       : "set xlabel 'CPU seconds per simulated second'\n";
-  out += ticks(low, high);
+  out += fmt::format("set xtics ({})\n", logTicks(low, high));
   out += fmt::format("set title '{}'\n", title);
   out += fmt::format("set xrange [{:.6g}:{:.6g}]\n", low, high);
   out += fmt::format("set yrange [{:.6g}:{:.6g}]\n",
@@ -80,6 +73,13 @@ std::string axes(const std::string& title, const std::vector<ChartPoint>& points
 }
 
 }  // namespace
+
+std::string logTicks(double low, double high) {
+  std::string list;
+  for (int exponent = static_cast<int>(std::floor(std::log10(low))); std::pow(10, exponent) <= high; ++exponent)
+    for (const int digit : {1, 2, 5}) list += fmt::format("{}{}e{}", list.empty() ? "" : ", ", digit, exponent);
+  return list;
+}
 
 void markFront(std::vector<ChartPoint>& points) {
   for (ChartPoint& p : points) {
@@ -138,9 +138,9 @@ std::string chartScript(const std::string& title, const std::vector<ChartPoint>&
     plot += fmt::format(
         ", \\\n  NaN with linespoints lw 2 pt {2} ps 0.7 lc '{1}' title '{3}'"  // in the key even if all failed
         ", \\\n  ${0} using 1:2 with linespoints lw 2 pt {2} ps 0.7 lc '{1}' notitle"
-        ", \\\n  ${0} using 1:2:3 with labels offset 0.4,0.7 left font ',10' tc '{1}' notitle"
+        ", \\\n  ${0} using 1:2:(strcol(3)) with labels offset 0.4,0.7 left font ',10' tc '{1}' notitle"
         ", \\\n  ${0}failed using 1:2 with points pt 2 ps 1 lw 2 lc '{1}' notitle"
-        ", \\\n  ${0}failed using 1:2:3 with labels offset 0,-0.9 font ',10' tc '{1}' notitle",
+        ", \\\n  ${0}failed using 1:2:(strcol(3)) with labels offset 0,-0.9 font ',10' tc '{1}' notitle",
         name, colour, 5 + 2 * (k % 5), legend);
   }
   const bool others = std::any_of(points.begin(), points.end(), [](const ChartPoint& p) { return p.nodes > 0; });

@@ -26,7 +26,6 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
       "set logscale xyy2\n"
       "set border 11 lc '#555555'\n"
       "set tics nomirror out\n"
-      "set y2tics\n"
       "set grid xtics ytics lc '#dddddd' lt 1 lw 1\n"
       "set format '%g'\n"
       "set format y2 '%g'\n"
@@ -37,7 +36,12 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
                                                                         : "CPU seconds per simulated second");
   out += fmt::format("set title '{}'\n", title);
   std::string ticks, data;
+  double cheapest = 0, dearest = 0;
   for (const SphereChartRow& r : rows) {
+    if (r.step > 0) {
+      cheapest = cheapest > 0 ? std::min(cheapest, r.cpu) : r.cpu;
+      dearest = std::max(dearest, r.cpu);
+    }
     ticks += fmt::format("{}{}", ticks.empty() ? "" : ", ", r.spheres);
     // gnuplot leaves out what is no number, and zeros have no logarithm.
     const auto shown = [&](double value, bool any) { return any && value > 0 ? fmt::format("{:.6g}", value) : "NaN"; };
@@ -46,6 +50,9 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
   }
   out += fmt::format("set xtics ({})\nset xrange [{:.6g}:{:.6g}]\n", ticks, 0.8 * rows.front().spheres,
                      1.25 * rows.back().spheres);
+  if (cheapest > 0)
+    out += fmt::format("set y2tics ({})\nset y2range [{:.6g}:{:.6g}]\n", logTicks(cheapest / 5, 2 * dearest),
+                       cheapest / 5, 2 * dearest);
   out += "$rows << EOD\n" + data + "EOD\n";
   // Okabe and Ito (2008): told apart by all kinds of eyes.
   out +=
