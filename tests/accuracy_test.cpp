@@ -6,6 +6,7 @@
 
 #include "app/files/mesh_file.h"
 #include "physics/dynamics/fixation.h"
+#include "physics/dynamics/rest_modes.h"
 #include "physics/dynamics/world.h"
 #include "physics/model/build.h"
 #include "tests/accuracy_reference.h"
@@ -122,6 +123,17 @@ INSTANTIATE_TEST_SUITE_P(
       const StaticCase& c = tested.param;
       return c.spheres == 25 ? c.name + std::string("_of_25") : std::string(c.name);
     });
+
+// Bending in both planes, torsion, second bending in both planes; then stretch. The surface swings along.
+TEST(DynamicAccuracy, TheCylindersModesAreThoseOfFiniteElements) {
+  const Result result = readResult("cylinder_modes");
+  BodyDescription body = bodyOf(readResult("cylinder_tip"), modelOf(result, 7), 0, 0);
+  const std::vector<double> found = naturalFrequencies(body, bodyMechanics(body), 8),
+                            expected = result.numbers("frequencies");
+  ASSERT_EQ(found.size(), 8u);
+  EXPECT_NEAR(found[0] / expected[0], 1, 0.005);
+  for (std::size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k] / expected[k], 1, 0.015) << k;
+}
 
 // The loaded vertices' mean displacement along the load swings about where it ends: its extremes give the first mode's
 // frequency and damping ratio.

@@ -5,6 +5,7 @@
 #include "app/commands/commands.h"
 #include "app/files/model_file.h"
 #include "app/files/xml_element.h"
+#include "physics/dynamics/rest_modes.h"
 #include "physics/model/build_report.h"
 #include "physics/model/mesh_topology.h"
 
@@ -71,6 +72,15 @@ void addBody(const SceneBody& body, const SoftBodyModel& model, std::vector<Resu
   add("driven_spheres", text(body.driven.size()), "");
 }
 
+// Undamped, of the whole body as it is held.
+void addFrequencies(const BodyDescription& body, std::vector<Result>& results) {
+  constexpr int kShown = 5;
+  std::string list;
+  for (const double f : naturalFrequencies(body, bodyMechanics(body), kShown))
+    list += fmt::format("{}{:.4g}", list.empty() ? "" : " ", f);
+  if (!list.empty()) results.push_back({fmt::format("body.{}.natural_frequencies", body.name), list, "Hz"});
+}
+
 std::vector<Result> sceneResults(const LoadedScene& loaded) {
   const Scene& scene = loaded.scene;
   const Simulation simulation(loaded);
@@ -98,7 +108,10 @@ std::vector<Result> sceneResults(const LoadedScene& loaded) {
                                  {"spheres", text(spheres), ""},
                                  {"links", text(links), ""},
                                  {"nodes", text(nodes), ""}};
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) addBody(scene.bodies[b], *loaded.models[b], results);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    addBody(scene.bodies[b], *loaded.models[b], results);
+    addFrequencies(world.bodies()[b], results);
+  }
   for (const SceneTool& tool : scene.tools)
     results.push_back({fmt::format("tool.{}.radius", tool.name), text(tool.settings.radius), "m"});
   return results;

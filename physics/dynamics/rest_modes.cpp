@@ -3,7 +3,9 @@
 #include <Eigen/Dense>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 
 namespace medulla {
 
@@ -117,6 +119,37 @@ class RestModel {
       x = divideByMass(force);
     }
     return eigenvalue;
+  }
+
+  // Stiffness of the links, and mass with the nodes' through their anchors' motion J: M + J^T m J. 6 spheres square.
+  MatrixXd linkStiffness() const {
+    MatrixXd k(6 * spheres_, 6 * spheres_);
+    for (int i = 0; i < k.cols(); ++i) k.col(i) = stiffnessTimes(VectorXd::Unit(size(), i), 1, 0).head(k.rows());
+    return k;
+  }
+  MatrixXd carriedMass() const {
+    const int count = 6 * spheres_;
+    std::vector<Eigen::Triplet<double>> entries;
+    for (int i = 0; i < nodes_; ++i) {
+      const Attachment& a = mechanics_.attachments[i];
+      const std::array<int, 2> hosts =
+          a.onLink ? std::array<int, 2>{model_.links[a.host].sphere0, model_.links[a.host].sphere1}
+                   : std::array<int, 2>{a.host, a.host};
+      const double root = mechanics_.nodeMoves[i] ? std::sqrt(mechanics_.nodeMass[i]) : 0;
+      for (int h = 0; h < (a.onLink ? 2 : 1); ++h)
+        for (int k = 6 * hosts[h]; k < 6 * hosts[h] + 6; ++k) {
+          const Vector3d rate = root * anchorRate(i, VectorXd::Unit(count, k));
+          for (int c = 0; c < 3; ++c) entries.emplace_back(3 * i + c, k, rate[c]);
+        }
+    }
+    Eigen::SparseMatrix<double> motion(3 * nodes_, count);
+    motion.setFromTriplets(entries.begin(), entries.end());
+    MatrixXd mass = motion.transpose() * motion;
+    for (int i = 0; i < spheres_; ++i) {
+      mass.block<3, 3>(6 * i, 6 * i) += mechanics_.sphereMass[i] * Matrix3d::Identity();
+      mass.block<3, 3>(6 * i + 3, 6 * i + 3) += mechanics_.sphereInertia[i];
+    }
+    return mass;
   }
 
   // A repeatable, structureless start vector: the fractional parts of multiples of the golden ratio.
@@ -309,6 +342,23 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
     if (i + 1 < kIterations) x = factor.solve(mm * x);
   }
   return std::sqrt(std::max(0.0, x.dot(k * x)));
+}
+
+std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMechanics& mechanics, int count) {
+  constexpr double kRigid = 1e-9;  // of the largest eigenvalue: motion that deforms nothing
+  const RestModel rest(body, mechanics);
+  std::vector<int> free;
+  for (int i = 0; i < static_cast<int>(mechanics.sphereMass.size()); ++i)
+    for (int k = 0; k < 6; ++k)
+      if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) free.push_back(6 * i + k);
+  if (free.empty()) return {};
+  const MatrixXd stiffness = rest.linkStiffness()(free, free), mass = rest.carriedMass()(free, free);
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> modes(stiffness, mass, Eigen::EigenvaluesOnly);
+  std::vector<double> out;
+  for (const double squared : modes.eigenvalues())
+    if (squared > kRigid * modes.eigenvalues().maxCoeff() && static_cast<int>(out.size()) < count)
+      out.push_back(std::sqrt(squared) / (2 * std::numbers::pi));
+  return out;
 }
 
 double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrator integrator) {

@@ -14,4 +14,8 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
 // exists (a single sphere, everything fixed).
 double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics);
 
+// Hz, ascending, at most `count`: the modes of spheres and links in which the body deforms, undamped, every surface
+// node riding where its host carries it: what the surface adds by giving way lies far above them.
+std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMechanics& mechanics, int count);
+
 }  // namespace medulla
