@@ -358,8 +358,10 @@ Verb addChart(CLI::App& app) {
   CLI::App* c =
       app.add_subcommand("chart", "run a scene by several methods and steps, and draw their time against their error");
   addSceneOptions(*c, a.run);
-  c->add_option("-o,--output", a.options.folder,
-                "folder for chart.csv, chart.gnuplot and chart.svg; made where missing")
+  c->add_option(
+       "-o,--output", a.options.folder,
+       "folder for chart.csv, .gnuplot and .svg, and of several --models spheres.csv, .gnuplot and .svg; made where "
+       "missing")
       ->type_name("DIR")
       ->required();
   c->add_option("--steps", a.steps, "substeps to run with, ms; the nearest whole shares of a dynamics frame are taken")
@@ -368,7 +370,8 @@ Verb addChart(CLI::App& app) {
       ->allow_extra_args(false)
       ->capture_default_str();
   a.options.methods = chartMethodNames();
-  c->add_option("--methods", a.options.methods, "curves; the first method's finest run is the reference")
+  c->add_option("--methods", a.options.methods,
+                "curves; the first method's finest run is the reference where no body names one")
       ->check(CLI::IsMember(chartMethodNames()))
       ->delimiter(',')
       ->allow_extra_args(false)
