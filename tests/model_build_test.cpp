@@ -213,6 +213,12 @@ TEST(ModelBuild, SpheresOfSeveralBodiesAreSharedByTheGapInMetres) {
   const TriangleMesh large = ellipsoidMesh(2, {0.03, 0.03, 0.09}), small = ellipsoidMesh(2, {0.01, 0.01, 0.03});
   const std::vector<BodyShape> shapes{measureShape(large, 0), measureShape(small, 0)};
   EXPECT_EQ(shareSpheres(shapes, 2), (std::vector<int>{1, 1}));
+  // More than set cover can use, with overshoots: one in turn to each.
+  const std::vector<BodyShape> standingOut{measureShape(large, 2), measureShape(small, 2)};
+  for (const int many : {600, 1501}) {
+    const std::vector<int> dealt = shareSpheres(standingOut, many);
+    EXPECT_EQ(dealt[0] + dealt[1], many);
+  }
   const std::vector<int> counts = shareSpheres(shapes, 15);
   EXPECT_EQ(counts[0] + counts[1], 15);
   double gaps[2];

@@ -138,13 +138,14 @@ std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count) {
   }
   // What is left goes, one each in turn, to those that the smaller gap gives more; then to all.
   for (int left = count - std::accumulate(counts.begin(), counts.end(), 0); left > 0;) {
-    const bool all = counts == more;
+    bool any = false;
     for (int b = 0; b < bodies && left > 0; ++b) {
-      if (!all && counts[b] >= more[b]) continue;
+      if (counts[b] >= more[b]) continue;
       ++counts[b];
-      if (all) ++more[b];
       --left;
+      any = true;
     }
+    if (!any) std::transform(counts.begin(), counts.end(), more.begin(), [](int c) { return c + 1; });
   }
   return counts;
 }
