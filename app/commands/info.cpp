@@ -75,6 +75,8 @@ void addBody(const SceneBody& body, const SoftBodyModel& model, std::vector<Resu
 // Undamped, of the whole body as it is held.
 void addFrequencies(const BodyDescription& body, std::vector<Result>& results) {
   constexpr int kShown = 5;
+  constexpr std::size_t kMostSpheres = 200;  // 2 s; beyond, time grows with the cube
+  if (body.model->spheres.size() > kMostSpheres) return;
   std::string list;
   for (const double f : naturalFrequencies(body, bodyMechanics(body), kShown))
     list += fmt::format("{}{:.4g}", list.empty() ? "" : " ", f);

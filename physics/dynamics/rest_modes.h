@@ -16,6 +16,7 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
 
 // Hz, ascending, at most `count`: the modes of spheres and links in which the body deforms, undamped, every surface
 // node riding where its host carries it: what the surface adds by giving way lies far above them.
+// Dense matrices: memory grows with the square of the spheres, time with the cube.
 std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMechanics& mechanics, int count);
 
 }  // namespace medulla

@@ -123,8 +123,8 @@ std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count) {
     high = std::max(high, shape.diagonal);
   }
   const auto countsFor = [&](double gap) {
-    std::vector<int> counts;
-    for (int b = 0; b < bodies; ++b) counts.push_back(greedy[b](100 * gap / shapes[b].diagonal));
+    std::vector<int> counts(bodies);
+    for (int b = 0; b < bodies; ++b) counts[b] = greedy[b](100 * gap / shapes[b].diagonal);
     return counts;
   };
   // Gaps that bring the sum just under and just over what was asked for.
