@@ -243,10 +243,11 @@ Verb addBuild(CLI::App& app) {
   c->add_option(
        "--overshoot", a.options.settings.overshoot,
        "how far spheres may stick out of the surface, in % of the bounding box's diagonal: they fill more, and "
-       "bodies touch by so much too early instead of sinking in by the gap [4.2 / sqrt(spheres), or half the gap]")
+       "bodies touch by so much too early instead of sinking in by the gap [4.2 / sqrt(spheres), or half the gap, 5 at "
+       "most]")
       ->check(CLI::Range(0.0, 5.0))
       ->type_name("PERCENT");
-  c->add_option("--method", a.method, "cover: inscribed balls chosen to fill the body; skeleton: the raw edge collapse")
+  c->add_option("--method", a.method, "cover: balls chosen to fill the body; skeleton: the raw edge collapse")
       ->check(CLI::IsMember({"cover", "skeleton"}))
       ->capture_default_str();
   c->add_option("--unit", a.options.unit, "unit of the mesh files")

@@ -122,6 +122,14 @@ TEST_F(ChartCommand, ReferenceOfTheSceneIsWhatErrorsAreAgainst) {
   EXPECT_EQ(table[3][0], "FEM");
   EXPECT_EQ(table[3][3], "12.5");
   EXPECT_EQ(table[3][13], "2000");
+  EXPECT_NE(table[1][10], "");  // and the rest
+  // Where loads act everywhere there is no rest.
+  ASSERT_EQ(chart({"--steps", "0.5", "--methods", "full", "--set", "body.pear.reference=" + (folder / "fem.txt"),
+                   "--set", "body.pear.load.plane=0 1 0 9"})
+                .exitCode,
+            0);
+  EXPECT_NE(rowsOf(folder / "out/chart.csv")[1][9], "");
+  EXPECT_EQ(rowsOf(folder / "out/chart.csv")[1][10], "");
   // Twice the displacements: half of them is the error.
   folder.write("twice.txt", "# unit 2e-3 m\n" + rows.substr(rows.find("m\n") + 2));
   ASSERT_EQ(
@@ -151,6 +159,8 @@ TEST(ReferenceFile, MistakesAreRefusedWithTheLine) {
   EXPECT_EQ(complaint("0 0 0\n0 0 0\n0 0 0\n"), "r.txt: nothing moves: no error can be stated in % of it");
   EXPECT_EQ(complaint("1 0 0\n# unit 3 mm\n"),
             "r.txt:2: expected # unit NUMBER m, with a number of metres greater than 0");
+  EXPECT_EQ(complaint("#Unit 3 mm\n"), "r.txt:1: expected # unit NUMBER m, with a number of metres greater than 0");
+  EXPECT_EQ(complaint("# unit 3 m\n# unit 3 m\n"), "r.txt:2: a second unit, expected one for all rows");
   EXPECT_EQ(complaint("# unit -3 m\n"), "r.txt:1: expected # unit NUMBER m, with a number of metres greater than 0");
   EXPECT_THROW(parseReferenceRuns("case 0 1 1 1\n", "r.time"), std::runtime_error);
   EXPECT_THROW(parseReferenceRuns("case 10 1 1\n", "r.time"), std::runtime_error);

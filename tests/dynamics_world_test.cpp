@@ -48,6 +48,34 @@ TEST(World, TheSameRunTwiceHasTheSameHash) {
   EXPECT_EQ(other.stateHash(), hash[0]) << "reading changed the state";
 }
 
+// What like bodies share is worked out once: whatever differs must tell them apart.
+TEST(World, BodiesOfOneModelMoveAsEachAlone) {
+  WorldSettings settings;
+  settings.substeps = 60;
+  const BodyDescription first = tube(6e3, 0.1);
+  std::vector<BodyDescription> bodies(7, first);
+  bodies[1].tissue.young = 9e3;
+  bodies[2].tissue.damping = 0.3;
+  bodies[3].links = LinkModel::springs;
+  bodies[4].factors.flexion = 2;
+  bodies[5].fixed = {{1, FixedFreedom::all}};
+  World together(settings, bodies);
+  for (int i = 0; i < 10; ++i) together.advance({});
+  DynamicsFrame all;
+  together.readFrame(all);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    World alone(settings, {bodies[b]});
+    for (int i = 0; i < 10; ++i) alone.advance({});
+    DynamicsFrame one;
+    alone.readFrame(one);
+    EXPECT_EQ(all.bodies[b].nodes, one.bodies[0].nodes) << b;
+    if (b >= 1 && b <= 5) {
+      EXPECT_NE(all.bodies[b].nodes, all.bodies[0].nodes) << b;
+    }
+  }
+  EXPECT_EQ(all.bodies[6].nodes, all.bodies[0].nodes);
+}
+
 TEST(World, BodiesDoNotDisturbEachOther) {
   WorldSettings settings;
   settings.substeps = 60;

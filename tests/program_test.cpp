@@ -165,6 +165,7 @@ TEST(Program, InfoTellsOfModelsAndScenes) {
   for (const char* name : {"settings", "links", "nodes", "volume", "extents", "gap_max", "cover", "mass_at_1000_kg/m3"})
     EXPECT_NE(valueOf(ofModel.out, name), "") << name;
   const ProgramResult ofScene = runProgram({"info", kScene});
+  EXPECT_NE(ofScene.out.find("natural_frequencies "), std::string::npos) << ofScene.out;
   ASSERT_EQ(ofScene.exitCode, 0) << ofScene.err;
   EXPECT_EQ(valueOf(ofScene.out, "kind"), "scene");
   EXPECT_EQ(valueOf(ofScene.out, "body.gallbladder.spheres"), "7");

@@ -44,7 +44,8 @@ struct ChartRun {
   std::string curve;
   RunOptions options;
   int spheres = 0;
-  double step = 0;  // s
+  double step = 0;                    // s
+  std::size_t method = 0, model = 0;  // in the order in which they were asked for
 };
 
 struct Outcome {
@@ -109,12 +110,13 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
     run.step = 1 / (base.scene.dynamicsRate * count);
     runs.push_back(std::move(run));
   };
-  for (const std::string& name : options.methods) {
+  for (std::size_t number = 0; number < options.methods.size(); ++number) {
+    const std::string& name = options.methods[number];
     const auto method = std::find_if(chartMethods().begin(), chartMethods().end(),
                                      [&](const ChartMethod& m) { return m.name == name; });
-    for (const std::vector<SceneOverride>& model : models) {
-      ChartRun run{name, options.run, 0, 0};
-      for (const auto& overrides : {expanded(method->overrides, base.scene), model})
+    for (std::size_t k = 0; k < models.size(); ++k) {
+      ChartRun run{name, options.run, 0, 0, number, k};
+      for (const auto& overrides : {expanded(method->overrides, base.scene), models[k]})
         run.options.overrides.insert(run.options.overrides.end(), overrides.begin(), overrides.end());
       const LoadedScene loaded = loadRun(run.options);
       requireSameMeshes(base, loaded);
@@ -157,12 +159,12 @@ Outcome execute(const ChartRun& run, const std::function<void(double)>& progress
     }
     progress(simulation.totals().simulated);
   }
-  for (int b = 0; b < static_cast<int>(loaded.models.size()); ++b) {
+  out.point.cpu = (processCpuSeconds() - start) / simulation.totals().simulated;
+  for (int b = 0; b < static_cast<int>(loaded.models.size()) && !out.point.failedAt; ++b) {
     const double ratio = simulation.world().volumeRatio(b);
     if (!out.point.volumeRatio || std::abs(ratio - 1) > std::abs(*out.point.volumeRatio - 1))
       out.point.volumeRatio = ratio;
   }
-  out.point.cpu = (processCpuSeconds() - start) / simulation.totals().simulated;
   return out;
 }
 
@@ -245,31 +247,30 @@ std::vector<Result> chartResults(const std::vector<ChartPoint>& points, const Ch
   return results;
 }
 
-// Per model how well its balls fit, and the cheapest run of the first method at its smallest step.
+// Per model how well its balls fit, and the first method's run at the smallest step that did not fail. Points come in
+// the order of the runs.
 std::vector<SphereChartRow> sphereRows(const ChartOptions& options, const LoadedScene& base,
-                                       const std::vector<ChartPoint>& points) {
+                                       const std::vector<ChartRun>& runs, const std::vector<ChartPoint>& points) {
   std::vector<SphereChartRow> rows;
-  for (const std::string& model : options.models) {
+  for (std::size_t m = 0; m < options.models.size(); ++m) {
     RunOptions run = options.run;
-    run.overrides.push_back(modelOverride(model, base.scene));
+    run.overrides.push_back(modelOverride(options.models[m], base.scene));
     const LoadedScene loaded = loadRun(run);
     SphereChartRow row;
     row.spheres = spheresOf(loaded);
-    for (const auto& m : loaded.models) {
-      const BuildReport report = measureModel(*m);
+    for (const auto& model : loaded.models) {
+      const BuildReport report = measureModel(*model);
       row.gapMax = std::max(row.gapMax, report.gapMax);
       row.gapMean = std::max(row.gapMean, report.gapMean);
     }
-    const ChartPoint* finest = nullptr;
-    for (const ChartPoint& p : points)
-      if (p.curve.starts_with(options.methods[0] + "_") && p.spheres == row.spheres && !p.failedAt &&
-          (!finest || p.step < finest->step))
-        finest = &p;
-    if (finest) {
-      row.step = finest->step;
-      row.cpu = finest->cpu;
-      row.errorMax = finest->errorMax;
-      row.errorRms = finest->errorRms;
+    for (std::size_t k = 0; k < std::min(runs.size(), points.size()); ++k) {
+      const ChartPoint& p = points[k];
+      if (runs[k].method != 0 || runs[k].model != m || p.failedAt || p.nodes > 0) continue;
+      if (row.step > 0 && row.step <= p.step) continue;
+      row.step = p.step;
+      row.cpu = p.cpu;
+      row.errorMax = p.errorMax;
+      row.errorRms = p.errorRms;
     }
     rows.push_back(row);
   }
@@ -310,11 +311,12 @@ int runChart(const ChartOptions& options) {
       for (const char* ending : {".csv", ".gnuplot", ".svg"}) outputs.push_back(stem + ending);
     requireDistinctOutputs(base, options.run, outputs);
     ChartTruth truth;
-    const std::vector<ChartPoint> points = executeAll(planRuns(options, base), base, truth);
+    const std::vector<ChartRun> runs = planRuns(options, base);
+    const std::vector<ChartPoint> points = executeAll(runs, base, truth);
     writeChart(chart + ".csv", points, truth.cost);
     draw(chart, chartScript(base.scene.name, points, truth.cost));
     if (options.models.size() > 1) {
-      const std::vector<SphereChartRow> rows = sphereRows(options, base, points);
+      const std::vector<SphereChartRow> rows = sphereRows(options, base, runs, points);
       writeSphereChart(spheres + ".csv", rows, truth.cost);
       draw(spheres, sphereChartScript(base.scene.name, rows, truth.cost));
     }

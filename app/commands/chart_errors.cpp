@@ -111,6 +111,7 @@ void measureErrors(const LoadedScene& loaded, const ChartTruth& truth, const std
   if (atLoads.count == 0) return;
   point.loadedErrorMax = percent * atLoads.largest;
   point.loadedErrorRms = percent * atLoads.rms();
+  if (elsewhere.count == 0) return;
   point.restErrorMax = percent * elsewhere.largest;
   point.restErrorRms = percent * elsewhere.rms();
 }

@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "app/files/log_file.h"
 #include "app/files/surface_file.h"
@@ -148,7 +149,11 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
                             const std::vector<std::string>& pictures) {
   const Scene& scene = loaded.scene;
   std::vector<std::string> inputs{options.scene}, outputs = pictures;
-  for (const SceneBody& body : scene.bodies) inputs.insert(inputs.end(), {body.modelPath, body.referencePath});
+  for (const SceneBody& body : scene.bodies) {
+    inputs.insert(inputs.end(), {body.modelPath, body.referencePath});
+    if (!body.referencePath.empty())
+      inputs.push_back(std::filesystem::path(body.referencePath).replace_extension(".time").string());
+  }
   for (const SceneStatic& item : scene.statics)
     if (!item.meshPath.empty()) inputs.push_back(item.meshPath);
   for (const SceneTool& tool : scene.tools) inputs.push_back(tool.trajectoryPath);

@@ -3,39 +3,43 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 
 #include "app/files/input_error.h"
+#include "app/files/number_text.h"
 #include "app/files/text_file.h"
 #include "app/files/text_lines.h"
 
 namespace medulla {
 
-// The line "# unit NUMBER m", a remark to the reader of rows.
+// The number of a remark "# unit NUMBER m"; nothing of other remarks.
+static std::optional<double> unitOfRemark(std::string_view remark, const std::string& name, int line) {
+  TextLines lines(remark, name);
+  if (!lines.next()) return {};
+  const auto& words = lines.words();
+  std::string first(words[0]);
+  std::transform(first.begin(), first.end(), first.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (!first.starts_with("unit")) return {};
+  const std::optional<double> unit = words.size() == 3 ? parseNumber<double>(words[1]) : std::nullopt;
+  if (first != "unit" || !unit || !(*unit > 0) || words[2] != "m")
+    throw inputError(name, line, "expected # unit NUMBER m, with a number of metres greater than 0");
+  return unit;
+}
+
+// What rows are in, m.
 static double unitOf(std::string_view text, const std::string& name) {
-  constexpr std::string_view kStart = "# unit ";
-  int line = 1;
-  for (std::size_t at = 0; at < text.size(); ++line) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::string_view whole = text.substr(at, end - at);
-    at = end + 1;
-    if (!whole.starts_with(kStart)) continue;
-    TextLines words(whole.substr(kStart.size()), name);
-    const bool any = words.next();
-    const auto refuse = [&] {
-      throw inputError(name, line, "expected # unit NUMBER m, with a number of metres greater than 0");
-    };
-    if (!any || words.words().size() != 2 || words.words()[1] != "m") refuse();
-    double unit = 0;
-    try {
-      unit = words.number(words.words()[0]);
-    } catch (const std::runtime_error&) {
-      refuse();
-    }
-    if (!(unit > 0)) refuse();
-    return unit;
+  std::optional<double> unit;
+  for (int line = 1; !text.empty(); ++line) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view whole = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (!whole.starts_with('#')) continue;
+    const std::optional<double> found = unitOfRemark(whole.substr(1), name, line);
+    if (found && unit) throw inputError(name, line, "a second unit, expected one for all rows");
+    if (found) unit = found;
   }
-  return 1;
+  return unit.value_or(1);
 }
 
 Reference parseReference(std::string_view text, const std::string& name, const SoftBodyModel& model) {
@@ -74,7 +78,7 @@ std::vector<ReferenceRun> parseReferenceRuns(std::string_view text, const std::s
     const ReferenceRun run{static_cast<int>(std::clamp<long long>(nodes, 0, 1 << 30)), lines.number(words[2]),
                            lines.number(words[3]), lines.number(words[4])};
     if (!(nodes > 0 && run.cpu > 0 && run.errorMax >= 0 && run.errorRms >= 0))
-      lines.fail("expected numbers greater than 0");
+      lines.fail("expected nodes and seconds greater than 0, and errors of 0 or more");
     runs.push_back(run);
   }
   return runs;

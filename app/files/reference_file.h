@@ -25,11 +25,13 @@ struct Reference {
 };
 
 // A row of three numbers per vertex of the mesh file, in its order, in metres or in what a line "# unit NUMBER m" says;
-// other lines that begin with # are remarks. Throws std::runtime_error "FILE:LINE: ..." on anything else, on another
-// number of rows than the mesh has vertices, and where nothing moves.
+// other lines that begin with # are remarks, but none that begins with "unit" in another form. Throws
+// std::runtime_error "FILE:LINE: ..." on anything else, on another number of rows than the mesh has vertices, and where
+// nothing moves.
 Reference parseReference(std::string_view text, const std::string& name, const SoftBodyModel& model);
 
 // Beside FILE.txt may lie FILE.time with what it cost: rows "case nodes seconds largest-error[%] RMS-error[%]".
+// Throws std::runtime_error "FILE:LINE: ..." on anything else.
 std::vector<ReferenceRun> parseReferenceRuns(std::string_view text, const std::string& name);
 
 // Both.

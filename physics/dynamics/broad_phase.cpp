@@ -80,13 +80,14 @@ Grid fillGrid(const std::vector<AxisBox>& boxes, double size, BroadPhase& phase)
     }
     count += cells;
   }
-  double all = 1;
-  for (int a = 0; a < 3; ++a) all *= grid.size[a] = last[a] - grid.first[a] + 1;
-  std::size_t buckets = static_cast<std::size_t>(all);
-  if (all > 4.0 * static_cast<double>(count)) {
-    buckets = std::bit_ceil(2 * count);
-    grid.mask = static_cast<std::uint32_t>(buckets - 1);
+  double cells = 1;
+  for (int a = 0; a < 3; ++a) {
+    grid.size[a] = last[a] - grid.first[a] + 1;
+    cells *= grid.size[a];
   }
+  const bool dense = cells <= 4.0 * static_cast<double>(count);
+  const std::size_t buckets = dense ? static_cast<std::size_t>(cells) : std::bit_ceil(2 * count);
+  if (!dense) grid.mask = static_cast<std::uint32_t>(buckets - 1);
   phase.begin.assign(buckets + 1, 0);
   phase.entries.resize(count);
   for (const AxisBox& b : boxes) grid.forEachCell(b, [&](const Cell& c) { ++phase.begin[grid.bucketOf(c)]; });
