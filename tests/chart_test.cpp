@@ -7,7 +7,6 @@
 
 #include "app/files/chart_file.h"
 #include "app/files/mesh_file.h"
-#include "app/files/reference_file.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 
@@ -136,34 +135,6 @@ TEST_F(ChartCommand, ReferenceOfTheSceneIsWhatErrorsAreAgainst) {
       chart({"--steps", "0.5", "--methods", "full", "--set", "body.pear.reference=" + (folder / "twice.txt")}).exitCode,
       0);
   EXPECT_NEAR(std::stod(rowsOf(folder / "out/chart.csv")[1][4]), 50, 1.5);
-}
-
-TEST(ReferenceFile, MistakesAreRefusedWithTheLine) {
-  SoftBodyModel model;
-  model.restNodes.resize(2);
-  model.nodeOfInputVertex = {1, -1, 0};
-  const auto complaint = [&](const char* text) -> std::string {
-    try {
-      parseReference(text, "r.txt", model);
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "";
-  };
-  EXPECT_EQ(complaint("# unit 1e-3 m\n1 0 0\n2 0 0\n3 0 0\n"), "");
-  EXPECT_EQ(parseReference("# unit 1e-3 m\n1 0 0\n2 0 0\n3 0 0\n", "r.txt", model).displacement[0]->x(), 3e-3);
-  EXPECT_EQ(complaint("1 0 0\n2 0\n3 0 0\n"), "r.txt:2: 2 words in this row, expected a displacement: x y z");
-  EXPECT_EQ(complaint("1 0 0\n2 0 nan\n3 0 0\n"), "r.txt:2: expected a finite number, found 'nan'");
-  EXPECT_EQ(complaint("1 0 0\n"), "r.txt: 1 rows, expected one for each of the mesh's 3 vertices");
-  EXPECT_EQ(complaint("1 0 0\n1 0 0\n1 0 0\n1 0 0\n"), "r.txt:4: more rows than the mesh has vertices: 3");
-  EXPECT_EQ(complaint("0 0 0\n0 0 0\n0 0 0\n"), "r.txt: nothing moves: no error can be stated in % of it");
-  EXPECT_EQ(complaint("1 0 0\n# unit 3 mm\n"),
-            "r.txt:2: expected # unit NUMBER m, with a number of metres greater than 0");
-  EXPECT_EQ(complaint("#Unit 3 mm\n"), "r.txt:1: expected # unit NUMBER m, with a number of metres greater than 0");
-  EXPECT_EQ(complaint("# unit 3 m\n# unit 3 m\n"), "r.txt:2: a second unit, expected one for all rows");
-  EXPECT_EQ(complaint("# unit -3 m\n"), "r.txt:1: expected # unit NUMBER m, with a number of metres greater than 0");
-  EXPECT_THROW(parseReferenceRuns("case 0 1 1 1\n", "r.time"), std::runtime_error);
-  EXPECT_THROW(parseReferenceRuns("case 10 1 1\n", "r.time"), std::runtime_error);
 }
 
 TEST_F(ChartCommand, GnuplotDrawsIt) {

@@ -6,6 +6,7 @@
 #include <functional>
 #include <sstream>
 
+#include "app/files/reference_file.h"
 #include "app/files/vertex_file.h"
 #include "app/simulation.h"
 #include "tests/program_run.h"
@@ -52,6 +53,27 @@ TEST(VertexFile, VerticesOfTheMeshFileBecomeNodes) {
     EXPECT_EQ(loads[2].node, 3);
     EXPECT_EQ(loads[2].force, Eigen::Vector3d(0, 0, -1e-3));
   }
+}
+
+TEST(ReferenceFile, MistakesAreRefusedWithTheLine) {
+  SoftBodyModel model;
+  model.restNodes.resize(2);
+  model.nodeOfInputVertex = {1, -1, 0};
+  const auto refusal = [&](const char* text) { return complaint([&] { parseReference(text, "r.txt", model); }); };
+  EXPECT_EQ(refusal("# unit 1e-3 m\n1 0 0\n2 0 0\n3 0 0\n"), "");
+  EXPECT_EQ(parseReference("# unit 1e-3 m\n1 0 0\n2 0 0\n3 0 0\n", "r.txt", model).displacement[0]->x(), 3e-3);
+  EXPECT_EQ(refusal("1 0 0\n2 0\n3 0 0\n"), "r.txt:2: 2 words in this row, expected a displacement: x y z");
+  EXPECT_EQ(refusal("1 0 0\n2 0 nan\n3 0 0\n"), "r.txt:2: expected a finite number, found 'nan'");
+  EXPECT_EQ(refusal("1 0 0\n"), "r.txt: 1 rows, expected one for each of the mesh's 3 vertices");
+  EXPECT_EQ(refusal("1 0 0\n1 0 0\n1 0 0\n1 0 0\n"), "r.txt:4: more rows than the mesh has vertices: 3");
+  EXPECT_EQ(refusal("0 0 0\n0 0 0\n0 0 0\n"), "r.txt: nothing moves: no error can be stated in % of it");
+  EXPECT_EQ(refusal("1 0 0\n# unit 3 mm\n"),
+            "r.txt:2: expected # unit NUMBER m, with a number of metres greater than 0");
+  EXPECT_EQ(refusal("#Unit 3 mm\n"), "r.txt:1: expected # unit NUMBER m, with a number of metres greater than 0");
+  EXPECT_EQ(refusal("# unit 3 m\n# unit 3 m\n"), "r.txt:2: a second unit, expected one for all rows");
+  EXPECT_EQ(refusal("# unit -3 m\n"), "r.txt:1: expected # unit NUMBER m, with a number of metres greater than 0");
+  EXPECT_THROW(parseReferenceRuns("case 0 1 1 1\n", "r.time"), std::runtime_error);
+  EXPECT_THROW(parseReferenceRuns("case 10 1 1\n", "r.time"), std::runtime_error);
 }
 
 TEST(VertexFile, MistakesNameTheLine) {

@@ -10,7 +10,7 @@ namespace medulla {
 
 enum class ContactMode {
   none,   // bodies pass through each other and through static shapes
-  balls,  // the inscribed balls of the filling spheres (paper 3): things slip through the gaps between them
+  balls,  // the balls of the filling spheres (paper 3): things slip through the gaps between them
   swept,  // the links' round cones, each the hull of its two balls, and the balls of spheres without links: no gaps
 };
 

@@ -107,7 +107,7 @@ MEDULLA_INLINE Lanes tangent1(const Contact& c) {
   return crossProduct(c.normal, c.tangent0);
 }
 
-// A direction across the normal, in the plane of it and the coordinate axis least along it.
+// A direction across the normal, and across the coordinate axis that is least along it.
 void chooseTangent(Contact& c) {
   const Lanes size = magnitude(c.normal);
   const int axis = size[0] <= size[1] && size[0] <= size[2] ? 0 : size[1] <= size[2] ? 1 : 2;

@@ -13,7 +13,7 @@ namespace medulla {
 
 // A filling sphere (paper 2.2): a ball, which is geometry, and a frame, which is mechanics.
 struct FillingSphere {
-  Eigen::Vector3d restBallCentre = Eigen::Vector3d::Zero();  // m; inscribed in the mesh: contact and buckets use it
+  Eigen::Vector3d restBallCentre = Eigen::Vector3d::Zero();  // m; sticks out by an overshoot at most; for contact
   double radius = 0;                                         // m
   // m; the mass sits here: centroid of the power cell less the shares of its surface nodes (node_volumes.h), of the
   // whole cell where nodes carry no mass.
