@@ -143,9 +143,9 @@ std::string trajectoryText(const Layout& l) {
   key(2.4, above(-0.05), straight, 0.3);
   out += "# back, open, touch, grab\n";
   key(3.1, above(0.05), straight, 0);
-  key(3.6, above(-0.025), straight, 0);  // deep enough to stay in touch with a body that gives way
-  key(4, above(-0.025), straight, 0);
-  key(4.2, above(-0.025), straight, 1);
+  key(3.6, above(-0.04), straight, 0);  // deep enough to stay in touch with a body that gives way
+  key(4, above(-0.04), straight, 0);
+  key(4.2, above(-0.04), straight, 1);
   out += "# pull\n";
   key(5.2, pulled, straight, 1);
   key(5.6, pulled, straight, 1);

@@ -108,17 +108,16 @@ TEST_P(StaticAccuracy, SurfaceLiesWhereFiniteElementsPutIt) {
 INSTANTIATE_TEST_SUITE_P(
     All, StaticAccuracy,
     testing::Values(
-        StaticCase{"cylinder_tip", 7, 2.4, 0.9, 0.1}, StaticCase{"cylinder_tip_large", 7, 2.4, 1, 0.2},
-        StaticCase{"cylinder_mid", 7, 3.3, 1.2, 0.1}, StaticCase{"cylinder_axial", 7, 4.4, 1.2, 0.5},
-        StaticCase{"cylinder_torsion", 7, 1.4, 0.5, 0.1}, StaticCase{"cylinder_poke_small", 7, 31.1, 6.1, 0.3},
-        StaticCase{"cylinder_poke_large", 7, 35.2, 12.1, 0.7}, StaticCase{"gallbladder_tip", 7, 5.1, 2.7, 0.1},
-        StaticCase{"gallbladder_tip_large", 7, 4.7, 2.5, 0.1}, StaticCase{"gallbladder_mid", 7, 5.2, 2.8, 0.1},
-        StaticCase{"gallbladder_axial", 7, 9.4, 4.1, 0.8}, StaticCase{"gallbladder_torsion", 7, 12.1, 4.1, 0.1},
-        StaticCase{"gallbladder_poke_small", 7, 37.2, 12, 0.3},
-        StaticCase{"gallbladder_poke_large", 7, 41.2, 23.3, 0.8}, StaticCase{"liver_tip", 35, 20.2, 7, 0.1},
-        StaticCase{"cylinder_tip_large", 25, 2.5, 1.1, 0.1}, StaticCase{"gallbladder_tip_large", 25, 7.2, 3.4, 0.3},
-        StaticCase{"liver_tip_in_plane", 35, 21.4, 10.2, 0.3}, StaticCase{"liver_mid", 35, 36.4, 11, 0.4},
-        StaticCase{"liver_axial", 35, 35.1, 18.2, 1.6}),
+        StaticCase{"cylinder_tip", 7, 0.7, 0.4, 0.1}, StaticCase{"cylinder_tip_large", 7, 0.9, 0.6, 0.2},
+        StaticCase{"cylinder_mid", 7, 1.2, 0.7, 0.1}, StaticCase{"cylinder_axial", 7, 3.2, 0.9, 0.7},
+        StaticCase{"cylinder_torsion", 7, 1.4, 0.5, 0.1}, StaticCase{"cylinder_poke_small", 7, 26, 4.7, 0.2},
+        StaticCase{"cylinder_poke_large", 7, 28.5, 8.3, 0.5}, StaticCase{"gallbladder_tip", 7, 5.1, 2.6, 0.1},
+        StaticCase{"gallbladder_tip_large", 7, 4.7, 2.4, 0.1}, StaticCase{"gallbladder_mid", 7, 5.4, 2.8, 0.1},
+        StaticCase{"gallbladder_axial", 7, 9.2, 3.6, 0.9}, StaticCase{"gallbladder_torsion", 7, 12.1, 3.9, 0.1},
+        StaticCase{"gallbladder_poke_small", 7, 51, 10, 0.2}, StaticCase{"gallbladder_poke_large", 7, 33, 18.7, 0.5},
+        StaticCase{"liver_tip", 35, 13.9, 6.4, 0.1}, StaticCase{"cylinder_tip_large", 25, 3.6, 1.8, 0.1},
+        StaticCase{"gallbladder_tip_large", 25, 7.2, 3.4, 0.3}, StaticCase{"liver_tip_in_plane", 35, 16, 9.3, 0.2},
+        StaticCase{"liver_mid", 35, 27.3, 10.6, 0.4}, StaticCase{"liver_axial", 35, 32.1, 17.6, 1.4}),
     [](const auto& tested) {
       const StaticCase& c = tested.param;
       return c.spheres == 25 ? c.name + std::string("_of_25") : std::string(c.name);

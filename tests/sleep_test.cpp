@@ -80,8 +80,8 @@ Loads holding(const World& world, int body, int node, const Vector3d& shift) {
 
 TEST(Sleep, WhatHasComeToRestIsLeftAlone) {
   World world = stackedRods(0.5), sleepless = stackedRods(0);
-  run(world, 3);
-  run(sleepless, 3);
+  run(world, 4);
+  run(sleepless, 4);
   EXPECT_EQ(bodiesAwake(world), 0);
   EXPECT_EQ(bodiesAwake(sleepless), 3);
   EXPECT_EQ(world.energies().kinetic, 0);

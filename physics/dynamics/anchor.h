@@ -25,6 +25,9 @@ inline Lanes3 velocityAt(const Anchor& a, const Lanes3& lever) {
 struct LinkHost {
   Lanes3 origin, line, originVelocity, lineVelocity, n, axisU, axisV, turning;
   Lanes spin0, spinAlong, twist, thickness, thicknessRate;
+  bool bends;  // what follows is set
+  Lanes3 bow, bowVelocity;
+  Lanes slopeU, slopeV, slopeUAlong, slopeVAlong, slopeURate, slopeVRate, slopeUAlongRate, slopeVAlongRate;
 };
 
 inline LinkHost linkHost(const WorldData& d, int link) {
@@ -44,26 +47,51 @@ inline LinkHost linkHost(const WorldData& d, int link) {
   h.twist = splat(f.twist[lane]);
   h.thickness = splat(f.thickness[lane]);
   h.thicknessRate = splat(f.thicknessRate[lane]);
+  h.bends = d.links.groups[link / 4].bends[lane] > 0;
+  if (!h.bends) return h;
+  h.bow = splatLane(f.bow, lane);
+  h.bowVelocity = splatLane(f.bowVelocity, lane);
+  h.slopeU = splat(f.slopeU[lane]);
+  h.slopeV = splat(f.slopeV[lane]);
+  h.slopeUAlong = splat(f.slopeUAlong[lane]);
+  h.slopeVAlong = splat(f.slopeVAlong[lane]);
+  h.slopeURate = splat(f.slopeURate[lane]);
+  h.slopeVRate = splat(f.slopeVRate[lane]);
+  h.slopeUAlongRate = splat(f.slopeUAlongRate[lane]);
+  h.slopeVAlongRate = splat(f.slopeVAlongRate[lane]);
   return h;
 }
 
-// What a link's nodes give it: sums of force and twist share, of force along the link and thickness, of moments.
-inline void setLoads(LinkFrame& f, int lane, Lanes sumAndTwist, Lanes alongAndThickness, Lanes moment) {
-  const auto set = [lane](Lanes3& to, Lanes from) {
-    to.x[lane] = from[0];
-    to.y[lane] = from[1];
-    to.z[lane] = from[2];
-  };
-  set(f.loadSum, sumAndTwist);
-  set(f.loadAlong, alongAndThickness);
-  set(f.loadMoment, moment);
-  f.loadTwist[lane] = sumAndTwist[3];
-  f.loadThickness[lane] = alongAndThickness[3];
+// A link's centre line is bowed and its sections lean as those of a bar of constant curvature between the two spheres'
+// directions t0 and t1: base += s (1 - s) / 2 bow, and what hangs at (y, z) on U and V moves by -(y, z).slope along n.
+// A cubic with the slopes t0 and t1, and the beam's own between shear and flexion, came no nearer to finite elements
+// (cylinder's end 0.6 to 0.7 %, along its chords 2.2), and cost more.
+inline Lanes bump(const NodeGroup& g) {
+  return g.along * fnma(splat(0.5), g.along, splat(0.5));
+}
+
+struct Slope {
+  Lanes u, v;
+};
+inline Slope slopeAt(const LinkHost& h, const NodeGroup& g) {
+  return {fma(g.along, h.slopeUAlong, h.slopeU), fma(g.along, h.slopeVAlong, h.slopeV)};
+}
+
+// Velocity of the point of the skeleton, and what changes about the offset, with (y, z) on U and V, otherwise than by
+// turning.
+MEDULLA_INLINE Lanes3 baseVelocityOf(const LinkHost& h, const NodeGroup& g, const Lanes3& offset, Lanes y, Lanes z) {
+  const Lanes3 straight = fma(h.thicknessRate, offset, fma(g.along, h.lineVelocity, h.originVelocity));
+  if (!h.bends) return straight;
+  const Slope slope = slopeAt(h, g);
+  const Lanes swirl = (g.twistShare * h.spinAlong) * (y * slope.v - z * slope.u);
+  const Lanes leaning = fma(y, fma(g.along, h.slopeUAlongRate, h.slopeURate),
+                            fma(z, fma(g.along, h.slopeVAlongRate, h.slopeVRate), swirl));
+  return fnma(leaning, h.n, fma(bump(g), h.bowVelocity, straight));
 }
 
 // The point at `along` of the centre line, slid with its stretch, plus the offset in the frame of sphere 0 carried onto
 // the line, twisted by its share of the torsion and as much shorter as the link is thinner.
-inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
+MEDULLA_INLINE Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   Lanes c, s;
   const Lanes angle = g.twistShare * h.twist;
   if (any(isLess(splat(kSmallAngle), magnitude(angle)))) {
@@ -76,12 +104,73 @@ inline Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
                fma(fnma(g.restArea.z, s, g.restArea.y * c), h.axisU, fma(g.restArea.y, s, g.restArea.z * c) * h.axisV));
   c = c * h.thickness;
   s = s * h.thickness;
+  const Lanes y = fnma(g.restOffset.z, s, g.restOffset.y * c), z = fma(g.restOffset.y, s, g.restOffset.z * c);
   a.base = fma(g.along, h.line, h.origin);
   a.omega = fma(fma(g.twistShare, h.spinAlong, h.spin0), h.n, h.turning);
-  a.offset =
-      fma(fnma(g.restOffset.z, s, g.restOffset.y * c), h.axisU, fma(g.restOffset.y, s, g.restOffset.z * c) * h.axisV);
-  a.baseVelocity = fma(h.thicknessRate, a.offset, fma(g.along, h.lineVelocity, h.originVelocity));
+  a.offset = fma(y, h.axisU, z * h.axisV);
+  if (h.bends) {
+    const Slope slope = slopeAt(h, g);
+    a.base = fma(bump(g), h.bow, a.base);
+    a.offset = fnma(fma(y, slope.u, z * slope.v), h.n, a.offset);
+  }
+  a.baseVelocity = baseVelocityOf(h, g, a.offset, y, z);
   return a;
+}
+
+inline AnchorLoads noLoads() {
+  const Lanes zero = splat(0);
+  const Lanes3 none{zero, zero, zero};
+  return {none, none, none, none, zero, zero, zero, zero, zero, zero};
+}
+
+// Adds forces on the anchors of four nodes, whose moments about the bases are `turn`: the transpose of the anchors'
+// velocities.
+MEDULLA_INLINE void addLoads(const LinkHost& h, const NodeGroup& g, const Lanes3& offset, const Lanes3& force,
+                             const Lanes3& turn, AnchorLoads& sum) {
+  sum.sum = sum.sum + force;
+  sum.along = fma(g.along, force, sum.along);
+  sum.moment = sum.moment + turn;
+  sum.thickness = sum.thickness + dot(offset, force);
+  Lanes about = dot(h.n, turn);
+  if (h.bends) {
+    const Slope slope = slopeAt(h, g);
+    const Lanes forward = dot(h.n, force), y = forward * dot(h.axisU, offset), z = forward * dot(h.axisV, offset);
+    sum.bow = fma(bump(g), force, sum.bow);
+    sum.slopeU = sum.slopeU + y;
+    sum.slopeV = sum.slopeV + z;
+    sum.slopeUAlong = fma(g.along, y, sum.slopeUAlong);
+    sum.slopeVAlong = fma(g.along, z, sum.slopeVAlong);
+    about = about - (y * slope.v - z * slope.u);
+  }
+  sum.twist = fma(g.twistShare, about, sum.twist);
+}
+
+// Of one link: the lanes of `sum` are its nodes'.
+inline void setLoads(const LinkHost& h, const AnchorLoads& sum, LinkLoads& to) {
+  store(to.sumTwist, sumOfLanes(sum.sum, sum.twist));
+  store(to.alongThickness, sumOfLanes(sum.along, sum.thickness));
+  store(to.momentSlopeU, sumOfLanes(sum.moment, sum.slopeU));
+  if (!h.bends) return;
+  store(to.bowSlopeV, sumOfLanes(sum.bow, sum.slopeV));
+  store(to.slopesAlong, sumsOfLanes(sum.slopeUAlong, sum.slopeVAlong, splat(0), splat(0)));
+}
+
+// Of four links.
+inline AnchorLoads gatherLoads(const LinkLoads* links, bool bend) {
+  AnchorLoads out = noLoads();
+  const auto gatherAll = [links](Quad LinkLoads::*q, Lanes& fourth) {
+    return gather(links[0].*q, links[1].*q, links[2].*q, links[3].*q, fourth);
+  };
+  out.sum = gatherAll(&LinkLoads::sumTwist, out.twist);
+  out.along = gatherAll(&LinkLoads::alongThickness, out.thickness);
+  out.moment = gatherAll(&LinkLoads::momentSlopeU, out.slopeU);
+  if (!bend) return out;
+  out.bow = gatherAll(&LinkLoads::bowSlopeV, out.slopeV);
+  Lanes unused;
+  const Lanes3 along = gatherAll(&LinkLoads::slopesAlong, unused);
+  out.slopeUAlong = along.x;
+  out.slopeVAlong = along.y;
+  return out;
 }
 
 struct SphereHost {

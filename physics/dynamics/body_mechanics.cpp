@@ -26,8 +26,12 @@ using Eigen::Vector3d;
 constexpr double kFoundationFactor = 1;
 
 // Volume pressure: the bulk modulus E / 3 (1 - 2 nu), of Young's modulus not more than this. More keeps the volume no
-// better than to a percent, and its one mode, all nodes in and out, would alone bound the step.
+// better than to a percent, and would alone bound the step.
 constexpr double kLargestBulk = 1;
+
+// Of the bulk modulus: beyond a tenth of the volume the pressure stays. Where a body lies inside out it would be any
+// number.
+constexpr double kLargestSwelling = 0.1;
 
 // Edge springs: Van Gelder (1998), k = E t sum(triangle areas) / length^2, with the layer's effective thickness t a
 // fixed share of the mean attachment depth. The same fits gave 0.17 mm E at a depth of 12 mm; Van Gelder's sum is 0.87
@@ -255,6 +259,24 @@ std::vector<Attachment> attachmentsToSpans(const SoftBodyModel& m, const std::ve
   return out;
 }
 
+// Each host keeps the volume that lies around it: a section that is squeezed bulges beside. The body's one pressure let
+// it grow wherever the surface is (a cylinder's poke of finite elements: 30 instead of 22 % off). The hosts share the
+// volume by area times distance of their nodes.
+void setBulk(const BodyDescription& body, double volume, BodyMechanics& out) {
+  const double compression = 1 / (3 * (1 - 2 * body.tissue.poisson));
+  const double bulk = std::min(compression, kLargestBulk) * body.tissue.young;
+  out.largestPressure = kLargestSwelling * bulk;
+  out.linkBulk.assign(body.model->links.size(), 0);
+  out.sphereBulk.assign(body.model->spheres.size(), 0);
+  double sum = 0;
+  for (const Attachment& a : out.attachments) {
+    (a.onLink ? out.linkBulk : out.sphereBulk)[a.host] += a.area * a.restOffset.norm();
+    sum += a.area * a.restOffset.norm();
+  }
+  for (std::vector<double>* hosts : {&out.linkBulk, &out.sphereBulk})
+    for (double& share : *hosts) share = share > 0 && volume > 0 ? bulk / (volume * share / sum) : 0;
+}
+
 void setSurfaceStiffness(const BodyDescription& body, BodyMechanics& out) {
   const SoftBodyModel& m = *body.model;
   double depthSum = 0;
@@ -266,9 +288,7 @@ void setSurfaceStiffness(const BodyDescription& body, BodyMechanics& out) {
     out.attachmentStiffness.push_back(depth > 0 ? kFoundationFactor * body.tissue.young * a.area / depth : 0);
     depthSum += depth;
   }
-  const double compression = 1 / (3 * (1 - 2 * body.tissue.poisson));
-  const double volume = enclosedVolume(mesh), bulk = std::min(compression, kLargestBulk) * body.tissue.young;
-  out.bulk = volume > 0 ? bulk / volume : 0;
+  setBulk(body, enclosedVolume(mesh), out);
   const double thickness =
       kLayerThicknessOverDepth * depthSum / static_cast<double>(std::max<std::size_t>(1, m.restNodes.size()));
   out.edgeStiffness.assign(m.edges.size(), 0);

@@ -38,10 +38,11 @@ struct BodyMechanics {
   std::vector<double> twistShare;           // per node on a link: of its torsion, what lies between end0 and the node
   std::vector<Eigen::Vector3d> normal;      // unit, per node
   std::vector<double> attachmentStiffness;  // N/m per node; of the full surface
-  double bulk = 0;                          // N/m5: pressure per volume between nodes and anchors
-  std::vector<double> edgeStiffness;        // N/m per edge; of the full surface
-  std::vector<double> nodeMass;             // kg; 0 on skin
-  std::vector<bool> nodeMoves;              // per node: not fixed
+  std::vector<double> linkBulk, sphereBulk;  // N/m5, per host: pressure per volume between its nodes and anchors
+  double largestPressure = 0;                // Pa
+  std::vector<double> edgeStiffness;         // N/m per edge; of the full surface
+  std::vector<double> nodeMass;              // kg; 0 on skin
+  std::vector<bool> nodeMoves;               // per node: not fixed
   // Set by dampBody. s, damping over stiffness, Rayleigh's beta of links and surface; 1/s, damping over mass, his
   // alpha.
   double linkRelaxation = 0, surfaceRelaxation = 0, massDamping = 0;

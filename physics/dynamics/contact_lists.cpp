@@ -31,7 +31,7 @@ double farthestMove(const ContactData& c) {
       const Lanes change = load(c.ball[i + k]) - load(c.ballAtList[i + k]);
       move[k] = change * change;
     }
-    largest = larger(largest, dotOfFour(move[0], move[1], move[2], move[3]));
+    largest = larger(largest, sumsOfLanes(move[0], move[1], move[2], move[3]));
   }
   return std::sqrt(std::max(std::max(largest[0], largest[1]), std::max(largest[2], largest[3])));
 }

@@ -57,7 +57,6 @@ struct ImplicitData {
   Motion motion, residual, change, direction, image, preconditioned;
   std::vector<Eigen::Vector3d> toolImpulses;  // N s, per load, of the whole step
   std::vector<Quad> carried, given;           // per node: the operator's velocities of anchors, impulses
-  std::vector<double> swollen;                // per body: volume that the nodes in `carried` enclose
   std::vector<Vector6> blocks;
   long solves = 0, iterations = 0;  // linear systems, and conjugate gradients in all
 };

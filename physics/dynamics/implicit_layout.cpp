@@ -61,7 +61,6 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
     m->resize(s.freedom.size());
   s.carried.resize(d.nodes.dynamicEnd);
   s.given.resize(d.nodes.dynamicEnd);
-  s.swollen.resize(d.ranges.size());
 }
 
 }  // namespace medulla

@@ -28,22 +28,20 @@ void putBlock(const Vector6& b, Motion& m, std::size_t sphere) {
   m[2 * sphere + 1] = {{b[3], b[4], b[5], 0}};
 }
 
-// Adds the bodies' pressures, each a row of rank one, to the impulses `given` of what stands in `carried`. The factor
-// of M + G does without them: conjugate gradients take one iteration more for each.
+// Adds the hosts' pressures, each a row of rank one, to the impulses `given` of what stands in `carried`. The factor of
+// M + G does without them: conjugate gradients take a few iterations more.
 void applyPressure(const WorldData& d, ImplicitData& s) {
-  const auto forGroups = [&](const auto& visit) {
-    for (const std::vector<HostRange>* ranges : {&d.nodes.onLinks, &d.nodes.onSpheres})
-      for (const HostRange& range : *ranges)
-        for (int g = range.firstGroup; g < range.endGroup; ++g) visit(g, range.body);
-  };
-  std::fill(s.swollen.begin(), s.swollen.end(), 0.0);
-  forGroups(
-      [&](int g, int body) { s.swollen[body] += sumOfLanes(dot(d.nodes.area[g], gatherFour(s.carried, 4 * g))); });
   const double h2 = s.duration * s.duration;
-  forGroups([&](int g, int body) {
-    const Lanes pressure = splat(h2 * d.ranges[body].bulk * s.swollen[body]);
-    storeFour(fma(pressure, d.nodes.area[g], gatherFour(s.given, 4 * g)), s.given, 4 * g);
-  });
+  for (const std::vector<HostRange>* ranges : {&d.nodes.onLinks, &d.nodes.onSpheres}) {
+    for (const HostRange& range : *ranges) {
+      Lanes volume = splat(0);
+      for (int g = range.firstGroup; g < range.endGroup; ++g)
+        volume = volume + dot(d.nodes.area[g], gatherFour(s.carried, 4 * g));
+      const Lanes pressure = splat(h2 * range.bulk * sumOfLanes(volume));
+      for (int g = range.firstGroup; g < range.endGroup; ++g)
+        storeFour(fma(pressure, d.nodes.area[g], gatherFour(s.given, 4 * g)), s.given, 4 * g);
+    }
+  }
 }
 
 // given = G (x - carried): impulses of attachments, edges and pressure on the nodes. `x` holds a velocity per node, or

@@ -52,6 +52,7 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
                    arm1 = span.end1 - m.spheres[link.sphere1].restFrame;
     const LinkStiffness& stiffness = mechanics.links[i];
     const bool beam = body.links == LinkModel::beam;
+    g.hasBends = g.hasBends || beam;
     g.hasArms = g.hasArms || !arm0.isZero(0) || !arm1.isZero(0);
     const double length = line.norm();
     const Vector3d t = line / length, u = (link.restU - t * t.dot(link.restU)).normalized();
@@ -74,7 +75,7 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
       g.torsion[l] = stiffness.torsion;
       g.couple[l] = 0.5 * (stiffness.flexionV.couple + stiffness.flexionU.couple);
       g.coupleDifference[l] = 0.5 * (stiffness.flexionV.couple - stiffness.flexionU.couple);
-      g.neoHookean[l] = beam ? 1 : 0;
+      g.neoHookean[l] = g.bends[l] = beam ? 1 : 0;
       g.thinning[l] = beam ? 2 * body.tissue.poisson : 0;
       g.relaxation[l] = mechanics.linkRelaxation;
     }
@@ -101,7 +102,14 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
   });
   for (std::size_t k = 0; k < sorted.size();) {
     const int host = mechanics.attachments[sorted[k]].host;
-    HostRange range{firstHost + host, static_cast<int>(order.node.size()) / 4, 0, mechanics.surfaceRelaxation, b};
+    HostRange range{firstHost + host,
+                    static_cast<int>(order.node.size()) / 4,
+                    0,
+                    mechanics.surfaceRelaxation,
+                    b,
+                    (onLink ? mechanics.linkBulk : mechanics.sphereBulk)[host],
+                    mechanics.largestPressure,
+                    -1};
     for (; k < sorted.size() && mechanics.attachments[sorted[k]].host == host; ++k) {
       order.body.push_back(b);
       order.node.push_back(sorted[k]);
@@ -127,6 +135,12 @@ NodeOrder orderNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) 
   append(false, true, d.nodes.onLinks);
   append(false, false, d.nodes.onSpheres);
   d.nodes.dynamicEnd = static_cast<int>(order.node.size());
+  for (std::vector<HostRange>* ranges : {&d.nodes.onLinks, &d.nodes.onSpheres}) {
+    for (HostRange& range : *ranges) {
+      range.part = static_cast<int>(d.nodes.swollen.size());
+      d.nodes.swollen.push_back(0);
+    }
+  }
   append(true, true, d.nodes.skinOnLinks);
   append(true, false, d.nodes.skinOnSpheres);
   return order;
@@ -254,7 +268,6 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.linkCount = static_cast<int>(m.links.size());
     r.node.resize(m.restNodes.size());
     r.restVolume = enclosedVolume(m);
-    r.bulk = r.wholeBulk = mechanics[b].bulk;
     r.massDamping = mechanics[b].massDamping;
     r.held = !d.bodies[b].fixed.empty() || !d.bodies[b].fixedNodes.empty();
     d.ranges.push_back(r);
@@ -262,6 +275,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     addLinks(d, d.bodies[b], mechanics[b], r.firstSphere);
   }
   d.links.frames.resize(d.links.groups.size());
+  d.links.loads.resize(4 * d.links.groups.size());
   d.links.unwoundTwist.resize(d.links.groups.size());
   d.links.slots.resize(8 * d.links.groups.size());
   addNodes(d, mechanics);

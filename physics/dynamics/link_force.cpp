@@ -1,6 +1,8 @@
 #include <cstddef>
 
+#include "physics/dynamics/anchor.h"
 #include "physics/dynamics/angles.h"
+#include "physics/dynamics/link_frame.h"
 #include "physics/dynamics/stages.h"
 
 // The elastic link (paper 2.2): six measures of the state q_m, each a smooth function of the two poses, and generalised
@@ -229,9 +231,12 @@ void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundT
   put(m.end1.spinAxis, f.spinAxis1);
   put(m.end0.lever, f.spinLever0);
   put(m.end1.lever, f.spinLever1);
-  const Lanes zero = splat(0);
-  for (Lanes3* sum : {&f.loadSum, &f.loadAlong, &f.loadMoment}) put({zero, zero, zero}, *sum);
-  f.loadTwist = f.loadThickness = zero;
+  if (link.hasBends) {
+    put(m.end0.t, f.t0);
+    put(m.end1.t, f.t1);
+    setBend(link, f);
+    setBendRates(link, s0.angularVelocity, s1.angularVelocity, lengthRate, f);
+  }
 }
 
 void storeVectors(const Lanes3& v, Quad& q0, Quad& q1, Quad& q2, Quad& q3) {
@@ -250,21 +255,19 @@ void evaluateLinks(WorldData& d) {
     evaluateGroup(d.links.groups[g], d.spheres, d.links.unwoundTwist[g], d.links.frames[g]);
 }
 
-// The transpose of the anchors' velocities x' = v0 + s v + (turning + n spin(s)) x r: what a load g at the anchor does
-// per unit of each sphere's velocity. Loads are minus the forces on the nodes.
+// Loads are minus the forces on the nodes; torsion turns the frame's two spins apart, as a load does.
 void returnLinkForces(WorldData& d) {
   for (const int g : d.awake.linkGroups) {
     const LinkFrame& f = d.links.frames[g];
-    const Lanes twistOfNodes = dot(f.n, f.loadMoment);
-    const Lanes moment0 = f.twistMoment - (twistOfNodes - f.loadTwist);
-    const Lanes moment1 = splat(0) - f.twistMoment - f.loadTwist;
-    const Lanes3 swing = cross(f.n, f.loadMoment) - moment0 * f.spinLever0 - moment1 * f.spinLever1;
-    const Lanes3 onBoth = fma(f.inverseLength, swing, fnma(f.thicknessSlope * f.loadThickness, f.n, f.force1));
-    const Lanes3 force1 = onBoth - f.loadAlong;
-    const Lanes3 force0 = f.loadAlong - f.loadSum - onBoth;
-    Lanes3 torque0 = fma(moment0, f.spinAxis0, f.torque0);
-    Lanes3 torque1 = fma(moment1, f.spinAxis1, f.torque1);
-    if (d.links.groups[g].hasArms) {
+    const LinkGroup& link = d.links.groups[g];
+    AnchorLoads loads = gatherLoads(&d.links.loads[4 * g], link.hasBends);
+    loads.twist = loads.twist + f.twistMoment;
+    const EndLoads nodes = endLoads(link, f, loads);
+    const Lanes3 force1 = f.force1 - nodes.force1;
+    const Lanes3 force0 = splat(-1) * (f.force1 + nodes.force0);
+    Lanes3 torque0 = f.torque0 - nodes.torque0;
+    Lanes3 torque1 = f.torque1 - nodes.torque1;
+    if (link.hasArms) {
       torque0 = torque0 + cross(f.arm0, force0);
       torque1 = torque1 + cross(f.arm1, force1);
     }

@@ -71,22 +71,25 @@ void addNodeImpulse(WorldData& d, int node, const Vector3d& impulse) {
   }
 }
 
+// The square of a matrix' largest stretch is not more than its largest row's sum times its largest column's.
+double stretchBound(const Eigen::Matrix3d& m) {
+  return m.cwiseAbs().rowwise().sum().maxCoeff() * m.cwiseAbs().colwise().sum().maxCoeff();
+}
+
 // 1/kg: velocity per impulse at the node; exact on masses, an upper bound on skin, where it only steers convergence.
 double mobility(const WorldData& d, int node) {
   if (!isSkin(d, node)) return d.nodes.inverseMass[node];
   const GroupHost host = d.nodes.groupHosts[node / 4];
-  const auto ofSphere = [&](int sphere, double lever2) {
+  const auto ofSphere = [&](int sphere, double linear, double angular) {
     const SphereGroup& g = d.spheres.groups[sphere / 4];
     const int l = sphere % 4;
     const double turning = g.inverseInertia[0][l] + g.inverseInertia[1][l] + g.inverseInertia[2][l];
-    return g.inverseMass[l] + g.freeToTurn[l] * turning * lever2;
+    return g.inverseMass[l] * linear + g.freeToTurn[l] * turning * angular;
   };
-  if (!host.onLink) return ofSphere(host.host, sphereOffset(d, host.host, node).squaredNorm());
+  if (!host.onLink) return ofSphere(host.host, 1, sphereOffset(d, host.host, node).squaredNorm());
   const LinkPoint p = linkPoint(d, host.host, node);
-  const double lever2 = (p.offset.norm() + std::max(p.arm0.norm(), p.arm1.norm())) *
-                        (p.offset.norm() + std::max(p.arm0.norm(), p.arm1.norm()));
-  const double lean = 1 + lever2 * p.inverseLength * p.inverseLength;
-  return lean * (ofSphere(p.sphere0, lever2) + ofSphere(p.sphere1, lever2));
+  const auto bound = [&p](int row) { return stretchBound(p.loads.middleRows<3>(row)); };
+  return ofSphere(p.sphere0, bound(0), bound(3)) + ofSphere(p.sphere1, bound(6), bound(9));
 }
 
 // One pass of Gauss-Seidel at one load: its force goes to what the spring asks for now. Returns the change's size.

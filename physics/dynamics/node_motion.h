@@ -15,9 +15,7 @@ struct SphereMotion {
 
 struct LinkPoint {
   int sphere0, sphere1;
-  double s, twistShare, inverseLength;
-  double thicknessSlope;
-  Eigen::Vector3d offset, n, axis0, axis1, lever0, lever1, arm0, arm1;
+  Eigen::Matrix<double, 12, 3> loads;  // what 1 N along x, y or z does: force and torque on sphere 0, then on 1
 };
 
 inline bool isSkin(const WorldData& d, int node) {

@@ -58,7 +58,8 @@ class RestModel {
       : model_(*body.model),
         mechanics_(mechanics),
         rows_(measureRows(*body.model, mechanics)),
-        thinning_(body.links == LinkModel::beam ? body.tissue.poisson : 0),
+        bends_(body.links == LinkModel::beam),
+        thinning_(bends_ ? body.tissue.poisson : 0),
         spheres_(static_cast<int>(mechanics.sphereMass.size())),
         nodes_(body.surface != SurfaceMode::skin ? static_cast<int>(mechanics.attachments.size()) : 0) {
     for (const Matrix3d& i : mechanics.sphereInertia) inverseInertia_.push_back(i.inverse());
@@ -81,14 +82,19 @@ class RestModel {
     }
     if (nodes_ == 0) return y;
     std::vector<Vector3d> displaced(nodes_), force(nodes_);
-    double swollen = 0;
+    std::vector<double> onLinks(model_.links.size(), 0), onSpheres(model_.spheres.size(), 0);  // volumes
+    const auto volume = [&](const Attachment& a) -> double& { return (a.onLink ? onLinks : onSpheres)[a.host]; };
     for (int i = 0; i < nodes_; ++i) {
       displaced[i] = x.segment<3>(node(i)) - anchorRate(i, x);
       force[i] = mechanics_.attachmentStiffness[i] * displaced[i];
-      swollen += mechanics_.attachments[i].area * mechanics_.normal[i].dot(displaced[i]);
+      const Attachment& a = mechanics_.attachments[i];
+      volume(a) += a.area * mechanics_.normal[i].dot(displaced[i]);
     }
-    for (int i = 0; i < nodes_; ++i)
-      force[i] += mechanics_.bulk * swollen * mechanics_.attachments[i].area * mechanics_.normal[i];
+    for (int i = 0; i < nodes_; ++i) {
+      const Attachment& a = mechanics_.attachments[i];
+      const double bulk = (a.onLink ? mechanics_.linkBulk : mechanics_.sphereBulk)[a.host];
+      force[i] += bulk * volume(a) * a.area * mechanics_.normal[i];
+    }
     for (std::size_t e = 0; e < model_.edges.size(); ++e) {
       const auto& [a, b] = model_.edges[e];
       const Vector3d f = mechanics_.edgeStiffness[e] * (displaced[b] - displaced[a]);
@@ -166,6 +172,7 @@ class RestModel {
     int s0, s1;  // the spheres' places in the vector of freedoms
     double along, twistShare, length, thinning;
     Vector3d n, arm0, arm1, offset;
+    double bump;  // m, of the centre line per turn of its ends against each other (anchor.h); 0 where it stays a chord
   };
 
   LinkAnchor linkAnchor(int i) const {
@@ -183,7 +190,8 @@ class RestModel {
             line / length,
             span.end0 - model_.spheres[l.sphere0].restFrame,
             span.end1 - model_.spheres[l.sphere1].restFrame,
-            a.restOffset};
+            a.restOffset,
+            0.5 * a.along * (1 - a.along) * (bends_ ? length : 0)};
   }
 
   // Where freedoms' rates x carry the anchor of node i.
@@ -194,8 +202,10 @@ class RestModel {
     const Vector3d w0 = x.segment<3>(p.s0 + 3), w1 = x.segment<3>(p.s1 + 3);
     const Vector3d v0 = x.segment<3>(p.s0) + w0.cross(p.arm0), dv = x.segment<3>(p.s1) + w1.cross(p.arm1) - v0;
     const double spin = p.n.dot((1 - p.twistShare) * w0 + p.twistShare * w1);
-    const Vector3d omega = p.n.cross(dv) / p.length + spin * p.n;
-    return v0 + p.along * dv + omega.cross(p.offset) - p.thinning * p.n.dot(dv) * p.offset;
+    const Vector3d leaning = bends_ ? Vector3d((1 - p.along) * w0 + p.along * w1) : p.n.cross(dv) / p.length;
+    const Vector3d omega = leaning + (spin - p.n.dot(leaning)) * p.n;
+    return v0 + p.along * dv + p.bump * (w0 - w1).cross(p.n) + omega.cross(p.offset) -
+           p.thinning * p.n.dot(dv) * p.offset;
   }
 
   // The transpose: y += what a force f on the anchor of node i does to its spheres.
@@ -208,12 +218,16 @@ class RestModel {
     }
     const LinkAnchor p = linkAnchor(i);
     const Vector3d moment = p.offset.cross(f);
-    const Vector3d swing = moment.cross(p.n) / p.length - p.thinning * p.offset.dot(f) * p.n;
+    const Vector3d about = p.n.dot(moment) * p.n, lean = moment - about;
+    const Vector3d swing = (bends_ ? Vector3d(Vector3d::Zero()) : Vector3d(moment.cross(p.n) / p.length)) -
+                           p.thinning * p.offset.dot(f) * p.n;
     const Vector3d f0 = (1 - p.along) * f - swing, f1 = p.along * f + swing;
+    const Vector3d bow = p.bump * p.n.cross(f);
+    const double leaning = bends_ ? 1 : 0;
     y.segment<3>(p.s0) += f0;
     y.segment<3>(p.s1) += f1;
-    y.segment<3>(p.s0 + 3) += (1 - p.twistShare) * p.n.dot(moment) * p.n + p.arm0.cross(f0);
-    y.segment<3>(p.s1 + 3) += p.twistShare * p.n.dot(moment) * p.n + p.arm1.cross(f1);
+    y.segment<3>(p.s0 + 3) += (1 - p.twistShare) * about + leaning * (1 - p.along) * lean + bow + p.arm0.cross(f0);
+    y.segment<3>(p.s1 + 3) += p.twistShare * about + leaning * p.along * lean - bow + p.arm1.cross(f1);
   }
 
   VectorXd timesMass(const VectorXd& x) const {
@@ -241,6 +255,7 @@ class RestModel {
   const BodyMechanics& mechanics_;
   std::vector<MeasureRow> rows_;
   std::vector<Matrix3d> inverseInertia_;
+  bool bends_;
   double thinning_;  // relative, of what hangs on a link, per relative stretch
   int spheres_, nodes_;
 };

@@ -136,16 +136,13 @@ inline Lanes3 gather(const Quad& q0, const Quad& q1, const Quad& q2, const Quad&
   Lanes unused;
   return gather(q0, q1, q2, q3, unused);
 }
-// Sum over the lanes of each component: (x, y, z, w).
-inline Lanes sumOfLanes(const Lanes3& v, Lanes w) {
-  Lanes a = v.x, b = v.y, c = v.z, d = w;
-  transpose(a, b, c, d);
-  return (a + b) + (c + d);
+// Sums over the lanes of four: one result per lane.
+inline Lanes sumsOfLanes(Lanes a, Lanes b, Lanes c, Lanes d) {
+  const Lanes ab = _mm256_hadd_pd(a, b), cd = _mm256_hadd_pd(c, d);
+  return _mm256_permute2f128_pd(ab, cd, 0x20) + _mm256_permute2f128_pd(ab, cd, 0x31);
 }
-// Squared-length style product of four (x, y, z, 0) pairs, one result per lane.
-inline Lanes dotOfFour(Lanes ab0, Lanes ab1, Lanes ab2, Lanes ab3) {
-  const Lanes h0 = _mm256_hadd_pd(ab0, ab1), h1 = _mm256_hadd_pd(ab2, ab3);
-  return _mm256_permute2f128_pd(h0, h1, 0x20) + _mm256_permute2f128_pd(h0, h1, 0x31);
+inline Lanes sumOfLanes(const Lanes3& v, Lanes w) {
+  return sumsOfLanes(v.x, v.y, v.z, w);
 }
 
 // Columns of the rotation of a unit quaternion.

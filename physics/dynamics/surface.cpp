@@ -25,13 +25,28 @@ MEDULLA_INLINE void pullNodes(Nodes& n, Lanes relaxation, const NodeGroup& group
   storeFour(displaced, n.displaced, 4 * g);
 }
 
+// `visit` with the link, once for those that bend and once for the others: as it is known then, no loop asks for it.
+template <class Visit>
+MEDULLA_INLINE void visitLink(const WorldData& d, int link, const Visit& visit) {
+  LinkHost host = linkHost(d, link);
+  if (host.bends) {
+    host.bends = true;
+    visit(host);
+  } else {
+    host.bends = false;
+    visit(host);
+  }
+}
+
 void pullOnLink(WorldData& d, const HostRange& range) {
-  const LinkHost host = linkHost(d, range.host);
-  const Lanes relaxation = splat(range.relaxation);
-  Lanes volume = splat(0);
-  for (int g = range.firstGroup; g < range.endGroup; ++g)
-    pullNodes(d.nodes, relaxation, d.nodes.groups[g], anchorOnLink(host, d.nodes.groups[g]), g, volume);
-  d.ranges[range.body].swollen += sumOfLanes(volume);
+  visitLink(
+      d, range.host, [&](const LinkHost& host) __attribute__((always_inline)) {
+        const Lanes relaxation = splat(range.relaxation);
+        Lanes volume = splat(0);
+        for (int g = range.firstGroup; g < range.endGroup; ++g)
+          pullNodes(d.nodes, relaxation, d.nodes.groups[g], anchorOnLink(host, d.nodes.groups[g]), g, volume);
+        d.nodes.swollen[range.part] = sumOfLanes(volume);
+      });
 }
 
 void pullOnSphere(WorldData& d, const HostRange& range) {
@@ -40,13 +55,11 @@ void pullOnSphere(WorldData& d, const HostRange& range) {
   Lanes volume = splat(0);
   for (int g = range.firstGroup; g < range.endGroup; ++g)
     pullNodes(d.nodes, relaxation, d.nodes.groups[g], anchorOnSphere(host, d.nodes.groups[g]), g, volume);
-  d.ranges[range.body].swollen += sumOfLanes(volume);
+  d.nodes.swollen[range.part] = sumOfLanes(volume);
 }
 
-// Linear in the volume between anchors and nodes, up to a tenth of the body's: inside out it would be any number.
-double pressureOf(const BodyRange& r) {
-  const double most = 0.1 * r.wholeBulk * r.restVolume;
-  return std::clamp(r.bulk * r.swollen, -most, most);
+double pressureOf(const WorldData& d, const HostRange& r) {
+  return std::clamp(r.bulk * d.nodes.swollen[r.part], -r.largestPressure, r.largestPressure);
 }
 
 struct NodeForces {
@@ -74,28 +87,22 @@ MEDULLA_INLINE NodeForces finishForces(WorldData& d, Lanes pressure, int g) {
 }
 
 void returnToLink(WorldData& d, const HostRange& range) {
-  LinkFrame& f = d.links.frames[range.host / 4];
-  const int lane = range.host % 4;
-  const Lanes3 n = splatLane(f.n, lane);
-  const Lanes zero = splat(0);
-  Lanes3 sum{zero, zero, zero}, along = sum, moment = sum;
-  Lanes twist = zero, thickness = zero;
-  const Lanes pressure = splat(pressureOf(d.ranges[range.body]));
-  for (int g = range.firstGroup; g < range.endGroup; ++g) {
-    const NodeForces on = finishForces(d, pressure, g);
-    sum = sum + on.force;
-    along = fma(d.nodes.groups[g].along, on.force, along);
-    moment = moment + on.turn;
-    twist = fma(d.nodes.groups[g].twistShare, dot(n, on.turn), twist);
-    thickness = thickness + dot(d.nodes.offset[g], on.force);
-  }
-  setLoads(f, lane, sumOfLanes(sum, twist), sumOfLanes(along, thickness), sumOfLanes(moment, zero));
+  visitLink(
+      d, range.host, [&](const LinkHost& host) __attribute__((always_inline)) {
+        AnchorLoads sum = noLoads();
+        const Lanes pressure = splat(pressureOf(d, range));
+        for (int g = range.firstGroup; g < range.endGroup; ++g) {
+          const NodeForces on = finishForces(d, pressure, g);
+          addLoads(host, d.nodes.groups[g], d.nodes.offset[g], on.force, on.turn, sum);
+        }
+        setLoads(host, sum, d.links.loads[range.host]);
+      });
 }
 
 void returnToSphere(WorldData& d, const HostRange& range) {
   const Lanes zero = splat(0);
   Lanes3 sum{zero, zero, zero}, moment = sum;
-  const Lanes pressure = splat(pressureOf(d.ranges[range.body]));
+  const Lanes pressure = splat(pressureOf(d, range));
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const NodeForces on = finishForces(d, pressure, g);
     sum = sum + on.force;
@@ -113,8 +120,6 @@ void evaluateAttachments(WorldData& d) {
     store(d.spheres.force[i], zero);
     store(d.spheres.torque[i], zero);
   }
-  for (std::size_t b = 0; b < d.ranges.size(); ++b)
-    if (!d.rest[b].asleep) d.ranges[b].swollen = 0;
   for (const HostRange& range : d.awake.onLinks) pullOnLink(d, range);
   for (const HostRange& range : d.awake.onSpheres) pullOnSphere(d, range);
 }
@@ -155,9 +160,11 @@ double surfaceEnergy(const WorldData& d) {
       sum += 0.25 * s.stiffness[i % 4] * (other - own).squaredNorm();
     }
   }
-  for (const BodyRange& r : d.ranges) {
-    const double pressure = pressureOf(r);
-    if (pressure != 0) sum += pressure * r.swollen - 0.5 * pressure * pressure / r.bulk;
+  for (const std::vector<HostRange>* ranges : {&d.nodes.onLinks, &d.nodes.onSpheres}) {
+    for (const HostRange& r : *ranges) {
+      const double pressure = pressureOf(d, r);
+      if (pressure != 0) sum += pressure * d.nodes.swollen[r.part] - 0.5 * pressure * pressure / r.bulk;
+    }
   }
   return sum;
 }

@@ -1,4 +1,4 @@
-#include "physics/dynamics/anchor.h"
+#include "physics/dynamics/anchor_row.h"
 #include "physics/dynamics/implicit_stages.h"
 
 namespace medulla {
@@ -21,24 +21,7 @@ void setFrameRates(const LinkGroup& g, const Motion& motion, LinkFrame& f) {
   f.spin0 = dot(f.spinAxis0, omega0) - dot(f.spinLever0, nRate);
   f.spinAlong = dot(f.spinAxis1, omega1) - dot(f.spinLever1, nRate) - f.spin0;
   f.thicknessRate = f.thicknessSlope * lengthRate;
-}
-
-// What forces on a link's anchors do to its two spheres; the transpose of setFrameRates() and the anchors' velocities.
-struct EndLoads {
-  Lanes3 force0, torque0, force1, torque1;
-};
-
-EndLoads endLoads(const LinkFrame& f, const Lanes3& sum, const Lanes3& along, const Lanes3& moment, Lanes twist1,
-                  Lanes thickness) {
-  const Lanes twist0 = dot(f.n, moment) - twist1;
-  const Lanes3 byDirection = cross(moment, f.n) - twist0 * f.spinLever0 - twist1 * f.spinLever1;
-  const Lanes3 swing = fma(f.inverseLength, byDirection, (f.thicknessSlope * thickness) * f.n);
-  EndLoads out;
-  out.force1 = along + swing;
-  out.force0 = sum - out.force1;
-  out.torque0 = fma(twist0, f.spinAxis0, cross(f.arm0, out.force0));
-  out.torque1 = fma(twist1, f.spinAxis1, cross(f.arm1, out.force1));
-  return out;
+  if (g.hasBends) setBendRates(g, omega0, omega1, lengthRate, f);
 }
 
 void addTo(Quad& q, Lanes a) {
@@ -49,7 +32,9 @@ void returnFromLinks(WorldData& d, Motion& motion) {
   for (std::size_t k = 0; k < d.links.groups.size(); ++k) {
     const LinkFrame& f = d.links.frames[k];
     const LinkGroup& g = d.links.groups[k];
-    const EndLoads e = endLoads(f, f.loadSum, f.loadAlong, f.loadMoment, f.loadTwist, f.loadThickness);
+    EndLoads e = endLoads(g, f, gatherLoads(&d.links.loads[4 * k], g.hasBends));
+    e.torque0 = e.torque0 + cross(f.arm0, e.force0);
+    e.torque1 = e.torque1 + cross(f.arm1, e.force1);
     Quad q[4][4];
     const Lanes3* parts[4] = {&e.force0, &e.torque0, &e.force1, &e.torque1};
     for (int p = 0; p < 4; ++p) {
@@ -77,11 +62,11 @@ void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried)
   for (const HostRange& range : d.nodes.onLinks) {
     const LinkHost h = linkHost(d, range.host);
     for (int g = range.firstGroup; g < range.endGroup; ++g) {
-      const Lanes along = d.nodes.groups[g].along;
-      const Lanes3 omega = fma(fma(d.nodes.groups[g].twistShare, h.spinAlong, h.spin0), h.n, h.turning);
+      const NodeGroup& group = d.nodes.groups[g];
+      const Lanes3 omega = fma(fma(group.twistShare, h.spinAlong, h.spin0), h.n, h.turning);
       const Lanes3& offset = d.nodes.offset[g];
-      const Lanes3 base = fma(along, h.lineVelocity, h.originVelocity);
-      storeFour(fma(h.thicknessRate, offset, base + cross(omega, offset)), carried, 4 * g);
+      const Lanes3 base = baseVelocityOf(h, group, offset, dot(h.axisU, offset), dot(h.axisV, offset));
+      storeFour(base + cross(omega, offset), carried, 4 * g);
     }
   }
   for (const HostRange& range : d.nodes.onSpheres) {
@@ -94,27 +79,15 @@ void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried)
 void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& motion) {
   const Lanes zero = splat(0);
   const Lanes3 none{zero, zero, zero};
-  for (LinkFrame& f : d.links.frames) {
-    f.loadSum = f.loadAlong = f.loadMoment = none;
-    f.loadTwist = f.loadThickness = zero;
-  }
   for (const HostRange& range : d.nodes.onLinks) {
-    LinkFrame& f = d.links.frames[range.host / 4];
-    const int lane = range.host % 4;
-    const Lanes3 n = splatLane(f.n, lane);
-    Lanes3 sum = none, along = none, moment = none;
-    Lanes twist = zero, thickness = zero;
+    const LinkHost h = linkHost(d, range.host);
+    AnchorLoads sum = noLoads();
     for (int g = range.firstGroup; g < range.endGroup; ++g) {
-      const Lanes s = d.nodes.groups[g].along;
+      const Lanes3 impulse = gatherFour(impulses, 4 * g);
       const Lanes3& offset = d.nodes.offset[g];
-      const Lanes3 impulse = gatherFour(impulses, 4 * g), turn = cross(offset, impulse);
-      sum = sum + impulse;
-      along = fma(s, impulse, along);
-      moment = moment + turn;
-      twist = fma(d.nodes.groups[g].twistShare, dot(n, turn), twist);
-      thickness = thickness + dot(offset, impulse);
+      addLoads(h, d.nodes.groups[g], offset, impulse, cross(offset, impulse), sum);
     }
-    setLoads(f, lane, sumOfLanes(sum, twist), sumOfLanes(along, thickness), sumOfLanes(moment, zero));
+    setLoads(h, sum, d.links.loads[range.host]);
   }
   returnFromLinks(d, motion);
   for (const HostRange& range : d.nodes.onSpheres) {
@@ -131,19 +104,6 @@ void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& mot
 
 namespace {
 
-struct Row12 {
-  Lanes c[12];
-};
-
-// Rows of J for one direction of four nodes of a link: what a unit force there does to the two spheres.
-Row12 linkRow(const LinkFrame& f, const NodeGroup& g, const Lanes3& offset, const Lanes3& direction) {
-  const Lanes3 moment = cross(offset, direction);
-  const EndLoads e =
-      endLoads(f, direction, g.along * direction, moment, g.twistShare * dot(f.n, moment), dot(offset, direction));
-  return {{e.force0.x, e.force0.y, e.force0.z, e.torque0.x, e.torque0.y, e.torque0.z, e.force1.x, e.force1.y,
-           e.force1.z, e.torque1.x, e.torque1.y, e.torque1.z}};
-}
-
 template <int size>
 void addSquare(const Lanes* row, Lanes weight, Lanes* sum) {
   int e = 0;
@@ -151,25 +111,6 @@ void addSquare(const Lanes* row, Lanes weight, Lanes* sum) {
     const Lanes scaled = weight * row[i];
     for (int j = i; j < size; ++j, ++e) sum[e] = fma(scaled, row[j], sum[e]);
   }
-}
-
-LinkFrame oneLink(const LinkFrame& f, int lane) {  // only what linkRow() needs
-  LinkFrame out;
-  out.n = splatLane(f.n, lane);
-  out.arm0 = splatLane(f.arm0, lane);
-  out.arm1 = splatLane(f.arm1, lane);
-  out.spinAxis0 = splatLane(f.spinAxis0, lane);
-  out.spinAxis1 = splatLane(f.spinAxis1, lane);
-  out.spinLever0 = splatLane(f.spinLever0, lane);
-  out.spinLever1 = splatLane(f.spinLever1, lane);
-  out.inverseLength = splat(f.inverseLength[lane]);
-  out.thicknessSlope = splat(f.thicknessSlope[lane]);
-  return out;
-}
-
-Lanes3 unit(int k) {
-  const Lanes zero = splat(0), one = splat(1);
-  return {k == 0 ? one : zero, k == 1 ? one : zero, k == 2 ? one : zero};
 }
 
 Lanes massesOf(const std::vector<double>& mass, int g) {
@@ -181,19 +122,18 @@ Lanes massesOf(const std::vector<double>& mass, int g) {
 void addCarriedMass(const WorldData& d, const std::vector<double>& mass, std::vector<Block6>& diagonal,
                     std::vector<Block6>& beside) {
   for (const HostRange& range : d.nodes.onLinks) {
-    const LinkFrame f = oneLink(d.links.frames[range.host / 4], range.host % 4);
+    const OneLink link = oneLink(d, range.host);
     Lanes sum[78];
     for (Lanes& s : sum) s = splat(0);
     for (int g = range.firstGroup; g < range.endGroup; ++g)
       for (int k = 0; k < 3; ++k)
-        addSquare<12>(linkRow(f, d.nodes.groups[g], d.nodes.offset[g], unit(k)).c, massesOf(mass, g), sum);
+        addSquare<12>(anchorRow(link, d.nodes.groups[g], d.nodes.offset[g], unit(k)).c, massesOf(mass, g), sum);
     Eigen::Matrix<double, 12, 12> m;
     int e = 0;
     for (int i = 0; i < 12; ++i)
       for (int j = i; j < 12; ++j, ++e) m(i, j) = m(j, i) = sumOfLanes(sum[e]);
-    const LinkGroup& g = d.links.groups[range.host / 4];
-    diagonal[g.sphere0[range.host % 4]] += m.topLeftCorner<6, 6>();
-    diagonal[g.sphere1[range.host % 4]] += m.bottomRightCorner<6, 6>();
+    diagonal[link.sphere0] += m.topLeftCorner<6, 6>();
+    diagonal[link.sphere1] += m.bottomRightCorner<6, 6>();
     beside[range.host] += m.topRightCorner<6, 6>();
   }
   for (const HostRange& range : d.nodes.onSpheres) {

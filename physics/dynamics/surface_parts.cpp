@@ -6,8 +6,8 @@
 #include "physics/dynamics/stages.h"
 
 // SurfaceMode::contact: a host's nodes move by themselves only where something acts on them or what acts has spread to
-// them. The others are carried: they hang still from their anchors, their mass is their spheres', and the pressure
-// reckons with the volume by which they would give way. Parts join and leave between frames.
+// them. The others are carried: they hang still from their anchors, and their mass is their spheres'. Parts join and
+// leave between frames.
 namespace medulla {
 
 namespace {
@@ -59,11 +59,8 @@ void layOutPart(const WorldData& d, const BodyMechanics& mechanics, std::size_t 
   part.unrest = kUnrest * meanRadius(*d.bodies[range.body].model);
   const bool held = isHeld(d, mechanics, k);
   for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
-    const NodeGroup& g = d.nodes.groups[i / 4];
     if (d.nodes.mass[i] == 0) continue;
     part.always = part.always || (d.nodes.inverseMass[i] == 0 && !held);
-    const Vector3d area = vectorOf(g.restArea, i % 4);
-    if (d.nodes.inverseMass[i] > 0) part.give += area.squaredNorm() / g.stiffness[i % 4];
   }
   part.moves = part.always;
 }
@@ -116,16 +113,12 @@ void partsChanged(WorldData& d) {
   SurfaceParts& s = d.surface;
   shareOutMasses(d);
   s.carried.clear();
-  std::vector<double> give(d.bodies.size(), 0);
   for (std::size_t k = 0; k < s.parts.size(); ++k) {
     if (k == d.nodes.onLinks.size()) s.firstOnSphere = s.carried.size();
     if (s.parts[k].moves) continue;
     s.carried.push_back(rangeOf(d, k));
-    give[rangeOf(d, k).body] += s.parts[k].give;
   }
   if (s.parts.size() == d.nodes.onLinks.size()) s.firstOnSphere = s.carried.size();
-  for (std::size_t b = 0; b < give.size(); ++b)
-    d.ranges[b].bulk = d.ranges[b].wholeBulk / (1 + d.ranges[b].wholeBulk * give[b]);
   listAwake(d);
 }
 
@@ -159,6 +152,8 @@ double unrestOf(const WorldData& d, std::size_t part) {
 void carry(WorldData& d, std::size_t part) {
   const HostRange& range = rangeOf(d, part);
   d.surface.parts[part].moves = false;
+  d.nodes.swollen[part] = 0;
+  if (part < d.nodes.onLinks.size()) d.links.loads[range.host] = {};
   for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i)
     if (d.nodes.mass[i] > 0) d.nodes.displaced[i] = quadOf(sagOf(d, i));
 }

@@ -67,8 +67,20 @@ struct LinkGroup {  // constants of four links
   Lanes flexionU1, flexionV1;           // on sphere 1
   Lanes couple, coupleDifference;       // N m/rad between the ends: mean over U and V, and half of V less U
   Lanes neoHookean;                     // 1, or 0: elongation is linear
+  Lanes bends;                          // 1, or 0: what hangs on the link follows its chord
+  bool hasBends;                        // some link of the four does
   Lanes thinning;                       // twice the Poisson's ratio that what hangs on the link follows; 0: none
   Lanes relaxation;                     // s, damping over stiffness (Rayleigh's beta)
+};
+
+// Sums over what hangs on each of four links of the forces f there, as the link's motions feel them (anchor.h). In N
+// and N m.
+struct AnchorLoads {
+  Lanes3 sum, along, moment;                       // f, along f, offset x f
+  Lanes3 bow;                                      // along (1 - along) / 2 f
+  Lanes twist;                                     // twistShare of what turns the anchors about n
+  Lanes thickness;                                 // offset . f
+  Lanes slopeU, slopeV, slopeUAlong, slopeVAlong;  // n.f times the offset's U and V, and along times these
 };
 
 // The four links as the surface sees them, and what the surface gives back.
@@ -84,11 +96,17 @@ struct LinkFrame {
   Lanes thicknessRate;     // 1/s, of its logarithm
   Lanes thicknessSlope;    // 1/m, of its logarithm per length
   Lanes3 spinAxis0, spinAxis1, spinLever0, spinLever1;  // spin_i = spinAxis_i . omega_i - spinLever_i . n'
-  Lanes3 force1, torque0, torque1;        // N on sphere 1 (and minus it on sphere 0), N m: elongation and flexion
-  Lanes twistMoment;                      // N m, of torsion
-  Lanes3 loadSum, loadAlong, loadMoment;  // sums over the nodes of force, along * force, offset x force (on the nodes)
-  Lanes loadTwist;                        // sum of twistShare * n . (offset x force)
-  Lanes loadThickness;                    // N m, sum of offset . force
+  Lanes3 t0, t1;                                        // unit: the rest centre line as the two spheres carry it
+  Lanes3 bow, bowVelocity;                              // m, m/s: length (t0 - t1) across the chord; 0 where bends is
+  Lanes slopeU, slopeV, slopeUAlong, slopeVAlong;       // t0 on U and V, and t1's less it; 0 where bends is
+  Lanes slopeURate, slopeVRate, slopeUAlongRate, slopeVAlongRate;  // 1/s
+  Lanes3 force1, torque0, torque1;  // N on sphere 1 (and minus it on sphere 0), N m: elongation and flexion
+  Lanes twistMoment;                // N m, of torsion
+};
+
+// AnchorLoads of one link, summed over its nodes. Of a link whose nodes do not move by themselves: 0.
+struct LinkLoads {
+  Quad sumTwist, alongThickness, momentSlopeU, bowSlopeV, slopesAlong;
 };
 
 struct Slot {
@@ -99,6 +117,7 @@ struct Links {
   int count = 0;
   std::vector<LinkGroup> groups;
   std::vector<LinkFrame> frames;
+  std::vector<LinkLoads> loads;    // per link, padded to four
   std::vector<Quad> unwoundTwist;  // rad per link, state: counts turns beyond 180 degrees
   std::vector<Slot> slots;         // 2 per link: end 0, end 1
 };
@@ -118,6 +137,9 @@ struct HostRange {
   int firstGroup, endGroup;  // of its nodes
   double relaxation;         // s, the attachments' damping over stiffness
   int body;
+  double bulk;             // N/m5: pressure per volume between these nodes and their anchors
+  double largestPressure;  // Pa
+  int part;                // place in Nodes::swollen; of dynamic nodes
 };
 
 struct GroupHost {
@@ -132,6 +154,7 @@ struct Nodes {
   std::vector<Lanes3> offset;              // m, from the anchors' bases to them; of the current substep
   std::vector<Lanes3> area;                // m2, of the surface at rest, carried along; of the current substep
   std::vector<Quad> displaced;             // m, per node: from where the host would carry it; of the current substep
+  std::vector<double> swollen;             // m3, per host: between its nodes and their anchors; of the current substep
   std::vector<double> mass, inverseMass;   // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
   std::vector<NodeGroup> groups;
   std::vector<GroupHost> groupHosts;
@@ -163,9 +186,6 @@ struct BodyRange {
   int firstLink = 0, linkCount = 0;
   std::vector<int> node;   // index in Nodes of every model node
   double restVolume = 0;   // m3, enclosed by the rest nodes
-  double wholeBulk = 0;    // N/m5, pressure per volume between anchors and nodes
-  double bulk = 0;         // N/m5, the same where only some nodes are there to give way; of the current frame
-  double swollen = 0;      // m3, that volume; of the current substep
   double massDamping = 0;  // 1/s, Rayleigh's alpha
   bool held = false;       // some sphere is fixed: deformation is motion against it rather than against a rigid motion
 };
@@ -178,7 +198,6 @@ struct SurfacePart {            // of one host; part k is that of Nodes::onLinks
   int quietFrames = 0;          // in a row, in which nothing asked for it; state
   bool always = true;           // there is no choice: another surface mode, or something acts on it all the time
   std::vector<int> neighbours;  // parts that edges join to this one
-  double give = 0;              // m5/N, volume that carried nodes would give way by per pressure
   double unrest = 0;            // m: nodes farther than this from where they hang at rest set neighbours moving
 };
 

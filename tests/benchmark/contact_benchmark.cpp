@@ -7,7 +7,9 @@
 #include "tests/synthetic_model.h"
 
 // Cost of contact against the number of spheres: rods of four spheres with a full surface, packed so that each ball
-// touches its six neighbours, in a case of six planes, under gravity.
+// touches its six neighbours, in a case of six planes, under gravity. A cube that grows has ever more neighbours per
+// ball, 1.4 pairs at 40 balls and 4.4 at 10 000, since ever fewer of them lie at its walls; a trough of one
+// cross-section has as many at any length, and shows what the number of spheres alone costs.
 namespace medulla {
 
 namespace {
@@ -28,10 +30,23 @@ std::vector<StaticShape> caseOf(const Eigen::Vector3d& size) {
   return planes;
 }
 
-World packedRods(int spheres, ContactMode mode) {
+struct Packing {
+  int columns = 1, depth = 2;  // rods side by side along x (their length) and z; layers are stacked as needed
+};
+
+Packing cubeOf(int spheres) {
+  const int side = static_cast<int>(std::ceil(std::cbrt(spheres))), columns = std::max(1, (side + 3) / 4);
+  return {columns, static_cast<int>(std::ceil(std::sqrt(spheres / 4 / columns)))};
+}
+
+// Two rods high, one rod across.
+Packing troughOf(int spheres) {
+  return {1, (spheres / 4 + 1) / 2};
+}
+
+World packedRods(int spheres, ContactMode mode, const Packing& packing) {
   const auto rod = synthetic::chainModel(synthetic::straightTube(4, 3 * kPitch, kRadius, 5, 8));
-  const int rods = spheres / 4, side = static_cast<int>(std::ceil(std::cbrt(spheres))),
-            columns = std::max(1, (side + 3) / 4), depth = static_cast<int>(std::ceil(std::sqrt(rods / columns)));
+  const int rods = spheres / 4, columns = packing.columns, depth = packing.depth;
   std::vector<BodyDescription> bodies;
   for (int k = 0; k < rods; ++k) {
     bodies.push_back(synthetic::body(rod, 5e3));
@@ -60,8 +75,9 @@ void count(benchmark::State& state, const World& world) {
 
 // One whole substep is the counter `substep`, over the same second of simulated time at every size: a heap that has
 // come to rest needs fewer passes than one that settles.
-static void packedSubstep(benchmark::State& state, ContactMode mode) {
-  World world = packedRods(static_cast<int>(state.range(0)), mode);
+static void packedSubstep(benchmark::State& state, ContactMode mode, Packing (*packing)(int)) {
+  const int spheres = static_cast<int>(state.range(0));
+  World world = packedRods(spheres, mode, packing(spheres));
   for (int i = 0; i < 5; ++i) world.advance({});
   for ([[maybe_unused]] auto _ : state) world.advance({});
   count(state, world);
@@ -72,12 +88,15 @@ static void fromFortyToTenThousand(benchmark::internal::Benchmark* b) {
   for (const int spheres : {40, 100, 400, 1000, 4000, 10000}) b->Arg(spheres);
   b->Iterations(20);
 }
-BENCHMARK_CAPTURE(packedSubstep, none, ContactMode::none)->Apply(fromFortyToTenThousand);
-BENCHMARK_CAPTURE(packedSubstep, balls, ContactMode::balls)->Apply(fromFortyToTenThousand);
-BENCHMARK_CAPTURE(packedSubstep, swept, ContactMode::swept)->Apply(fromFortyToTenThousand);
+BENCHMARK_CAPTURE(packedSubstep, cubeNone, ContactMode::none, cubeOf)->Apply(fromFortyToTenThousand);
+BENCHMARK_CAPTURE(packedSubstep, cubeBalls, ContactMode::balls, cubeOf)->Apply(fromFortyToTenThousand);
+BENCHMARK_CAPTURE(packedSubstep, cubeSwept, ContactMode::swept, cubeOf)->Apply(fromFortyToTenThousand);
+BENCHMARK_CAPTURE(packedSubstep, troughBalls, ContactMode::balls, troughOf)->Apply(fromFortyToTenThousand);
+BENCHMARK_CAPTURE(packedSubstep, troughSwept, ContactMode::swept, troughOf)->Apply(fromFortyToTenThousand);
 
 static void contactStage(benchmark::State& state, ContactMode mode, void (*stage)(WorldData&)) {
-  World world = packedRods(static_cast<int>(state.range(0)), mode);
+  const int spheres = static_cast<int>(state.range(0));
+  World world = packedRods(spheres, mode, cubeOf(spheres));
   for (int i = 0; i < 3; ++i) world.advance({});
   for ([[maybe_unused]] auto _ : state) stage(world.data());
   count(state, world);

@@ -1,6 +1,7 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "physics/dynamics/implicit_data.h"
@@ -14,8 +15,10 @@ namespace medulla {
 
 using Scene = std::vector<BodyDescription> (*)();
 
-static void runSubsteps(benchmark::State& state, Scene scene) {
-  World world({}, scene());
+static void runSubsteps(benchmark::State& state, Scene scene, LinkModel links) {
+  std::vector<BodyDescription> bodies = scene();
+  for (BodyDescription& body : bodies) body.links = links;
+  World world({}, std::move(bodies));
   for (int i = 0; i < 3; ++i) world.advance({});
   for ([[maybe_unused]] auto _ : state) world.advance({});
   const WorldData& d = world.data();
@@ -37,13 +40,14 @@ static void quickestOfMany(benchmark::internal::Benchmark* b) {
   b->MinTime(0.02)->Repetitions(50)->ReportAggregatesOnly()->ComputeStatistics("min", quickest);
 }
 constexpr Scene kGallbladder = synthetic::gallbladderScene, kAbdomen = synthetic::abdomenScene;
-BENCHMARK_CAPTURE(runSubsteps, , kGallbladder)->Name("gallbladderSubstep")->Apply(quickestOfMany);
-BENCHMARK_CAPTURE(runSubsteps, , kAbdomen)->Name("abdomenSubstep")->Apply(quickestOfMany);
+BENCHMARK_CAPTURE(runSubsteps, , kGallbladder, LinkModel::beam)->Name("gallbladderSubstep")->Apply(quickestOfMany);
+BENCHMARK_CAPTURE(runSubsteps, , kAbdomen, LinkModel::beam)->Name("abdomenSubstep")->Apply(quickestOfMany);
 
-// Few frames, to count instructions: valgrind --tool=callgrind --toggle-collect='medulla::World::advance*'. Links as
-// springs run the same instructions as beams.
-BENCHMARK_CAPTURE(runSubsteps, , kGallbladder)->Name("gallbladderFrames")->Iterations(1);
-BENCHMARK_CAPTURE(runSubsteps, , kAbdomen)->Name("abdomenFrames")->Iterations(1);
+// Few frames, to count instructions: valgrind --tool=callgrind --toggle-collect='medulla::World::advance*'.
+BENCHMARK_CAPTURE(runSubsteps, , kGallbladder, LinkModel::beam)->Name("gallbladderFrames")->Iterations(1);
+BENCHMARK_CAPTURE(runSubsteps, , kAbdomen, LinkModel::beam)->Name("abdomenFrames")->Iterations(1);
+BENCHMARK_CAPTURE(runSubsteps, , kGallbladder, LinkModel::springs)->Name("gallbladderSpringsFrames")->Iterations(1);
+BENCHMARK_CAPTURE(runSubsteps, , kAbdomen, LinkModel::springs)->Name("abdomenSpringsFrames")->Iterations(1);
 
 // Implicit steps of 10 ms of the larger scene while it sags; `solve` is the time per linear system, assembled,
 // factorised and solved, the forces around it included.

@@ -1,0 +1,62 @@
+#pragma once
+
+#include "physics/dynamics/world_data.h"
+
+// How the frames of four links, which carry surface nodes (anchor.h), follow their spheres' motion, and the transpose.
+namespace medulla {
+
+// Slopes of the ends and the bow between them: t0, t1, n, U, V and the line are set.
+MEDULLA_INLINE void setBend(const LinkGroup& g, LinkFrame& f) {
+  f.slopeU = g.bends * dot(f.t0, f.axisU);
+  f.slopeV = g.bends * dot(f.t0, f.axisV);
+  f.slopeUAlong = g.bends * dot(f.t1, f.axisU) - f.slopeU;
+  f.slopeVAlong = g.bends * dot(f.t1, f.axisV) - f.slopeV;
+  const Lanes length = dot(f.n, f.line);
+  put((splat(0) - length) * fma(f.slopeUAlong, f.axisU, f.slopeVAlong * f.axisV), f.bow);
+}
+
+// Their rates: U and V turn with the frame of sphere 0 carried onto the line, whose turning and spin0 are set. m/s,
+// rad/s.
+MEDULLA_INLINE void setBendRates(const LinkGroup& g, const Lanes3& omega0, const Lanes3& omega1, Lanes lengthRate,
+                                 LinkFrame& f) {
+  const Lanes3 frame = fma(f.spin0, f.n, f.turning);
+  const Lanes3 rate0 = cross(omega0 - frame, f.t0), rate1 = cross(omega1 - frame, f.t1);
+  f.slopeURate = g.bends * dot(f.axisU, rate0);
+  f.slopeVRate = g.bends * dot(f.axisV, rate0);
+  f.slopeUAlongRate = g.bends * dot(f.axisU, rate1) - f.slopeURate;
+  f.slopeVAlongRate = g.bends * dot(f.axisV, rate1) - f.slopeVRate;
+  const Lanes length = dot(f.n, f.line);
+  const Lanes3 bowing = (splat(0) - length) * fma(f.slopeUAlongRate, f.axisU, f.slopeVAlongRate * f.axisV);
+  put(bowing + fma(lengthRate * f.inverseLength, f.bow, cross(frame, f.bow)), f.bowVelocity);
+}
+
+struct EndLoads {
+  Lanes3 force0, torque0, force1, torque1;  // N at the link's ends, N m
+};
+
+// What loads on a link's anchors do to its ends and spheres: the transpose of the rates above and of the anchors'
+// velocities. Arms from the spheres' frames to the ends are the caller's.
+MEDULLA_INLINE EndLoads endLoads(const LinkGroup& g, const LinkFrame& f, const AnchorLoads& loads) {
+  Lanes3 moment = loads.moment, lean0{splat(0), splat(0), splat(0)}, lean1 = lean0;
+  Lanes stretching = f.thicknessSlope * loads.thickness;
+  if (g.hasBends) {
+    const Lanes length = dot(f.n, f.line);
+    const Lanes bowU = length * dot(loads.bow, f.axisU), bowV = length * dot(loads.bow, f.axisV);
+    const Lanes u0 = bowU - (loads.slopeU - loads.slopeUAlong), v0 = bowV - (loads.slopeV - loads.slopeVAlong);
+    const Lanes u1 = splat(0) - bowU - loads.slopeUAlong, v1 = splat(0) - bowV - loads.slopeVAlong;
+    lean0 = g.bends * cross(f.t0, fma(u0, f.axisU, v0 * f.axisV));
+    lean1 = g.bends * cross(f.t1, fma(u1, f.axisU, v1 * f.axisV));
+    moment = moment + cross(f.bow, loads.bow) - lean0 - lean1;
+    stretching = fma(f.inverseLength, dot(loads.bow, f.bow), stretching);
+  }
+  const Lanes spin0 = dot(f.n, moment) - loads.twist, spin1 = loads.twist;
+  const Lanes3 byDirection = cross(moment, f.n) - spin0 * f.spinLever0 - spin1 * f.spinLever1;
+  EndLoads out;
+  out.force1 = loads.along + fma(f.inverseLength, byDirection, stretching * f.n);
+  out.force0 = loads.sum - out.force1;
+  out.torque0 = fma(spin0, f.spinAxis0, lean0);
+  out.torque1 = fma(spin1, f.spinAxis1, lean1);
+  return out;
+}
+
+}  // namespace medulla
