@@ -24,8 +24,9 @@ inline Lanes3 velocityAt(const Anchor& a, const Lanes3& lever) {
 // One link's frame, the same in all lanes.
 struct LinkHost {
   Lanes3 origin, line, originVelocity, lineVelocity, n, axisU, axisV, turning;
-  Lanes spin0, spinAlong, twist, thickness, thicknessRate;
-  bool bends;  // what follows is set
+  Lanes spin0, spinAlong, twist;
+  bool isBeam;  // what follows is set
+  Lanes thickness, thicknessRate;
   Lanes3 bow, bowVelocity;
   Lanes slopeU, slopeV, slopeUAlong, slopeVAlong, slopeURate, slopeVRate, slopeUAlongRate, slopeVAlongRate;
 };
@@ -45,10 +46,10 @@ inline LinkHost linkHost(const WorldData& d, int link) {
   h.spin0 = splat(f.spin0[lane]);
   h.spinAlong = splat(f.spinAlong[lane]);
   h.twist = splat(f.twist[lane]);
+  h.isBeam = d.links.groups[link / 4].beam[lane] > 0;
+  if (!h.isBeam) return h;
   h.thickness = splat(f.thickness[lane]);
   h.thicknessRate = splat(f.thicknessRate[lane]);
-  h.bends = d.links.groups[link / 4].bends[lane] > 0;
-  if (!h.bends) return h;
   h.bow = splatLane(f.bow, lane);
   h.bowVelocity = splatLane(f.bowVelocity, lane);
   h.slopeU = splat(f.slopeU[lane]);
@@ -62,7 +63,7 @@ inline LinkHost linkHost(const WorldData& d, int link) {
   return h;
 }
 
-// A link's centre line is bowed and its sections lean as those of a bar of constant curvature between the two spheres'
+// A beam's centre line is bowed and its sections lean as those of a bar of constant curvature between the two spheres'
 // directions t0 and t1: base += s (1 - s) / 2 bow, and what hangs at (y, z) on U and V moves by -(y, z).slope along n.
 // A cubic with the slopes t0 and t1, and the beam's own between shear and flexion, came no nearer to finite elements
 // (cylinder's end 0.6 to 0.7 %, along its chords 2.2), and cost more.
@@ -80,17 +81,17 @@ inline Slope slopeAt(const LinkHost& h, const NodeGroup& g) {
 // Velocity of the point of the skeleton, and what changes about the offset, with (y, z) on U and V, otherwise than by
 // turning.
 MEDULLA_INLINE Lanes3 baseVelocityOf(const LinkHost& h, const NodeGroup& g, const Lanes3& offset, Lanes y, Lanes z) {
-  const Lanes3 straight = fma(h.thicknessRate, offset, fma(g.along, h.lineVelocity, h.originVelocity));
-  if (!h.bends) return straight;
+  const Lanes3 straight = fma(g.along, h.lineVelocity, h.originVelocity);
+  if (!h.isBeam) return straight;
   const Slope slope = slopeAt(h, g);
   const Lanes swirl = (g.twistShare * h.spinAlong) * (y * slope.v - z * slope.u);
   const Lanes leaning = fma(y, fma(g.along, h.slopeUAlongRate, h.slopeURate),
                             fma(z, fma(g.along, h.slopeVAlongRate, h.slopeVRate), swirl));
-  return fnma(leaning, h.n, fma(bump(g), h.bowVelocity, straight));
+  return fnma(leaning, h.n, fma(bump(g), h.bowVelocity, fma(h.thicknessRate, offset, straight)));
 }
 
 // The point at `along` of the centre line, slid with its stretch, plus the offset in the frame of sphere 0 carried onto
-// the line, twisted by its share of the torsion and as much shorter as the link is thinner.
+// the line, twisted by its share of the torsion and as much shorter as a beam is thinner.
 MEDULLA_INLINE Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   Lanes c, s;
   const Lanes angle = g.twistShare * h.twist;
@@ -102,13 +103,15 @@ MEDULLA_INLINE Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   Anchor a;
   a.area = fma(g.restArea.x, h.n,
                fma(fnma(g.restArea.z, s, g.restArea.y * c), h.axisU, fma(g.restArea.y, s, g.restArea.z * c) * h.axisV));
-  c = c * h.thickness;
-  s = s * h.thickness;
+  if (h.isBeam) {
+    c = c * h.thickness;
+    s = s * h.thickness;
+  }
   const Lanes y = fnma(g.restOffset.z, s, g.restOffset.y * c), z = fma(g.restOffset.y, s, g.restOffset.z * c);
   a.base = fma(g.along, h.line, h.origin);
   a.omega = fma(fma(g.twistShare, h.spinAlong, h.spin0), h.n, h.turning);
   a.offset = fma(y, h.axisU, z * h.axisV);
-  if (h.bends) {
+  if (h.isBeam) {
     const Slope slope = slopeAt(h, g);
     a.base = fma(bump(g), h.bow, a.base);
     a.offset = fnma(fma(y, slope.u, z * slope.v), h.n, a.offset);
@@ -130,11 +133,11 @@ MEDULLA_INLINE void addLoads(const LinkHost& h, const NodeGroup& g, const Lanes3
   sum.sum = sum.sum + force;
   sum.along = fma(g.along, force, sum.along);
   sum.moment = sum.moment + turn;
-  sum.thickness = sum.thickness + dot(offset, force);
   Lanes about = dot(h.n, turn);
-  if (h.bends) {
+  if (h.isBeam) {
     const Slope slope = slopeAt(h, g);
     const Lanes forward = dot(h.n, force), y = forward * dot(h.axisU, offset), z = forward * dot(h.axisV, offset);
+    sum.thickness = sum.thickness + dot(offset, force);
     sum.bow = fma(bump(g), force, sum.bow);
     sum.slopeU = sum.slopeU + y;
     sum.slopeV = sum.slopeV + z;
@@ -150,7 +153,7 @@ inline void setLoads(const LinkHost& h, const AnchorLoads& sum, LinkLoads& to) {
   store(to.sumTwist, sumOfLanes(sum.sum, sum.twist));
   store(to.alongThickness, sumOfLanes(sum.along, sum.thickness));
   store(to.momentSlopeU, sumOfLanes(sum.moment, sum.slopeU));
-  if (!h.bends) return;
+  if (!h.isBeam) return;
   store(to.bowSlopeV, sumOfLanes(sum.bow, sum.slopeV));
   store(to.slopesAlong, sumsOfLanes(sum.slopeUAlong, sum.slopeVAlong, splat(0), splat(0)));
 }

@@ -22,8 +22,8 @@ inline OneLink oneLink(const WorldData& d, int link) {
   out.sphere0 = static_cast<int>(g.sphere0[lane]);
   out.sphere1 = static_cast<int>(g.sphere1[lane]);
   out.host = linkHost(d, link);
-  out.group.bends = splat(g.bends[lane]);
-  out.group.hasBends = out.host.bends;
+  out.group.beam = splat(g.beam[lane]);
+  out.group.hasBeams = out.host.isBeam;
   for (Lanes3 LinkFrame::*member :
        {&LinkFrame::n, &LinkFrame::line, &LinkFrame::axisU, &LinkFrame::axisV, &LinkFrame::arm0, &LinkFrame::arm1,
         &LinkFrame::t0, &LinkFrame::t1, &LinkFrame::bow, &LinkFrame::spinAxis0, &LinkFrame::spinAxis1,

@@ -26,10 +26,10 @@ void layOutNodes(const WorldData& d, ImplicitData& s) {
     s.carriedMass.push_back(free ? s.pull[i] * m / (m + s.pull[i]) : s.pull[i]);
     s.nodeMobility.push_back(free ? m + s.pull[i] : 0);
   }
-  for (int i = 0; i < n.dynamicEnd; ++i)
-    for (int e = d.springs.first[i / 4]; e < d.springs.first[i / 4 + 1]; ++e)
-      if (s.nodeMobility[i] > 0) s.nodeMobility[i] += h2 * d.springs.groups[e].stiffness[i % 4];
-  for (double& mobility : s.nodeMobility) mobility = mobility > 0 ? 1 / mobility : 0;
+  for (int i = 0; i < n.dynamicEnd; ++i) {
+    double& mobility = s.nodeMobility[i];
+    mobility = mobility > 0 ? 1 / (mobility + h2 * n.groups[i / 4].edges[i % 4]) : 0;
+  }
 }
 
 }  // namespace

@@ -54,12 +54,9 @@ void applySurface(const WorldData& d, ImplicitData& s, const Quad* x) {
   }
   const Lanes h2 = splat(s.duration * s.duration);
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
-    Lanes edges[4];
-    pullOfEdges(d.springs, displaced.data(), g, edges);
-    for (int k = 0; k < 4; ++k) {
-      const int i = 4 * g + k;
-      store(s.given[i], fnma(h2, edges[k], splat(s.pull[i]) * load(displaced[i])));
-    }
+    const Lanes3 own = gatherFour(displaced, 4 * g);
+    const Lanes3 edges = pullOfEdges(d.springs, displaced.data(), own, d.nodes.groups[g].edges, g);
+    storeFour(fnma(h2, edges, _mm256_loadu_pd(&s.pull[4 * g]) * own), s.given, 4 * g);
   }
   applyPressure(d, s);
 }

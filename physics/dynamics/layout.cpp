@@ -52,7 +52,7 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
                    arm1 = span.end1 - m.spheres[link.sphere1].restFrame;
     const LinkStiffness& stiffness = mechanics.links[i];
     const bool beam = body.links == LinkModel::beam;
-    g.hasBends = g.hasBends || beam;
+    g.hasBeams = g.hasBeams || beam;
     g.hasArms = g.hasArms || !arm0.isZero(0) || !arm1.isZero(0);
     const double length = line.norm();
     const Vector3d t = line / length, u = (link.restU - t * t.dot(link.restU)).normalized();
@@ -75,7 +75,7 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
       g.torsion[l] = stiffness.torsion;
       g.couple[l] = 0.5 * (stiffness.flexionV.couple + stiffness.flexionU.couple);
       g.coupleDifference[l] = 0.5 * (stiffness.flexionV.couple - stiffness.flexionU.couple);
-      g.neoHookean[l] = g.bends[l] = beam ? 1 : 0;
+      g.beam[l] = beam ? 1 : 0;
       g.thinning[l] = beam ? 2 * body.tissue.poisson : 0;
       g.relaxation[l] = mechanics.linkRelaxation;
     }
@@ -210,6 +210,7 @@ void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
         const SpringEnd end = k < ends[i + l].size() ? ends[i + l][k] : SpringEnd{i + l, 0};
         g.other[l] = static_cast<std::uint32_t>(end.other * sizeof(Quad));
         g.stiffness[l] = static_cast<float>(end.stiffness);
+        d.nodes.groups[i / 4].edges[l] += g.stiffness[l];
       }
     }
     s.first.push_back(static_cast<int>(s.groups.size()));

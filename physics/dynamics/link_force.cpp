@@ -193,10 +193,12 @@ void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundT
   const Lanes spin0 = dot(m.end0.spinAxis, s0.angularVelocity) - dot(m.end0.lever, nRate);
   const Lanes spin1 = dot(m.end1.spinAxis, s1.angularVelocity) - dot(m.end1.lever, nRate);
 
-  const Lanes linear = m.length - link.restLength;
-  const Lanes hyper = link.restLength * neoHookeanTension(m.length * link.inverseRestLength);
-  const Lanes tension =
-      link.elongation * fma(link.relaxation, lengthRate, fma(link.neoHookean, hyper - linear, linear));
+  Lanes stretched = m.length - link.restLength;
+  if (link.hasBeams) {
+    const Lanes hyper = link.restLength * neoHookeanTension(m.length * link.inverseRestLength);
+    stretched = fma(link.beam, hyper - stretched, stretched);
+  }
+  const Lanes tension = link.elongation * fma(link.relaxation, lengthRate, stretched);
   const Flexion still0 = flexionOf(m.end0), still1 = flexionOf(m.end1);
   const Flexion q0 = damped(still0, flexionRate(m.end0, nRate, s0.angularVelocity, m.n), link.relaxation);
   const Flexion q1 = damped(still1, flexionRate(m.end1, nRate, s1.angularVelocity, m.n), link.relaxation);
@@ -212,7 +214,6 @@ void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundT
   f.twistMoment =
       fma(link.torsion, fma(link.relaxation, spin1 - spin0, m.twist), couplingTorque(link, m, still0, still1));
 
-  thin(link, m.length, lengthRate, f);
   put(s0.arm, f.arm0);
   put(s1.arm, f.arm1);
   put(s0.position, f.origin);
@@ -231,7 +232,8 @@ void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundT
   put(m.end1.spinAxis, f.spinAxis1);
   put(m.end0.lever, f.spinLever0);
   put(m.end1.lever, f.spinLever1);
-  if (link.hasBends) {
+  if (link.hasBeams) {
+    thin(link, m.length, lengthRate, f);
     put(m.end0.t, f.t0);
     put(m.end1.t, f.t1);
     setBend(link, f);
@@ -260,7 +262,7 @@ void returnLinkForces(WorldData& d) {
   for (const int g : d.awake.linkGroups) {
     const LinkFrame& f = d.links.frames[g];
     const LinkGroup& link = d.links.groups[g];
-    AnchorLoads loads = gatherLoads(&d.links.loads[4 * g], link.hasBends);
+    AnchorLoads loads = gatherLoads(&d.links.loads[4 * g], link.hasBeams);
     loads.twist = loads.twist + f.twistMoment;
     const EndLoads nodes = endLoads(link, f, loads);
     const Lanes3 force1 = f.force1 - nodes.force1;
@@ -285,7 +287,7 @@ static double energyOf(const LinkGroup& link, const LinkMeasures& m, const Flexi
   const double rest = link.restLength[lane], length = m.length[lane], linear = 0.5 * (length - rest) * (length - rest);
   return 0.5 * twice[lane] + foldEnergy(m.end0, q0, link.flexionU0 + link.flexionV0, lane) +
          foldEnergy(m.end1, q1, link.flexionU1 + link.flexionV1, lane) +
-         link.elongation[lane] * (link.neoHookean[lane] > 0 ? rest * rest * neoHookeanEnergy(length / rest) : linear);
+         link.elongation[lane] * (link.beam[lane] > 0 ? rest * rest * neoHookeanEnergy(length / rest) : linear);
 }
 
 double linkEnergy(const WorldData& d) {

@@ -7,10 +7,10 @@ namespace medulla {
 
 // Slopes of the ends and the bow between them: t0, t1, n, U, V and the line are set.
 MEDULLA_INLINE void setBend(const LinkGroup& g, LinkFrame& f) {
-  f.slopeU = g.bends * dot(f.t0, f.axisU);
-  f.slopeV = g.bends * dot(f.t0, f.axisV);
-  f.slopeUAlong = g.bends * dot(f.t1, f.axisU) - f.slopeU;
-  f.slopeVAlong = g.bends * dot(f.t1, f.axisV) - f.slopeV;
+  f.slopeU = g.beam * dot(f.t0, f.axisU);
+  f.slopeV = g.beam * dot(f.t0, f.axisV);
+  f.slopeUAlong = g.beam * dot(f.t1, f.axisU) - f.slopeU;
+  f.slopeVAlong = g.beam * dot(f.t1, f.axisV) - f.slopeV;
   const Lanes length = dot(f.n, f.line);
   put((splat(0) - length) * fma(f.slopeUAlong, f.axisU, f.slopeVAlong * f.axisV), f.bow);
 }
@@ -21,10 +21,10 @@ MEDULLA_INLINE void setBendRates(const LinkGroup& g, const Lanes3& omega0, const
                                  LinkFrame& f) {
   const Lanes3 frame = fma(f.spin0, f.n, f.turning);
   const Lanes3 rate0 = cross(omega0 - frame, f.t0), rate1 = cross(omega1 - frame, f.t1);
-  f.slopeURate = g.bends * dot(f.axisU, rate0);
-  f.slopeVRate = g.bends * dot(f.axisV, rate0);
-  f.slopeUAlongRate = g.bends * dot(f.axisU, rate1) - f.slopeURate;
-  f.slopeVAlongRate = g.bends * dot(f.axisV, rate1) - f.slopeVRate;
+  f.slopeURate = g.beam * dot(f.axisU, rate0);
+  f.slopeVRate = g.beam * dot(f.axisV, rate0);
+  f.slopeUAlongRate = g.beam * dot(f.axisU, rate1) - f.slopeURate;
+  f.slopeVAlongRate = g.beam * dot(f.axisV, rate1) - f.slopeVRate;
   const Lanes length = dot(f.n, f.line);
   const Lanes3 bowing = (splat(0) - length) * fma(f.slopeUAlongRate, f.axisU, f.slopeVAlongRate * f.axisV);
   put(bowing + fma(lengthRate * f.inverseLength, f.bow, cross(frame, f.bow)), f.bowVelocity);
@@ -38,16 +38,16 @@ struct EndLoads {
 // velocities. Arms from the spheres' frames to the ends are the caller's.
 MEDULLA_INLINE EndLoads endLoads(const LinkGroup& g, const LinkFrame& f, const AnchorLoads& loads) {
   Lanes3 moment = loads.moment, lean0{splat(0), splat(0), splat(0)}, lean1 = lean0;
-  Lanes stretching = f.thicknessSlope * loads.thickness;
-  if (g.hasBends) {
+  Lanes stretching = splat(0);
+  if (g.hasBeams) {
     const Lanes length = dot(f.n, f.line);
     const Lanes bowU = length * dot(loads.bow, f.axisU), bowV = length * dot(loads.bow, f.axisV);
     const Lanes u0 = bowU - (loads.slopeU - loads.slopeUAlong), v0 = bowV - (loads.slopeV - loads.slopeVAlong);
     const Lanes u1 = splat(0) - bowU - loads.slopeUAlong, v1 = splat(0) - bowV - loads.slopeVAlong;
-    lean0 = g.bends * cross(f.t0, fma(u0, f.axisU, v0 * f.axisV));
-    lean1 = g.bends * cross(f.t1, fma(u1, f.axisU, v1 * f.axisV));
+    lean0 = g.beam * cross(f.t0, fma(u0, f.axisU, v0 * f.axisV));
+    lean1 = g.beam * cross(f.t1, fma(u1, f.axisU, v1 * f.axisV));
     moment = moment + cross(f.bow, loads.bow) - lean0 - lean1;
-    stretching = fma(f.inverseLength, dot(loads.bow, f.bow), stretching);
+    stretching = fma(f.inverseLength, dot(loads.bow, f.bow), f.thicknessSlope * loads.thickness);
   }
   const Lanes spin0 = dot(f.n, moment) - loads.twist, spin1 = loads.twist;
   const Lanes3 byDirection = cross(moment, f.n) - spin0 * f.spinLever0 - spin1 * f.spinLever1;

@@ -79,8 +79,8 @@ void elongationLaw(const LinkGroup& g, Lanes length, Lanes& slope, Lanes& tensio
   const Lanes hyperSlope = third * fma(splat(2), inverse2 * inverse, one);
   const Lanes hyper = g.restLength * fma(hyperSlope, stretch - x, third * (x - inverse2));
   const Lanes linear = length - g.restLength;
-  slope = g.elongation * fma(g.neoHookean, hyperSlope - one, one);
-  tension = g.elongation * fma(g.neoHookean, hyper - linear, linear);
+  slope = g.elongation * fma(g.beam, hyperSlope - one, one);
+  tension = g.elongation * fma(g.beam, hyper - linear, linear);
 }
 
 Matrix9 groupStiffness(const LinkGroup& g, const LinkFrame& f, const Spheres& s, double duration) {

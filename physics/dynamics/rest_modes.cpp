@@ -58,8 +58,8 @@ class RestModel {
       : model_(*body.model),
         mechanics_(mechanics),
         rows_(measureRows(*body.model, mechanics)),
-        bends_(body.links == LinkModel::beam),
-        thinning_(bends_ ? body.tissue.poisson : 0),
+        isBeam_(body.links == LinkModel::beam),
+        thinning_(isBeam_ ? body.tissue.poisson : 0),
         spheres_(static_cast<int>(mechanics.sphereMass.size())),
         nodes_(body.surface != SurfaceMode::skin ? static_cast<int>(mechanics.attachments.size()) : 0) {
     for (const Matrix3d& i : mechanics.sphereInertia) inverseInertia_.push_back(i.inverse());
@@ -191,7 +191,7 @@ class RestModel {
             span.end0 - model_.spheres[l.sphere0].restFrame,
             span.end1 - model_.spheres[l.sphere1].restFrame,
             a.restOffset,
-            0.5 * a.along * (1 - a.along) * (bends_ ? length : 0)};
+            0.5 * a.along * (1 - a.along) * (isBeam_ ? length : 0)};
   }
 
   // Where freedoms' rates x carry the anchor of node i.
@@ -202,7 +202,7 @@ class RestModel {
     const Vector3d w0 = x.segment<3>(p.s0 + 3), w1 = x.segment<3>(p.s1 + 3);
     const Vector3d v0 = x.segment<3>(p.s0) + w0.cross(p.arm0), dv = x.segment<3>(p.s1) + w1.cross(p.arm1) - v0;
     const double spin = p.n.dot((1 - p.twistShare) * w0 + p.twistShare * w1);
-    const Vector3d leaning = bends_ ? Vector3d((1 - p.along) * w0 + p.along * w1) : p.n.cross(dv) / p.length;
+    const Vector3d leaning = isBeam_ ? Vector3d((1 - p.along) * w0 + p.along * w1) : p.n.cross(dv) / p.length;
     const Vector3d omega = leaning + (spin - p.n.dot(leaning)) * p.n;
     return v0 + p.along * dv + p.bump * (w0 - w1).cross(p.n) + omega.cross(p.offset) -
            p.thinning * p.n.dot(dv) * p.offset;
@@ -219,11 +219,11 @@ class RestModel {
     const LinkAnchor p = linkAnchor(i);
     const Vector3d moment = p.offset.cross(f);
     const Vector3d about = p.n.dot(moment) * p.n, lean = moment - about;
-    const Vector3d swing = (bends_ ? Vector3d(Vector3d::Zero()) : Vector3d(moment.cross(p.n) / p.length)) -
+    const Vector3d swing = (isBeam_ ? Vector3d(Vector3d::Zero()) : Vector3d(moment.cross(p.n) / p.length)) -
                            p.thinning * p.offset.dot(f) * p.n;
     const Vector3d f0 = (1 - p.along) * f - swing, f1 = p.along * f + swing;
     const Vector3d bow = p.bump * p.n.cross(f);
-    const double leaning = bends_ ? 1 : 0;
+    const double leaning = isBeam_ ? 1 : 0;
     y.segment<3>(p.s0) += f0;
     y.segment<3>(p.s1) += f1;
     y.segment<3>(p.s0 + 3) += (1 - p.twistShare) * about + leaning * (1 - p.along) * lean + bow + p.arm0.cross(f0);
@@ -255,7 +255,7 @@ class RestModel {
   const BodyMechanics& mechanics_;
   std::vector<MeasureRow> rows_;
   std::vector<Matrix3d> inverseInertia_;
-  bool bends_;
+  bool isBeam_;
   double thinning_;  // relative, of what hangs on a link, per relative stretch
   int spheres_, nodes_;
 };

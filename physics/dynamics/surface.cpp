@@ -29,11 +29,11 @@ MEDULLA_INLINE void pullNodes(Nodes& n, Lanes relaxation, const NodeGroup& group
 template <class Visit>
 MEDULLA_INLINE void visitLink(const WorldData& d, int link, const Visit& visit) {
   LinkHost host = linkHost(d, link);
-  if (host.bends) {
-    host.bends = true;
+  if (host.isBeam) {
+    host.isBeam = true;
     visit(host);
   } else {
-    host.bends = false;
+    host.isBeam = false;
     visit(host);
   }
 }
@@ -75,10 +75,8 @@ struct NodeForces {
 // turn nothing, dampers act at the node, and so do the areas, which turn with the host; edges act at the anchors.
 MEDULLA_INLINE NodeForces finishForces(WorldData& d, Lanes pressure, int g) {
   Nodes& n = d.nodes;
-  Lanes sum[4];
-  pullOfEdges(d.springs, n.displaced.data(), g, sum);
-  transpose(sum[0], sum[1], sum[2], sum[3]);
-  const Lanes3 edges{sum[0], sum[1], sum[2]}, displaced = gatherFour(n.displaced, 4 * g);
+  const Lanes3 displaced = gatherFour(n.displaced, 4 * g);
+  const Lanes3 edges = pullOfEdges(d.springs, n.displaced.data(), displaced, n.groups[g].edges, g);
   NodeForces out;
   out.force = fnma(pressure, n.area[g], n.force[g] + edges);
   out.turn = cross(n.offset[g] + displaced, out.force) - cross(displaced, edges);

@@ -20,8 +20,9 @@ void setFrameRates(const LinkGroup& g, const Motion& motion, LinkFrame& f) {
   f.turning = cross(f.n, nRate);
   f.spin0 = dot(f.spinAxis0, omega0) - dot(f.spinLever0, nRate);
   f.spinAlong = dot(f.spinAxis1, omega1) - dot(f.spinLever1, nRate) - f.spin0;
+  if (!g.hasBeams) return;
   f.thicknessRate = f.thicknessSlope * lengthRate;
-  if (g.hasBends) setBendRates(g, omega0, omega1, lengthRate, f);
+  setBendRates(g, omega0, omega1, lengthRate, f);
 }
 
 void addTo(Quad& q, Lanes a) {
@@ -32,7 +33,7 @@ void returnFromLinks(WorldData& d, Motion& motion) {
   for (std::size_t k = 0; k < d.links.groups.size(); ++k) {
     const LinkFrame& f = d.links.frames[k];
     const LinkGroup& g = d.links.groups[k];
-    EndLoads e = endLoads(g, f, gatherLoads(&d.links.loads[4 * k], g.hasBends));
+    EndLoads e = endLoads(g, f, gatherLoads(&d.links.loads[4 * k], g.hasBeams));
     e.torque0 = e.torque0 + cross(f.arm0, e.force0);
     e.torque1 = e.torque1 + cross(f.arm1, e.force1);
     Quad q[4][4];

@@ -66,10 +66,9 @@ struct LinkGroup {  // constants of four links
   Lanes flexionU0, flexionV0;           // N m/rad about U, about V, at the end on sphere 0
   Lanes flexionU1, flexionV1;           // on sphere 1
   Lanes couple, coupleDifference;       // N m/rad between the ends: mean over U and V, and half of V less U
-  Lanes neoHookean;                     // 1, or 0: elongation is linear
-  Lanes bends;                          // 1, or 0: what hangs on the link follows its chord
-  bool hasBends;                        // some link of the four does
-  Lanes thinning;                       // twice the Poisson's ratio that what hangs on the link follows; 0: none
+  Lanes beam;                           // 1, or 0: a spring, linear along, whose nodes keep to its chord
+  bool hasBeams;                        // some link of the four is one
+  Lanes thinning;                       // twice the Poisson\'s ratio that what hangs on a beam follows
   Lanes relaxation;                     // s, damping over stiffness (Rayleigh's beta)
 };
 
@@ -96,9 +95,10 @@ struct LinkFrame {
   Lanes thicknessRate;     // 1/s, of its logarithm
   Lanes thicknessSlope;    // 1/m, of its logarithm per length
   Lanes3 spinAxis0, spinAxis1, spinLever0, spinLever1;  // spin_i = spinAxis_i . omega_i - spinLever_i . n'
-  Lanes3 t0, t1;                                        // unit: the rest centre line as the two spheres carry it
-  Lanes3 bow, bowVelocity;                              // m, m/s: length (t0 - t1) across the chord; 0 where bends is
-  Lanes slopeU, slopeV, slopeUAlong, slopeVAlong;       // t0 on U and V, and t1's less it; 0 where bends is
+  // Of beams, and 0 of springs beside them.
+  Lanes3 t0, t1;                                   // unit: the rest centre line as the two spheres carry it
+  Lanes3 bow, bowVelocity;                         // m, m/s: length (t0 - t1) across the chord
+  Lanes slopeU, slopeV, slopeUAlong, slopeVAlong;  // t0 on U and V, and t1's less it
   Lanes slopeURate, slopeVRate, slopeUAlongRate, slopeVAlongRate;  // 1/s
   Lanes3 force1, torque0, torque1;  // N on sphere 1 (and minus it on sphere 0), N m: elongation and flexion
   Lanes twistMoment;                // N m, of torsion
@@ -130,6 +130,7 @@ struct NodeGroup {    // constants of four nodes
   Lanes3 restOffset;  // m; on a link (0, component on U, component on V), on a sphere in its frame
   Lanes3 restArea;    // m2, outward, in the offset's frame (on a link: along it, on U, on V); 0 on pads
   Lanes stiffness;    // N/m of the attachment; 0 on pads
+  Lanes edges;        // N/m of all edges' springs at the node
 };
 
 struct HostRange {
