@@ -15,13 +15,14 @@ class OwnScene : public testing::Test {
  protected:
   struct Changes {
     std::string golden = "0.32 0.4", look = "liver", young = "5e3";
-    double duration = 0.48;  // s: 12 pictures
-    double cameraTarget = 0;
+    double duration = 0.48;       // s: 12 pictures
+    double cameraTarget = -0.05;  // m, x
   };
   void SetUp() override {
     std::filesystem::create_directories(folder / "own");
     folder.write("own/organ.csv",
-                 "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,0,0,0.06,1,0,0,0,0\n0.4,0,0,0.01,1,0,0,0,0\n");
+                 "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,-0.0525,-0.0385,0.05,1,0,0,0,0\n0.4,-0.0525,-0.0385,0.019,1,"
+                 "0,0,0,0\n");
     write({});
   }
   void write(const Changes& c) const {
@@ -29,7 +30,7 @@ class OwnScene : public testing::Test {
                  fmt::format(R"(<scene name="organ"><clock duration="{}"/><dynamics gravity="0 0 0"/>
 <tissue name="t" young="{}"/>
 <body name="organ" tissue="t" look="{}" model="{}/assets/gallbladder/gallbladder.model.xml"><fix spheres="1"/></body>
-<tool name="probe" trajectory="organ.csv"/><camera position="0 0 0.15" target="{} 0 0"/>
+<tool name="probe" trajectory="organ.csv"/><camera position="-0.05 -0.045 0.15" target="{} -0.045 0.02"/>
 <output size="320 240" fps="25" golden="{}"/></scene>)",
                              c.duration, c.young, c.look, MEDULLA_SOURCE_DIR, c.cameraTarget, c.golden));
   }

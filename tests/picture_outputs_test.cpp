@@ -51,32 +51,32 @@ TEST_F(Outputs, BytesDependOnNeitherRunNorThreadsNorContext) {
 }
 
 TEST_F(Outputs, AKilledRunIsResumedToTheSameBytes) {
-  write({.golden = "0", .duration = 4});
+  write({.golden = "0", .duration = 2});
   const std::vector<std::string> small{"--size", "64x48", "-o", "frames", "--resume"};
-  const fs::path collecting = folder / "frames.0-100.part";
+  const fs::path collecting = folder / "frames.0-50.part";
   ProgramOptions killed;
   killed.signal = SIGKILL;
-  killed.interruptWhen = [&] { return fs::exists(collecting / "00010.png"); };
+  killed.interruptWhen = [&] { return fs::exists(collecting / "00006.png"); };
   EXPECT_EQ(render(small, killed).exitCode, 128 + SIGKILL);
   ASSERT_TRUE(fs::exists(collecting / "00005.png"));
   EXPECT_FALSE(fs::exists(folder / "frames/00000.png"));
   // As a power cut would leave them: a name without its bytes, and a file under a temporary name.
-  fs::resize_file(collecting / "00003.png", 100);
-  folder.write("frames.0-100.part/00011.png.partial-1", "x");
+  fs::resize_file(collecting / "00003.png", 50);
+  folder.write("frames.0-50.part/00049.png.partial-1", "x");
   const auto earlier = fs::last_write_time(collecting / "00005.png");
 
   // ^C keeps them, too.
   ProgramOptions interrupted;
-  interrupted.interruptWhen = [&] { return fs::exists(collecting / "00030.png"); };
+  interrupted.interruptWhen = [&] { return fs::exists(collecting / "00020.png"); };
   EXPECT_EQ(render(small, interrupted).exitCode, 130);
   EXPECT_EQ(fs::last_write_time(collecting / "00005.png"), earlier);
 
   expectRefused(render({"--size", "64x48", "-o", "frames", "--resume", "--view", "model"}), "pictures of another run");
   const ProgramResult rest = render(small);
   ASSERT_EQ(rest.exitCode, 0) << rest.err;
-  EXPECT_EQ(rest.out.find("pictures 100\n"), std::string::npos) << rest.out;
+  EXPECT_EQ(rest.out.find("pictures 50\n"), std::string::npos) << rest.out;
   ASSERT_EQ(render({"--size", "64x48", "-o", "whole"}).exitCode, 0);
-  EXPECT_EQ(pictures("frames", 100), pictures("whole", 100));
+  EXPECT_EQ(pictures("frames", 50), pictures("whole", 50));
   EXPECT_EQ(contents().size(), 2u);
 }
 
@@ -151,7 +151,7 @@ TEST_F(Outputs, AFullDiskStopsTheRunAndLeavesNothing) {
   full.fileSizeLimit = 1000;
   for (const char* name : {"a.mp4", "a.webm", "a.gif", "a.webp", "frames", "frames --resume"}) {
     const bool resume = std::string(name).find("resume") != std::string::npos;
-    std::vector<std::string> words{"-o", resume ? "frames" : name};
+    std::vector<std::string> words{"--size", "96x64", "-o", resume ? "frames" : name};
     if (resume) words.push_back("--resume");
     expectRefused(render(words, full), "File too large");
     if (resume) fs::remove_all(folder / "frames.0-12.part");  // the pictures before, for another try
