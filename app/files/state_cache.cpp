@@ -58,7 +58,7 @@ class Taker {
   std::string text(std::size_t size) {
     short_ = short_ || bytes_.size() < size;
     if (short_) return {};
-    const std::string out(bytes_.substr(0, size));
+    std::string out(bytes_.substr(0, size));
     bytes_.remove_prefix(size);
     return out;
   }
