@@ -108,11 +108,10 @@ bool namesMomentOf(const std::string& name, const std::string& scene) {
 std::vector<Moment> momentsOf(const Scene& scene) {
   if (scene.goldenTimes.empty())
     throw std::runtime_error(scene.path + ": names no golden moments: expected <output golden=\"...\"/>");
-  const int pictures = static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9));
   std::vector<Moment> moments;
   for (const double time : scene.goldenTimes) {
     Moment moment;
-    moment.frame = std::min(static_cast<int>(std::lround(time * scene.fps)), pictures - 1);
+    moment.frame = std::min(static_cast<int>(std::lround(time * scene.fps)), pictureCount(scene) - 1);
     moment.name = fmt::format("{}_{}", stemOf(scene.path), moment.frame);
     moments.push_back(std::move(moment));
   }

@@ -3,7 +3,8 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <functional>
+#include <tuple>
+#include <utility>
 
 #include "app/commands/commands.h"
 #include "app/files/content_hash.h"
