@@ -2,15 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <functional>
 #include <memory>
 
 #include "app/commands/commands.h"
 #include "app/files/number_text.h"
+#include "app/files/output_file.h"
 #include "app/interrupt.h"
+#include "app/verbs.h"
+#include "render/video_writer.h"
 
 namespace medulla {
 
@@ -31,12 +33,6 @@ constexpr const char* kExitCodes =
     "Exit codes: 0 done, 1 input or run failed, 2 wrong usage, 3 mismatch, 4 not at rest in\n"
     "time, 130 interrupted.";
 
-// A verb with what it does once its words are parsed: options that contradict each other are usage errors, too.
-struct Verb {
-  CLI::App* command;
-  std::function<int()> run;
-};
-
 std::optional<std::pair<int, int>> splitPair(const std::string& text, char separator) {
   const std::size_t at = text.find(separator);
   if (at == std::string::npos) return std::nullopt;
@@ -45,19 +41,7 @@ std::optional<std::pair<int, int>> splitPair(const std::string& text, char separ
   return std::make_pair(*a, *b);
 }
 
-[[noreturn]] void usageError(const std::string& option, const std::string& value, const std::string& expected) {
-  throw CLI::ValidationError(option + " " + value, "expected " + expected);
-}
-
-// Options as typed; turned into RunOptions after parsing.
-struct RunArguments {
-  std::string scene, log, logRate = "frame";
-  std::vector<std::string> sets, trajectories;
-  std::vector<std::vector<std::string>> surfaces;
-};
-
-void addSceneOptions(CLI::App& command, RunArguments& a) {
-  command.add_option("SCENE", a.scene, "scene file (XML)")->required();
+void addOverrides(CLI::App& command, RunArguments& a) {
   command
       .add_option("--set", a.sets, "replace one value of the scene, e.g. body.gallbladder.surface=skin (repeatable)")
       ->type_name("PATH=VALUE")
@@ -68,7 +52,6 @@ void addSceneOptions(CLI::App& command, RunArguments& a) {
 }
 
 void addRunOptions(CLI::App& command, RunArguments& a) {
-  addSceneOptions(command, a);
   command.add_option("--log", a.log, "write a CSV row per dynamics frame: tools, forces, volume, energies")
       ->type_name("FILE");
   command.add_option("--log-rate", a.logRate, "rows of the log: per dynamics frame or per servo tick")
@@ -79,6 +62,17 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
       ->type_name("T FILE.obj")
       ->type_size(2)
       ->allow_extra_args(false);
+}
+
+}  // namespace
+
+void usageError(const std::string& option, const std::string& value, const std::string& expected) {
+  throw CLI::ValidationError(option + " " + value, "expected " + expected);
+}
+
+void addSceneOptions(CLI::App& command, RunArguments& a) {
+  command.add_option("SCENE", a.scene, "scene file (XML)")->required();
+  addOverrides(command, a);
 }
 
 RunOptions runOptions(const RunArguments& a) {
@@ -110,25 +104,28 @@ RunOptions runOptions(const RunArguments& a) {
   return options;
 }
 
+namespace {
+
 struct RenderArguments {
   RunArguments run;
-  std::vector<std::string> outputs;
-  std::string view = "tissue", size, fps, frames, context = "auto";
+  std::vector<std::string> scenes, outputs;
+  std::string view = "tissue", size, fps, frames, still, quality, cache, context = "auto";
   std::vector<std::string> show;
+  bool resume = false, timings = false;
 };
 
-RenderOptions renderOptions(const RenderArguments& a) {
-  RenderOptions options;
-  options.run = runOptions(a.run);
-  options.outputs = a.outputs;
-  if (options.outputs.empty()) options.outputs = {std::filesystem::path(a.run.scene).stem().string() + ".mp4"};
-  options.view.view = a.view == "model" ? ViewKind::model : a.view == "both" ? ViewKind::both : ViewKind::tissue;
-  options.view.showProxy = std::find(a.show.begin(), a.show.end(), "proxy") != a.show.end();
+// "{scene}" in the name of a file stands for the scene's: so several scenes have files of their own.
+std::string fileOf(const std::string& scene, std::string path) {
+  const std::string place = "{scene}", name = std::filesystem::path(scene).stem().string();
+  for (std::size_t at = path.find(place); at != std::string::npos; at = path.find(place, at + name.size()))
+    path.replace(at, place.size(), name);
+  return path;
+}
+
+void readPictures(const RenderArguments& a, RenderOptions& options) {
   if (!a.size.empty()) {
     options.size = splitPair(a.size, 'x');
-    const auto valid = [](int n) { return n >= 16 && n <= 8192 && n % 2 == 0; };
-    if (!options.size || !valid(options.size->first) || !valid(options.size->second))
-      usageError("--size", a.size, "WIDTHxHEIGHT, even numbers from 16 to 8192");
+    if (!options.size) usageError("--size", a.size, "WIDTHxHEIGHT, even numbers from 16 to 8192");
   }
   if (!a.frames.empty()) {
     options.frames = splitPair(a.frames, ':');
@@ -138,42 +135,117 @@ RenderOptions renderOptions(const RenderArguments& a) {
     options.fps = parseNumber<double>(a.fps);
     if (!options.fps || *options.fps < 1 || *options.fps > 240) usageError("--fps", a.fps, "a number from 1 to 240");
   }
+  if (!a.still.empty()) {
+    options.still = parseNumber<double>(a.still);
+    if (!options.still || *options.still < 0) usageError("--still", a.still, "a time in seconds, 0 or more");
+  }
+}
+
+RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) {
+  RenderOptions options;
+  options.run = runOptions(a.run);
+  options.run.scene = scene;
+  options.run.logPath = fileOf(scene, a.run.log);
+  for (SurfaceRequest& surface : options.run.surfaces) surface.path = fileOf(scene, surface.path);
+  options.cachePath = fileOf(scene, a.cache);
+  for (const std::string& output : a.outputs) options.outputs.push_back(fileOf(scene, output));
+  if (options.outputs.empty()) options.outputs = {fileOf(scene, a.still.empty() ? "{scene}.mp4" : "{scene}.png")};
+  options.view.view = a.view == "model" ? ViewKind::model : a.view == "both" ? ViewKind::both : ViewKind::tissue;
+  options.view.showProxy = std::find(a.show.begin(), a.show.end(), "proxy") != a.show.end();
+  readPictures(a, options);
+  const std::string quality = !a.quality.empty() ? a.quality : options.still ? "best" : "standard";
+  options.quality = quality == "draft" ? Quality::draft : quality == "best" ? Quality::best : Quality::standard;
   options.context = a.context;
+  options.resume = a.resume;
+  options.timings = a.timings;
   return options;
 }
 
-Verb addRender(CLI::App& app) {
-  const auto arguments = std::make_shared<RenderArguments>();
-  RenderArguments& a = *arguments;
-  CLI::App* c = app.add_subcommand("render", "run a scene and draw it into a video or numbered PNG files");
-  addRunOptions(*c, a.run);
-  c->add_option("-o,--output", a.outputs,
-                "FILE.mp4, or a folder for PNG files; repeatable (default: SCENE's name + .mp4)")
-      ->type_name("FILE.mp4|DIR")
-      ->allow_extra_args(false);
+// Each scene has files of its own, and a run that takes up another draws nothing twice.
+void checkRender(const RenderArguments& a) {
+  std::vector<std::string> files = a.outputs;
+  for (const std::string& more : {a.run.log, a.cache})
+    if (!more.empty()) files.push_back(more);
+  for (const auto& surface : a.run.surfaces) files.push_back(surface.at(1));
+  for (const std::string& file : files)
+    if (a.scenes.size() > 1 && file.find("{scene}") == std::string::npos)
+      usageError("of several scenes", file, "a name with {scene} in it, which becomes each one's name");
+  if (!a.cache.empty() && (!a.run.log.empty() || !a.run.surfaces.empty()))
+    usageError("--cache", a.cache, "no --log and no --surface-at: nothing is simulated");
+  if (!a.resume) return;
+  if (a.outputs.empty() || !a.still.empty()) usageError("--resume", "", "-o DIR: folders of PNG files can be resumed");
+  for (const std::string& output : a.outputs)
+    if (isVideoName(output)) usageError("--resume", output, "a folder: videos are made in one go");
+}
+
+int runRenders(const RenderArguments& a) {
+  checkRender(a);
+  std::vector<RenderOptions> all;
+  for (const std::string& scene : a.scenes) all.push_back(renderOptions(a, scene));
+  std::vector<std::string> files;
+  for (const RenderOptions& options : all) files.insert(files.end(), options.outputs.begin(), options.outputs.end());
+  if (all.size() > 1) requireDistinctFiles(files, a.scenes);
+  for (const RenderOptions& options : all) {
+    runRender(options);
+    std::fflush(stdout);
+  }
+  return 0;
+}
+
+void addPictureOptions(CLI::App* c, RenderArguments& a) {
   c->add_option("--view", a.view, "skin; or spheres, links and attachments; or both")
       ->check(CLI::IsMember({"tissue", "model", "both"}))
       ->capture_default_str();
   c->add_option("--show", a.show, "draw also: proxy (proxy sphere, device and the spring between them)")
       ->check(CLI::IsMember({"proxy"}))
       ->allow_extra_args(false);
-  c->add_option("--size", a.size, "picture size in pixels (default: the scene's)")->type_name("WxH");
+  c->add_option("--size", a.size, "picture size in pixels, even numbers from 16 to 8192 (default: the scene's)")
+      ->type_name("WxH");
+  c->add_option(
+       "--quality", a.quality,
+       "draft: no shadows, jagged edges; standard; best: four times the pixels, averaged [standard; of a still "
+       "best]")
+      ->check(CLI::IsMember({"draft", "standard", "best"}));
   c->add_option("--fps", a.fps, "pictures per second, 1 to 240 (default: the scene's)");
-  c->add_option("--frames", a.frames, "only pictures A to B-1, counted from 0")->type_name("A:B");
+  CLI::Option* frames = c->add_option("--frames", a.frames, "only pictures A to B-1, counted from 0")->type_name("A:B");
+  c->add_option("--still", a.still, "one picture at time T (s) into FILE.png")->type_name("T")->excludes(frames);
+  c->add_option("--cache", a.cache, "draw the states that replay --cache wrote instead of simulating")
+      ->type_name("FILE");
   c->add_option("--context", a.context, "how to draw off screen")
       ->check(CLI::IsMember({"auto", "osmesa", "egl"}))
       ->capture_default_str();
-  return {c, [arguments] { return runRender(renderOptions(*arguments)); }};
+}
+
+Verb addRender(CLI::App& app) {
+  const auto arguments = std::make_shared<RenderArguments>();
+  RenderArguments& a = *arguments;
+  CLI::App* c = app.add_subcommand("render", "run scenes and draw them into videos or numbered PNG files");
+  c->add_option("SCENE", a.scenes, "scene files (XML)")->required();
+  addOverrides(*c, a.run);
+  addRunOptions(*c, a.run);
+  c->add_option("-o,--output", a.outputs,
+                "FILE.mp4, .webm, .gif or .webp, or a folder for PNG files; {scene} in it is the scene's name; "
+                "repeatable (default: {scene}.mp4)")
+      ->type_name("FILE|DIR")
+      ->allow_extra_args(false);
+  addPictureOptions(c, a);
+  c->add_flag("--resume", a.resume,
+              "take over the PNG files that an ended run of the same pictures left, and leave one's own");
+  c->add_flag("--timings", a.timings, "tell at the end what took how long, on standard error");
+  return {c, [arguments] { return runRenders(*arguments); }};
 }
 
 Verb addReplay(CLI::App& app) {
   struct Arguments {
     RunArguments run;
+    std::string cache;
     bool untilRest = false;
   };
   const auto a = std::make_shared<Arguments>();
   CLI::App* c = app.add_subcommand("replay", "run a scene without pictures, as fast as it goes, and print its results");
+  addSceneOptions(*c, a->run);
   addRunOptions(*c, a->run);
+  c->add_option("--cache", a->cache, "write what every picture shows, for medulla render --cache")->type_name("FILE");
   c->add_flag(
       "--until-rest", a->untilRest,
       "end when every surface node is slower than 1e-5 m/s and no load is still growing; exit code 4 where that "
@@ -181,6 +253,7 @@ Verb addReplay(CLI::App& app) {
   return {c, [a] {
             RunOptions options = runOptions(a->run);
             options.untilRest = a->untilRest;
+            options.cachePath = a->cache;
             return runReplay(options);
           }};
 }
@@ -288,11 +361,16 @@ Verb addGolden(CLI::App& app) {
   const auto options = std::make_shared<GoldenOptions>();
   GoldenOptions& o = *options;
   CLI::App* c = app.add_subcommand("golden", "render the scenes' golden moments and compare with the stored images");
-  c->add_option("SCENE", o.scenes, "scene files (default: scenes/*.xml)");
-  c->add_flag("--update", o.update, "store what is drawn now as the new golden images");
-  c->add_option("--images", o.images, "folder of the golden images (default: golden_images beside the scene's folder)")
+  c->add_option("SCENE", o.scenes, "scene files (default: those that the images in --dir name, or scenes/*.xml)");
+  c->add_option("--dir", o.folder, "folder of the golden images (default: golden_images beside the scene's folder)")
       ->type_name("DIR");
-  c->add_option("--failures", o.failures, "where pictures that differ go")->type_name("DIR")->capture_default_str();
+  c->add_option("--update", o.update,
+                "store what is drawn now: of a scene, by file or name, or of one moment, such as liver_45 (repeatable)")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  c->add_option("--failures", o.failures, "where report.html and the pictures that fail go")
+      ->type_name("DIR")
+      ->capture_default_str();
   c->add_option("--context", o.context, "how to draw off screen")
       ->check(CLI::IsMember({"auto", "osmesa", "egl"}))
       ->capture_default_str();
@@ -315,108 +393,15 @@ CompareOptions compareOptions(const CompareArguments& a) {
 Verb addCompare(CLI::App& app) {
   const auto arguments = std::make_shared<CompareArguments>();
   CompareArguments& a = *arguments;
-  CLI::App* c = app.add_subcommand("compare", "say where two logs differ first; exit code 3 where they do");
-  c->add_option("A", a.options.a, "log of a run (CSV)")->required();
+  CLI::App* c =
+      app.add_subcommand("compare", "say where two logs or two state caches differ first; exit code 3 where they do");
+  c->add_option("A", a.options.a, "log (CSV) or state cache of a run")->required();
   c->add_option("B", a.options.b, "another")->required();
   c->add_option("--tolerance", a.tolerance,
                 "differences that do not count, as a share of the column's largest value; 0: every field is the same "
                 "text")
       ->capture_default_str();
   return {c, [arguments] { return runCompare(compareOptions(*arguments)); }};
-}
-
-struct ChartArguments {
-  RunArguments run;
-  ChartOptions options;
-  std::vector<std::string> steps = {"0.1", "0.2", "0.5", "1", "2", "5", "10", "20"};
-};
-
-std::vector<double> numbersOf(const std::string& option, const std::vector<std::string>& words, double low, double high,
-                              double unit, const std::string& expected) {
-  std::vector<double> out;
-  for (const std::string& word : words) {
-    const auto value = parseNumber<double>(word);
-    if (!value || *value < low || *value > high) usageError(option, word, expected);
-    out.push_back(unit * *value);
-  }
-  return out;
-}
-
-std::vector<double> stepsOf(const std::string& option, const std::vector<std::string>& words) {
-  return numbersOf(option, words, 1e-3, 50, 1e-3, "milliseconds from 0.001 to 50");
-}
-
-ChartOptions chartOptions(const ChartArguments& a) {
-  ChartOptions options = a.options;
-  options.run = runOptions(a.run);
-  options.steps = stepsOf("--steps", a.steps);
-  return options;
-}
-
-Verb addChart(CLI::App& app) {
-  const auto arguments = std::make_shared<ChartArguments>();
-  ChartArguments& a = *arguments;
-  CLI::App* c =
-      app.add_subcommand("chart", "run a scene by several methods and steps, and draw their time against their error");
-  addSceneOptions(*c, a.run);
-  c->add_option(
-       "-o,--output", a.options.folder,
-       "folder for chart.csv, .gnuplot and .svg, and of several --models spheres.csv, .gnuplot and .svg; made where "
-       "missing")
-      ->type_name("DIR")
-      ->required();
-  c->add_option("--steps", a.steps, "substeps to run with, ms; the nearest whole shares of a dynamics frame are taken")
-      ->type_name("MS,MS,...")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->capture_default_str();
-  a.options.methods = chartMethodNames();
-  c->add_option("--methods", a.options.methods,
-                "curves; the first method's finest run is the reference where no body names one")
-      ->check(CLI::IsMember(chartMethodNames()))
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->capture_default_str();
-  c->add_option("--models", a.options.models,
-                "models of the same mesh with other numbers of spheres, for curves of their own (repeatable)")
-      ->type_name("[BODY=]FILE")
-      ->allow_extra_args(false);
-  return {c, [arguments] { return runChart(chartOptions(*arguments)); }};
-}
-
-struct StabilityArguments {
-  RunArguments run;
-  StabilityOptions options;
-  std::vector<std::string> steps = {"0.1", "0.5", "2", "10", "50"}, trialSteps = {"1", "10", "50"},
-                           young = {"1e2", "1e3", "1e4", "1e5", "1e6", "1e7", "1e8", "1e9"};
-};
-
-StabilityOptions stabilityOptions(const StabilityArguments& a) {
-  StabilityOptions options = a.options;
-  options.run = runOptions(a.run);
-  options.steps = stepsOf("--steps", a.steps);
-  options.trialSteps = stepsOf("--trial-steps", a.trialSteps);
-  options.young = numbersOf("--young", a.young, 1e-3, 1e12, 1, "Pa from 0.001 to 1e12");
-  return options;
-}
-
-Verb addStability(CLI::App& app) {
-  const auto arguments = std::make_shared<StabilityArguments>();
-  StabilityArguments& a = *arguments;
-  CLI::App* c =
-      app.add_subcommand("stability", "torture a scene's first body by every method and step, and draw what survives");
-  addSceneOptions(*c, a.run);
-  c->add_option("-o,--output", a.options.folder,
-                "folder for map.csv, trials.csv, stability.gnuplot and stability.svg; made where missing")
-      ->type_name("DIR")
-      ->required();
-  const auto addList = [&](const char* name, std::vector<std::string>& values, const char* help, const char* type) {
-    c->add_option(name, values, help)->type_name(type)->delimiter(',')->allow_extra_args(false)->capture_default_str();
-  };
-  addList("--steps", a.steps, "steps of the map, ms", "MS,MS,...");
-  addList("--young", a.young, "stiffnesses of the map, Pa", "PA,PA,...");
-  addList("--trial-steps", a.trialSteps, "steps of the trials, ms", "MS,MS,...");
-  return {c, [arguments] { return runStability(stabilityOptions(*arguments)); }};
 }
 
 int dispatch(int argc, char** argv) {
@@ -454,7 +439,7 @@ int runCommandLine(int argc, char** argv) {
     if (std::fflush(stdout) != 0) throw std::runtime_error("standard output cannot be written");
     return code;
   } catch (const Interrupted&) {
-    std::fputs("medulla: interrupted, nothing unfinished was kept\n", stderr);
+    std::fputs("medulla: interrupted, nothing unfinished has its final name\n", stderr);
     return 130;
   } catch (const NotAtRest& error) {
     std::fprintf(stderr, "medulla: %s\n", error.what());

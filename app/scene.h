@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -98,6 +99,9 @@ struct Scene {
   int width = 1280, height = 720;                // 16 to 8192, even
   double fps = 30;                               // 1 to 240
   std::vector<double> goldenTimes;               // s, strictly increasing, within 0 to duration
+  // Of what the file and its overrides say, however it is laid out; files that they name are not looked into.
+  std::uint64_t contentHash = 0;  // of everything
+  std::uint64_t motionHash = 0;   // without camera, light, output and looks: the same motion, however it is drawn
 };
 
 // `--set PATH=VALUE`: replaces one attribute before the scene is interpreted, e.g. body.gallbladder.surface=skin,

@@ -10,16 +10,42 @@
 
 namespace medulla {
 
-std::unique_ptr<GlContext> makeGlContext(const std::string& name) {
+namespace {
+
+struct ContextKind {
+  const char* name;
+  const char* package;
+  std::unique_ptr<GlContext> (*make)();  // nullptr: not built in
+};
+constexpr ContextKind kKinds[] = {
 #ifdef MEDULLA_HAVE_OSMESA
-  if (name == "auto" || name == "osmesa") return makeOsmesaContext();
+    {"osmesa", "libosmesa6-dev", makeOsmesaContext},
+#else
+    {"osmesa", "libosmesa6-dev", nullptr},
 #endif
 #ifdef MEDULLA_HAVE_EGL
-  if (name == "auto" || name == "egl") return makeEglContext();
+    {"egl", "libegl-dev", makeEglContext},
+#else
+    {"egl", "libegl-dev", nullptr},
 #endif
-  if (name == "osmesa") throw std::runtime_error("context osmesa is not built in: install libosmesa6-dev and rebuild");
-  if (name == "egl") throw std::runtime_error("context egl is not built in: install libegl-dev and rebuild");
-  throw std::runtime_error("unknown context '" + name + "', expected auto, osmesa or egl");
+};
+
+}  // namespace
+
+std::unique_ptr<GlContext> makeGlContext(const std::string& name) {
+  std::string reasons;
+  for (const ContextKind& kind : kKinds) {
+    if (name != "auto" && name != kind.name) continue;
+    std::string reason = std::string("not built in: install ") + kind.package + " and rebuild";
+    try {
+      if (kind.make) return kind.make();
+    } catch (const std::runtime_error& error) {
+      reason = error.what();
+    }
+    reasons += (reasons.empty() ? "" : "; ") + std::string(kind.name) + ": " + reason;
+  }
+  if (reasons.empty()) throw std::runtime_error("unknown context '" + name + "', expected auto, osmesa or egl");
+  throw std::runtime_error("no OpenGL context to draw with: " + reasons);
 }
 
 void spreadRasterThreads() {

@@ -13,8 +13,8 @@ class GlContext {
   virtual void makeCurrent() = 0;  // throws std::runtime_error
 };
 
-// `name`: auto (OSMesa where built in, else EGL), osmesa, egl. Throws std::runtime_error when the context is unknown,
-// not built in, or cannot start.
+// `name`: auto (OSMesa, or EGL where that is not built in or cannot start), osmesa, egl. Throws std::runtime_error in
+// one line that says of each why not.
 std::unique_ptr<GlContext> makeGlContext(const std::string& name);
 
 // Mesa's software rasteriser runs one worker per core, and the kernel often stacks two of them on one core for seconds,

@@ -71,7 +71,25 @@ std::vector<std::uint8_t> compressedRows(const Image& image) {
   return out;
 }
 
+std::vector<PngText> readTexts(const std::vector<std::uint8_t>& file) {
+  std::vector<PngText> texts;
+  for (std::size_t at = sizeof kSignature; at + 12 <= file.size();) {
+    const std::size_t size = bigEndian(&file[at]);
+    if (size > file.size() - at - 12) break;
+    if (std::memcmp(&file[at + 4], "tEXt", 4) == 0) {
+      const std::string data(file.begin() + at + 8, file.begin() + at + 8 + size);
+      const std::size_t split = data.find('\0');
+      if (split != std::string::npos) texts.push_back({data.substr(0, split), data.substr(split + 1)});
+    }
+    at += size + 12;
+  }
+  return texts;
+}
+
+}  // namespace
+
 std::vector<std::uint8_t> encodePng(const Image& image, const std::vector<PngText>& texts) {
+  assert(image.width > 0 && image.height > 0 && image.pixels.size() == 4ul * image.width * image.height);
   std::vector<std::uint8_t> out(kSignature, kSignature + sizeof kSignature), header;
   appendBigEndian(header, image.width);
   appendBigEndian(header, image.height);
@@ -90,25 +108,7 @@ std::vector<std::uint8_t> encodePng(const Image& image, const std::vector<PngTex
   return out;
 }
 
-std::vector<PngText> readTexts(const std::vector<std::uint8_t>& file) {
-  std::vector<PngText> texts;
-  for (std::size_t at = sizeof kSignature; at + 12 <= file.size();) {
-    const std::size_t size = bigEndian(&file[at]);
-    if (size > file.size() - at - 12) break;
-    if (std::memcmp(&file[at + 4], "tEXt", 4) == 0) {
-      const std::string data(file.begin() + at + 8, file.begin() + at + 8 + size);
-      const std::size_t split = data.find('\0');
-      if (split != std::string::npos) texts.push_back({data.substr(0, split), data.substr(split + 1)});
-    }
-    at += size + 12;
-  }
-  return texts;
-}
-
-}  // namespace
-
 void writePng(const std::string& path, const Image& image, const std::vector<PngText>& texts) {
-  assert(image.width > 0 && image.height > 0 && image.pixels.size() == 4ul * image.width * image.height);
   const std::vector<std::uint8_t> bytes = encodePng(image, texts);
   const std::string partial = path + ".partial-" + std::to_string(getpid());
   std::error_code ignored;

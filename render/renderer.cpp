@@ -4,7 +4,10 @@
 #include <GL/gl.h>
 #include <GL/glext.h>
 
+#include <algorithm>
+#include <array>
 #include <cassert>
+#include <cmath>
 #include <stdexcept>
 
 #include "render/gl_context.h"
@@ -36,7 +39,8 @@ struct Framebuffer {
       glFramebufferRenderbuffer(GL_FRAMEBUFFER, point[k], GL_RENDERBUFFER, buffers[k]);
     }
     if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
-      throw std::runtime_error("OpenGL has no framebuffer of " + std::to_string(width) + "x" + std::to_string(height));
+      throw std::runtime_error("OpenGL cannot draw " + std::to_string(width) + "x" + std::to_string(height) +
+                               " pixels, expected a smaller size or a lower quality");
   }
   ~Framebuffer() {
     glDeleteRenderbuffers(2, buffers);
@@ -49,6 +53,42 @@ void checkSettings(const RendererSettings& s) {
   if (bad(s.width) || bad(s.height))
     throw std::runtime_error("picture size " + std::to_string(s.width) + "x" + std::to_string(s.height) +
                              ", expected even numbers from 16 to 8192");
+  assert(s.supersample >= 1 && s.supersample <= 4);
+}
+
+// sRGB, 8 bits, to light in 16 bits, and back.
+struct LightTables {
+  std::array<std::uint16_t, 256> light;
+  std::vector<std::uint8_t> shown = std::vector<std::uint8_t>(1 << 16);
+
+  LightTables() {
+    for (int v = 0; v < 256; ++v) {
+      const double s = v / 255.0, linear = s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
+      light[v] = static_cast<std::uint16_t>(std::lround(65535 * linear));
+    }
+    for (int v = 0, next = 0; v < 256; ++v) {
+      const int until = v < 255 ? (light[v] + light[v + 1] + 1) / 2 : 1 << 16;
+      for (; next < until; ++next) shown[next] = static_cast<std::uint8_t>(v);
+    }
+  }
+};
+
+// Each pixel of `out` becomes the mean of `factor`^2 pixels of `fine`, in light: means of coded values darken edges.
+void reduce(const Image& fine, int factor, const LightTables& tables, Image& out) {
+  const unsigned count = unsigned(factor * factor);
+  for (int y = 0; y < out.height; ++y)
+    for (int x = 0; x < out.width; ++x) {
+      unsigned sum[3] = {count / 2, count / 2, count / 2};
+      for (int row = 0; row < factor; ++row) {
+        const std::uint8_t* p =
+            &fine.pixels[4 * (std::size_t(y * factor + row) * fine.width + std::size_t(x) * factor)];
+        for (int k = 0; k < factor; ++k, p += 4)
+          for (int c = 0; c < 3; ++c) sum[c] += tables.light[p[c]];
+      }
+      std::uint8_t* to = &out.pixels[4 * (std::size_t(y) * out.width + x)];
+      for (int c = 0; c < 3; ++c) to[c] = tables.shown[sum[c] / count];
+      to[3] = 255;
+    }
 }
 
 }  // namespace
@@ -56,11 +96,15 @@ void checkSettings(const RendererSettings& s) {
 struct Renderer::Data {
   RendererSettings settings;
   std::unique_ptr<GlContext> context;
+  int fineWidth, fineHeight;  // px, as drawn; a picture is smaller by `supersample`
   Framebuffer framebuffer;
   TissuePass tissue;
   HazePass background;
   ModelView model;
+  std::optional<PostProcess> finePost;  // of supersampled pictures
   PostProcess post;
+  LightTables tables;
+  Image fine;
 
   SceneMesh mesh;  // surfaces at their place in this picture, then instruments
   SceneMesh rest;  // surfaces at rest, baked
@@ -75,9 +119,12 @@ struct Renderer::Data {
   explicit Data(const RendererSettings& s)
       : settings(s),
         context(makeGlContext(s.context)),
-        framebuffer(s.width, s.height),
+        fineWidth(s.width * s.supersample),
+        fineHeight(s.height * s.supersample),
+        framebuffer(fineWidth, fineHeight),
         post(s.width, s.height),
-        seen(s.height) {
+        seen(fineHeight) {
+    if (s.supersample > 1) finePost.emplace(fineWidth, fineHeight);
     tissue.addLook(findLook("steel"));
     glFinish();
     spreadRasterThreads();
@@ -92,6 +139,7 @@ struct Renderer::Data {
   void lightAndSort(const Picture& picture, const Viewpoint& view);
   void draw(const Picture& picture, const Viewpoint& view);
   void readBack(Image& out) const;
+  void finish(bool round, Image& out);
 };
 
 void Renderer::Data::bake() {
@@ -151,15 +199,15 @@ void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view)
 
 void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.id);
-  glViewport(0, 0, settings.width, settings.height);
+  glViewport(0, 0, fineWidth, fineHeight);
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
   glClearColor(0.02f, 0.01f, 0.01f, 1);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   if (picture.view == ViewKind::model) model.drawBackdrop();
   const auto scaled = [&view](int side) { return int(float(side) * view.overscan); };
-  const int w = scaled(settings.width), h = scaled(settings.height);
-  glViewport((settings.width - w) / 2, (settings.height - h) / 2, w, h);
+  const int w = scaled(fineWidth), h = scaled(fineHeight);
+  glViewport((fineWidth - w) / 2, (fineHeight - h) / 2, w, h);
   if (view.round) tissue.drawMask(view);
   tissue.upload(lit, lists, shadowIfOn());
 
@@ -178,10 +226,10 @@ void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
 }
 
 void Renderer::Data::readBack(Image& out) const {
-  out.width = settings.width;
-  out.height = settings.height;
-  out.pixels.resize(4ul * settings.width * settings.height);
-  glReadPixels(0, 0, settings.width, settings.height, GL_RGBA, GL_UNSIGNED_BYTE, out.pixels.data());
+  out.width = fineWidth;
+  out.height = fineHeight;
+  out.pixels.resize(4ul * fineWidth * fineHeight);
+  glReadPixels(0, 0, fineWidth, fineHeight, GL_RGBA, GL_UNSIGNED_BYTE, out.pixels.data());
   if (const unsigned error = glGetError()) throw std::runtime_error("OpenGL error " + std::to_string(error));
 }
 
@@ -212,22 +260,53 @@ int Renderer::addSurface(SurfaceShape shape) {
   return int(m.parts.size()) - 1;
 }
 
-void Renderer::render(const Picture& picture, Image& out) {
+// Edges are smoothed as drawn; the lens's halo and rim are as wide in a picture whatever its quality.
+void Renderer::Data::finish(bool round, Image& out) {
+  if (settings.supersample > 1) {
+    if (settings.antialias) finePost->smoothEdges(fine);
+    out.width = settings.width;
+    out.height = settings.height;
+    out.pixels.resize(4ul * out.width * out.height);
+    reduce(fine, settings.supersample, tables, out);
+  } else if (settings.antialias) {
+    post.smoothEdges(out);
+  }
+  if (!round) return;
+  post.addGlare(out);
+  post.fadeRim(out);
+}
+
+void Renderer::render(const Picture& picture, Image& out, StageTimes* times) {
+  const auto stage = [times](const char* name) {
+    if (times) times->start(name);
+  };
   Data& d = *data_;
   d.context->makeCurrent();
   const bool round = picture.endoscopeMask && picture.view != ViewKind::model;
   const Viewpoint view = makeViewpoint(picture.camera, float(d.settings.width) / float(d.settings.height), round);
+  stage("bake");
   d.bake();
+  stage("place");
   d.placeSurfaces(picture);
   d.placeInstruments(picture);
+  stage("light");
   d.lightAndSort(picture, view);
+  stage("draw");
   d.draw(picture, view);
-  d.readBack(out);
-  if (d.settings.antialias) d.post.smoothEdges(out);
-  if (round) {
-    d.post.addGlare(out);
-    d.post.fadeRim(out);
-  }
+  d.readBack(d.settings.supersample > 1 ? d.fine : out);
+  stage("finish");
+  d.finish(round, out);
+  if (times) times->stop();
+}
+
+RendererSettings rendererSettings(int width, int height, const std::string& context, Quality quality) {
+  RendererSettings s;
+  s.width = width;
+  s.height = height;
+  s.context = context;
+  s.shadows = s.antialias = quality != Quality::draft;
+  s.supersample = quality == Quality::best ? 2 : 1;
+  return s;
 }
 
 std::string Renderer::description() const {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "render/image.h"
+#include "render/stage_times.h"
 
 // Draws one picture from plain arrays. Knows looks, light and pixels; knows nothing of bodies and physics.
 namespace medulla {
@@ -91,7 +92,12 @@ struct RendererSettings {
   int width = 1280, height = 720;  // 16..8192, even
   std::string context = "auto";    // auto | osmesa | egl
   bool shadows = true, antialias = true;
+  int supersample = 1;  // 1 to 4: every pixel is the mean, in light, of its square
 };
+
+// draft: no shadows, jagged edges. standard. best: four times the pixels, then averaged.
+enum class Quality { draft, standard, best };
+RendererSettings rendererSettings(int width, int height, const std::string& context, Quality quality);
 
 class Renderer {
  public:
@@ -99,7 +105,7 @@ class Renderer {
   ~Renderer();
   Renderer(Renderer&&) noexcept;
   int addSurface(SurfaceShape shape);  // throws std::runtime_error on an unknown look, naming the known ones
-  void render(const Picture& picture, Image& out);
+  void render(const Picture& picture, Image& out, StageTimes* times = nullptr);  // adds to `times`, if given
   std::string description() const;  // GL_RENDERER and GL_VERSION: golden images record it
 
  private:

@@ -3,6 +3,7 @@
 #include <pthread.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cassert>
 #include <cerrno>
 #include <condition_variable>
@@ -22,6 +23,32 @@ namespace {
 
 // Enough that neither side waits for the other's jitter; more only costs memory (3.7 MB each at 720p).
 constexpr std::size_t kQueuedPictures = 3;
+
+struct FormatName {
+  const char* extension;
+  VideoFormat format;
+};
+constexpr FormatName kFormats[] = {
+    {".mp4", VideoFormat::mp4}, {".webm", VideoFormat::webm}, {".gif", VideoFormat::gif}, {".webp", VideoFormat::webp}};
+
+const FormatName* findFormat(const std::string& path) {
+  const std::string extension = std::filesystem::path(path).extension().string();
+  const auto* found = std::find_if(std::begin(kFormats), std::end(kFormats),
+                                   [&](const FormatName& f) { return extension == f.extension; });
+  return found == std::end(kFormats) ? nullptr : found;
+}
+
+VideoFormat checkedFormat(const std::string& path, int width, int height, double fps) {
+  const FormatName* format = findFormat(path);
+  assert(format && width > 0 && height > 0 && fps > 0);
+  if (width % 2 != 0 || height % 2 != 0)
+    throw std::runtime_error(path + ": a video of " + std::to_string(width) + "x" + std::to_string(height) +
+                             " pixels, expected even numbers");
+  constexpr double gifMost = 50;
+  if (format->format == VideoFormat::gif && fps > gifMost)
+    throw std::runtime_error(path + ": more than 50 pictures per second, which no GIF can show");
+  return format->format;
+}
 
 std::string checkedPartialPath(const std::string& path) {
   namespace fs = std::filesystem;
@@ -52,7 +79,7 @@ struct VideoWriter::Data {
         partial(checkedPartialPath(p)),
         width(w),
         height(h),
-        encoder(partial, w, h, fps),
+        encoder(checkedFormat(p, w, h, fps), partial, w, h, fps),
         spare(kQueuedPictures) {
     feeder = std::thread([this] { feed(); });
   }
@@ -102,12 +129,16 @@ struct VideoWriter::Data {
   [[noreturn]] void fail() {
     end();
     encoder.finish();
-    throw std::runtime_error(path + ": ffmpeg failed: " + encoder.complaint());
+    const std::string words = encoder.complaint();
+    throw std::runtime_error(path + ": ffmpeg failed: " + (words.empty() ? "it gave no reason" : words));
   }
 };
 
+bool isVideoName(const std::string& path) {
+  return findFormat(path) != nullptr;
+}
+
 VideoWriter::VideoWriter(const std::string& path, int width, int height, double fps) {
-  assert(width > 0 && height > 0 && width % 2 == 0 && height % 2 == 0 && fps > 0);
   data_ = std::make_unique<Data>(path, width, height, fps);
 }
 VideoWriter::~VideoWriter() = default;

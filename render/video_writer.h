@@ -7,11 +7,16 @@
 
 namespace medulla {
 
-// An mp4 (H.264) through the ffmpeg program. The file grows beside its target under a name of its own and is renamed by
-// finish(); a writer destroyed before that leaves nothing.
+// Whether a file of this name is a video: .mp4 (H.264), .webm (VP9), .gif or .webp (animated, repeating for ever).
+bool isVideoName(const std::string& path);
+
+// A video through the ffmpeg program, of the kind that its name says. The file grows beside its target under a name of
+// its own and is renamed by finish(); a writer destroyed before that leaves nothing.
 class VideoWriter {
  public:
-  // Throws std::runtime_error when ffmpeg is not installed or the folder cannot be written. Width and height even.
+  // Throws std::runtime_error when ffmpeg is not installed, the folder cannot be written, the size is odd (colours are
+  // stored for 2x2 pixels at once), or a GIF is to show more than 50 pictures per second (its times are hundredths of a
+  // second, and players take the shortest for a tenth).
   VideoWriter(const std::string& path, int width, int height, double fps);
   ~VideoWriter();
   VideoWriter(VideoWriter&&) noexcept;

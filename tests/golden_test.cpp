@@ -1,10 +1,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
+#include "app/files/mesh_file.h"
+#include "app/scene_view.h"
+#include "physics/model/build.h"
+#include "physics/model/mesh_repair.h"
+#include "render/flip.h"
 #include "render/image.h"
-#include "tests/program_run.h"
-#include "tests/temporary_folder.h"
+#include "tests/own_scene.h"
 
 // The golden images of every shipped scene, through the command that users run; and that the gate closes.
 namespace medulla {
@@ -49,13 +54,151 @@ TEST(Golden, AnotherPictureFailsWithItsDifferenceAndTheCommandThatRepeatsIt) {
           for (int c = 0; c < 3; ++c) image.pixels[4 * (std::size_t(y) * image.width + x) + c] = 0;
     writePng(folder / ("images/" + name), image, texts);
   }
-  const ProgramResult r =
-      runProgram({"golden", scene, "--images", folder / "images", "--failures", folder / "failures"});
+  const ProgramResult r = runProgram({"golden", scene, "--dir", folder / "images", "--failures", folder / "failures"});
   EXPECT_EQ(r.exitCode, 3) << r.out << r.err;
   EXPECT_NE(r.out.find("gallbladder_15 failed"), std::string::npos) << r.out;
   EXPECT_NE(r.err.find("medulla golden "), std::string::npos) << r.err;
   EXPECT_TRUE(std::filesystem::exists(folder / "failures/gallbladder_15_actual.png"));
   EXPECT_TRUE(std::filesystem::exists(folder / "failures/gallbladder_15_difference.png"));
+  const std::string report = readFile(folder / "failures/report.html");
+  EXPECT_NE(report.find("1 of 5 golden images failed"), std::string::npos);
+  for (const char* words :
+       {"gallbladder_15", "over 16, PSNR", "FLIP 0.", "llvmpipe", "data:image/png;base64,iVBORw0KGgo"})
+    EXPECT_NE(report.find(words), std::string::npos) << words;
+  EXPECT_EQ(report.find("http"), std::string::npos);  // nothing from elsewhere
+}
+
+class OwnGolden : public OwnScene {
+ protected:
+  void SetUp() override {
+    OwnScene::SetUp();
+    const ProgramResult made = golden({"--dir", "pictures", "--update", "own/organ.xml"});
+    ASSERT_EQ(made.exitCode, 0) << made.err;
+    ASSERT_TRUE(std::filesystem::exists(folder / "pictures/organ_10.png")) << made.out;
+  }
+  ProgramResult golden(std::vector<std::string> words, const ProgramOptions& options = {}) const {
+    words.insert(words.begin(), "golden");
+    return run(words, options);
+  }
+};
+
+TEST_F(OwnGolden, ItsFolderKnowsItsScenesAndPassesAtAnyNumberOfThreadsAndVectorWidth) {
+  const std::vector<std::pair<std::string, std::string>> environments[] = {
+      {}, {{"LP_NUM_THREADS", "0"}}, {{"LP_NUM_THREADS", "1"}, {"LP_NATIVE_VECTOR_WIDTH", "128"}}};
+  for (const auto& environment : environments) {
+    ProgramOptions options;
+    options.environment = environment;
+    const ProgramResult r = golden({"--dir", "pictures"}, options);
+    EXPECT_EQ(r.exitCode, 0) << r.out << r.err;
+    EXPECT_NE(r.out.find("organ_8 ok: equal\norgan_10 ok: equal\nreport out/golden/report.html\n"), std::string::npos)
+        << r.out;
+  }
+  const std::string report = readFile(folder / "out/golden/report.html");
+  EXPECT_NE(report.find("2 golden images passed"), std::string::npos);
+  EXPECT_EQ(report.find("data:image"), std::string::npos);  // nothing to look at
+}
+
+TEST_F(OwnGolden, OneMomentIsUpdatedAloneAndAnotherPictureFails) {
+  write({.cameraTarget = -0.0499});  // the camera turned by a quarter of a pixel
+  EXPECT_EQ(golden({"--dir", "pictures"}).exitCode, 3);
+  EXPECT_EQ(golden({"own/organ.xml", "--dir", "pictures", "--update", "organ_10"}).out,
+            "pictures/organ_10.png written\n");
+  const ProgramResult r = golden({"--dir", "pictures"});
+  EXPECT_EQ(r.exitCode, 3);
+  EXPECT_NE(r.out.find("organ_8 failed: "), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("organ_10 ok: equal"), std::string::npos) << r.out;
+}
+
+TEST_F(OwnGolden, WhatCannotBeComparedIsSaid) {
+  expectRefused(golden({"--dir", "own"}), "own: no golden image here names its scene");
+  expectRefused(golden({"--dir", "pictures", "--update", "organ_11"}), "organ.xml has no such moment");
+  expectRefused(golden({"--dir", "pictures", "--update", "liver"}), "--update liver: no such scene");
+  expectRefused(golden({"own/organ.xml", "./own/organ.xml", "--dir", "pictures"}), "two scenes of the name organ");
+  write({.golden = "0.4"});
+  std::filesystem::remove(folder / "pictures/organ_10.png");
+  const ProgramResult r = golden({"own/organ.xml", "--dir", "pictures"});
+  EXPECT_EQ(r.exitCode, 3);
+  EXPECT_NE(r.out.find("organ_10 failed: pictures/organ_10.png does not exist"), std::string::npos) << r.out;
+}
+
+// The second tier alone: what must not pass, while the grasper slides along the gallbladder.
+class Gate : public testing::Test {
+ protected:
+  static constexpr int kFrame = 120, kWidth = 640, kHeight = 360;
+  static LoadedScene load(const std::vector<SceneOverride>& overrides = {}) {
+    return loadScene(readScene(kSource + "/scenes/gallbladder.xml", overrides));
+  }
+  // The picture's state and the next one's, and the run's first, which is the organ at rest.
+  struct States {
+    DynamicsFrame rest;
+    PictureState now, next;
+  };
+  static States simulate(const LoadedScene& loaded) {
+    Simulation simulation(loaded);
+    States states;
+    states.rest = simulation.current();
+    for (PictureState* state : {&states.now, &states.next}) {
+      const double time = (kFrame + (state == &states.next)) / loaded.scene.fps;
+      while (simulation.time() < time - 1e-9) simulation.advanceFrame();
+      stateAt(simulation.record(), time, *state);
+    }
+    return states;
+  }
+  // Draws states of one scene: textures are baked once.
+  struct Artist {
+    Renderer renderer;
+    SceneView view;
+    Artist(const LoadedScene& loaded, const DynamicsFrame& rest, bool shadows = true)
+        : renderer({.width = kWidth, .height = kHeight, .shadows = shadows}), view(loaded, rest, renderer) {}
+    Image draw(const PictureState& state) {
+      Picture picture;
+      Image image;
+      view.compose(state, {}, picture);
+      renderer.render(picture, image);
+      return image;
+    }
+  };
+  static void expectTold(const Image& golden, const Image& other, const char* what) {
+    const ImageDifference d = compareImages(golden, other);
+    EXPECT_FALSE(withinTolerance(d)) << what << ": " << d.overFourPercent << " % over 4, " << d.overSixteen
+                                     << " over 16, " << d.psnr << " dB";
+    EXPECT_GT(flipMean(golden, other), 1e-3) << what;
+  }
+};
+
+TEST_F(Gate, TellsApartWhatAPersonWouldWantToKnow) {
+  LoadedScene loaded = load();
+  const States states = simulate(loaded);
+  Artist artist(loaded, states.rest);
+  const Image golden = artist.draw(states.now);
+  expectTold(golden, artist.draw(states.next), "one picture later");
+  EXPECT_TRUE(compareImages(golden, artist.draw(states.now)).equal);
+
+  expectTold(golden, Artist(loaded, states.rest, false).draw(states.now), "without shadow");
+  const LoadedScene other = load({{"body.gallbladder.look", "gut"}});
+  expectTold(golden, Artist(other, states.rest).draw(states.now), "another look");
+
+  const CameraKey before = loaded.scene.camera[0];
+  CameraKey& camera = loaded.scene.camera[0];
+  const Eigen::Vector3d forward = camera.target - camera.position;
+  const double pixel = 2 * forward.norm() * std::tan(camera.fovDegrees * M_PI / 360) / kHeight;  // m, at the target
+  const Eigen::Vector3d step = pixel * forward.cross(Eigen::Vector3d::UnitY()).normalized();
+  camera.position += step;
+  camera.target += step;
+  expectTold(golden, artist.draw(states.now), "camera moved by a pixel");
+  camera = before;
+
+  BuildSettings settings;
+  settings.spheres = static_cast<int>(loaded.models[0]->spheres.size()) + 1;
+  settings.overshoot = 0;
+  BuildReport report;
+  LoadedScene finer = loaded;
+  const std::string organ = kSource + "/assets/gallbladder/gallbladder";
+  const TriangleMesh fine = readMesh(organ + "_fine.obj", 1);
+  finer.models[0] = std::make_shared<const SoftBodyModel>(
+      buildModel(repairMesh(readMesh(organ + ".obj", 1)), &fine, settings, report));
+  const States finerStates = simulate(finer);
+  expectTold(golden, Artist(finer, finerStates.rest).draw(finerStates.now), "another number of spheres");
 }
 
 }  // namespace medulla

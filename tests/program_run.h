@@ -1,5 +1,6 @@
 #pragma once
 
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,6 +11,7 @@
 #include <functional>
 #include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 // Runs the program itself, as a user would, in a folder of the test's own.
@@ -22,8 +24,11 @@ struct ProgramResult {
 
 struct ProgramOptions {
   std::string folder = ".";
-  std::function<bool()> interruptWhen;  // asked every 10 ms; SIGINT is sent once it holds
-  std::string path;                     // PATH of the child; empty: inherited
+  std::function<bool()> interruptWhen;  // asked every 10 ms; `signal` is sent once it holds
+  int signal = SIGINT;
+  std::string path;                                              // PATH of the child; empty: inherited
+  std::vector<std::pair<std::string, std::string>> environment;  // set for the child
+  long fileSizeLimit = 0;  // bytes; a longer file fails as on a full disk; 0: none
 };
 
 inline std::string readFile(const std::string& path) {
@@ -40,6 +45,12 @@ inline ProgramResult runProgram(const std::vector<std::string>& arguments, const
         chdir(options.folder.c_str()) != 0)
       _exit(99);
     if (!options.path.empty()) setenv("PATH", options.path.c_str(), 1);
+    for (const auto& [name, value] : options.environment) setenv(name.c_str(), value.c_str(), 1);
+    if (options.fileSizeLimit > 0) {
+      std::signal(SIGXFSZ, SIG_IGN);  // which the child and its own children inherit
+      const rlimit limit{static_cast<rlim_t>(options.fileSizeLimit), static_cast<rlim_t>(options.fileSizeLimit)};
+      setrlimit(RLIMIT_FSIZE, &limit);
+    }
     std::vector<char*> argv{const_cast<char*>(MEDULLA_PROGRAM)};
     for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
     argv.push_back(nullptr);
@@ -50,7 +61,7 @@ inline ProgramResult runProgram(const std::vector<std::string>& arguments, const
   bool ended = false;
   if (options.interruptWhen) {
     while (!(ended = waitpid(child, &status, WNOHANG) == child) && !options.interruptWhen()) usleep(10000);
-    if (!ended) kill(child, SIGINT);
+    if (!ended) kill(child, options.signal);
   }
   if (!ended) waitpid(child, &status, 0);
   ProgramResult result;

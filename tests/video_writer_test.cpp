@@ -110,6 +110,52 @@ TEST_F(VideoWriterTest, FilmHasEveryPictureRightColoursAndTags) {
   EXPECT_EQ(tags, "yuv420p,tv,bt709,30/1\n");
 }
 
+TEST_F(VideoWriterTest, EveryKindOfVideoHasEveryPicture) {
+  for (const char* name : {"a.webm", "a.gif", "a.webp"}) {
+    VideoWriter writer(path(name), 64, 32, 25);
+    for (int k = 0; k < 10; ++k) writer.write(flat(64, 32, std::uint8_t(200 - 8 * k), 60, 40));
+    writer.finish();
+    EXPECT_GT(fs::file_size(path(name)), 100u) << name;
+  }
+  EXPECT_EQ(filesInFolder(), 3u);
+  for (const char* name : {"a.webm", "a.gif"}) {
+    const std::string raw = outputOf("ffmpeg -v error -i " + path(name) + " -f rawvideo -pix_fmt rgb24 -");
+    ASSERT_EQ(raw.size(), 10u * 64 * 32 * 3) << name;
+    for (int k = 0; k < 10; ++k) {
+      const std::size_t middle = (std::size_t(k) * 64 * 32 + 16 * 64 + 32) * 3;
+      EXPECT_NEAR(std::uint8_t(raw[middle]), 200 - 8 * k, 8) << name << " picture " << k;
+      EXPECT_NEAR(std::uint8_t(raw[middle + 1]), 60, 8) << name << " picture " << k;
+    }
+  }
+  // ffmpeg reads no animated WebP: its chunks are counted (RIFF container of Google's WebP specification).
+  std::ifstream file(path("a.webp"), std::ios::binary);
+  const std::string webp((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  EXPECT_EQ(webp.substr(0, 4) + webp.substr(8, 4), "RIFFWEBP");
+  int pictures = 0;
+  for (std::size_t at = webp.find("ANMF"); at != std::string::npos; at = webp.find("ANMF", at + 1)) ++pictures;
+  EXPECT_EQ(pictures, 10);
+}
+
+TEST_F(VideoWriterTest, WhatAKindCannotHoldIsRefused) {
+  EXPECT_EQ(messageOf([&] { VideoWriter(path("a.mp4"), 65, 32, 30); }),
+            path("a.mp4") + ": a video of 65x32 pixels, expected even numbers");
+  EXPECT_NE(messageOf([&] { VideoWriter(path("a.gif"), 64, 32, 60); }).find("more than 50"), std::string::npos);
+  EXPECT_TRUE(isVideoName("a.webm"));
+  EXPECT_FALSE(isVideoName("a.png"));
+  EXPECT_EQ(filesInFolder(), 0u);
+}
+
+TEST_F(VideoWriterTest, FfmpegThatComplainsAndYetSucceedsHasFailed) {
+  replaceFfmpeg("cat > /dev/null; echo 'Error closing file' >&2; exit 0");
+  EXPECT_NE(messageOf([&] {
+              VideoWriter writer(path("a.mp4"), 64, 32, 30);
+              writer.write(flat(64, 32, 1, 2, 3));
+              writer.finish();
+            }).find("Error closing file"),
+            std::string::npos);
+  EXPECT_FALSE(fs::exists(path("a.mp4")));
+}
+
 TEST_F(VideoWriterTest, UnfinishedFilmLeavesNothingAndKeepsTheEarlierOne) {
   std::ofstream(path("a.mp4")) << "earlier";
   {

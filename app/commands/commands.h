@@ -34,27 +34,33 @@ int runReplay(const RunOptions& options);
 
 struct RenderOptions {
   RunOptions run;
-  std::vector<std::string> outputs;  // FILE.mp4 or a folder for numbered PNG files
+  std::vector<std::string>
+      outputs;            // FILE.mp4, .webm, .gif, .webp, a folder for numbered PNG files; of a still FILE.png
+  std::string cachePath;  // states of an earlier run of the same motion; empty: simulate
   ViewOptions view;
+  Quality quality = Quality::standard;
+  std::optional<double> still;                // s, >= 0: one picture at this time
   std::optional<std::pair<int, int>> size;    // pixels
   std::optional<double> fps;                  // Hz
   std::optional<std::pair<int, int>> frames;  // [first, last)
   std::string context = "auto";
+  bool resume = false;   // folders of PNG files only: what an ended run left is not drawn again
+  bool timings = false;  // a table on standard error, per stage
 };
 int runRender(const RenderOptions& options);
 
 struct GoldenOptions {
-  std::vector<std::string> scenes;  // empty: every scenes/*.xml under the current folder
-  std::string images;               // empty: golden_images beside the scene's folder
-  std::string failures = "out/golden";
+  std::vector<std::string> scenes;      // empty: those that the folder's images name; without folder scenes/*.xml
+  std::string folder;                   // of the golden images; empty: golden_images beside the scene's folder
+  std::vector<std::string> update;      // scenes (file or name) and moments to store anew; empty: compare
+  std::string failures = "out/golden";  // folder for report.html and pictures that fail
   std::string context = "auto";
-  bool update = false;
 };
 int runGolden(const GoldenOptions& options);
 
 struct CompareOptions {
-  std::string a, b;      // logs
-  double tolerance = 0;  // share of the largest value that a column has in either; 0: the same text
+  std::string a, b;      // two logs or two state caches
+  double tolerance = 0;  // share of the largest value that a column has in either; 0: the same
 };
 int runCompare(const CompareOptions& options);
 

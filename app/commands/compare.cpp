@@ -5,6 +5,7 @@
 
 #include "app/commands/commands.h"
 #include "app/files/log_table.h"
+#include "app/files/state_cache.h"
 
 namespace medulla {
 
@@ -42,9 +43,119 @@ int differing(std::vector<Result> results) {
   return 3;
 }
 
-}  // namespace
+// What a cache says of every picture, as columns.
+void appendNames(std::vector<std::string>& out, const std::string& start, const char* letters) {
+  for (; *letters; ++letters) out.push_back(start + "." + *letters);
+}
 
-int runCompare(const CompareOptions& options) {
+std::vector<std::string> fieldsOf(const CacheLayout& layout) {
+  std::vector<std::string> out{"t"};
+  for (const CacheLayout::Body& body : layout.bodies) {
+    for (int i = 0; i < body.spheres; ++i) {
+      appendNames(out, fmt::format("{}.sphere.{}.position", body.name, i), "xyz");
+      appendNames(out, fmt::format("{}.sphere.{}.orientation", body.name, i), "wxyz");
+    }
+    for (int i = 0; i < body.nodes; ++i) appendNames(out, fmt::format("{}.node.{}", body.name, i), "xyz");
+  }
+  for (const std::string& tool : layout.tools) {
+    appendNames(out, tool + ".trajectory.position", "xyz");
+    appendNames(out, tool + ".trajectory.orientation", "wxyz");
+    out.push_back(tool + ".trajectory.grip");
+    for (const char* what : {".device", ".proxy", ".force"}) appendNames(out, tool + what, "xyz");
+    for (const char* what : {".contact", ".held", ".clamped"}) out.push_back(tool + what);
+  }
+  return out;
+}
+
+// In the order of fieldsOf().
+void valuesOf(const PictureState& state, std::vector<double>& out) {
+  out.assign(1, state.time);
+  const auto add = [&out](const Eigen::Vector3d& v) { out.insert(out.end(), {v.x(), v.y(), v.z()}); };
+  const auto turn = [&out](const Eigen::Quaterniond& q) { out.insert(out.end(), {q.w(), q.x(), q.y(), q.z()}); };
+  for (const BodyFrame& body : state.frame.bodies) {
+    for (const SpherePose& sphere : body.spheres) {
+      add(sphere.position);
+      turn(sphere.worldFromSphere);
+    }
+    for (const Eigen::Vector3d& node : body.nodes) add(node);
+  }
+  for (std::size_t k = 0; k < state.tools.size(); ++k) {
+    const ToolSample& input = state.inputs[k];
+    const ToolState& tool = state.tools[k];
+    add(input.position);
+    turn(input.worldFromTool);
+    out.push_back(input.grip);
+    for (const Eigen::Vector3d* v : {&tool.device, &tool.proxy, &tool.force}) add(*v);
+    for (const bool flag : {tool.inContact, tool.holding, tool.clamped}) out.push_back(flag ? 1 : 0);
+  }
+}
+
+// Components of one vector share a scale: one that stays near zero has no meaning of its own.
+std::vector<double> scales(CacheReader& a, CacheReader& b, const std::vector<std::string>& fields) {
+  std::vector<double> out, values;
+  PictureState state;
+  for (CacheReader* cache : {&a, &b})
+    for (int n = 0; n < cache->pictures(); ++n) {
+      cache->read(n, state);
+      valuesOf(state, values);
+      out.resize(values.size());
+      for (std::size_t k = 0; k < out.size(); ++k) out[k] = std::max(out[k], std::abs(values[k]));
+    }
+  const auto vectorOf = [&fields](std::size_t k) { return fields[k].substr(0, fields[k].size() - 2); };
+  const auto component = [&fields](std::size_t k) {
+    return fields[k].size() > 2 && fields[k][fields[k].size() - 2] == '.';
+  };
+  for (std::size_t k = 0, end = 0; k < out.size(); k = end) {
+    for (end = k + 1; component(k) && end < out.size() && component(end) && vectorOf(end) == vectorOf(k);) ++end;
+    std::fill(out.begin() + std::ptrdiff_t(k), out.begin() + std::ptrdiff_t(end),
+              *std::max_element(out.begin() + std::ptrdiff_t(k), out.begin() + std::ptrdiff_t(end)));
+  }
+  return out;
+}
+
+std::string describe(const CacheLayout& layout) {
+  std::string out = fmt::format("{:g} pictures per second", layout.fps);
+  for (const CacheLayout::Body& body : layout.bodies)
+    out += fmt::format(", {} of {} spheres and {} nodes", body.name, body.spheres, body.nodes);
+  for (const std::string& tool : layout.tools) out += ", " + tool;
+  return out;
+}
+
+int compareCaches(const CompareOptions& options) {
+  CacheReader a(options.a), b(options.b);
+  if (describe(a.layout()) != describe(b.layout()))
+    return differing({{"a", describe(a.layout()), ""}, {"b", describe(b.layout()), ""}});
+  const std::vector<std::string> fields = fieldsOf(a.layout());
+  const std::vector<double> scale = options.tolerance > 0 ? scales(a, b, fields) : std::vector<double>();
+  PictureState state;
+  std::vector<double> inA, inB;
+  for (int n = 0; n < std::min(a.pictures(), b.pictures()); ++n) {
+    const std::uint64_t hashA = a.read(n, state);
+    valuesOf(state, inA);
+    const std::uint64_t hashB = b.read(n, state);
+    valuesOf(state, inB);
+    const auto differ = [&](const std::string& field, const std::string& valueA, const std::string& valueB) {
+      return differing({{"picture", fmt::format("{}", n), ""},
+                        {"t", fmt::format("{}", inA[0]), "s"},
+                        {"field", field, ""},
+                        {"a", valueA, ""},
+                        {"b", valueB, ""}});
+    };
+    for (std::size_t k = 0; k < inA.size(); ++k)
+      if (options.tolerance > 0 ? std::abs(inA[k] - inB[k]) > options.tolerance * scale[k] : inA[k] != inB[k])
+        return differ(fields[k], fmt::format("{}", inA[k]), fmt::format("{}", inB[k]));
+    // What no picture shows, such as speeds.
+    if (options.tolerance == 0 && hashA != hashB)
+      return differ("state_hash", fmt::format("{:016x}", hashA), fmt::format("{:016x}", hashB));
+  }
+  if (a.pictures() != b.pictures())
+    return differing(
+        {{"pictures_a", fmt::format("{}", a.pictures()), ""}, {"pictures_b", fmt::format("{}", b.pictures()), ""}});
+  printResults({{"equal", "yes", ""}, {"pictures", fmt::format("{}", a.pictures()), ""}});
+  return 0;
+}
+
+int compareLogs(const CompareOptions& options) {
   const LogTable a = readLog(options.a), b = readLog(options.b);
   const auto [inA, inB] = std::mismatch(a.columns.begin(), a.columns.end(), b.columns.begin(), b.columns.end());
   if (inA != a.columns.end() || inB != b.columns.end())
@@ -66,6 +177,16 @@ int runCompare(const CompareOptions& options) {
         {{"rows_a", fmt::format("{}", a.value.size()), ""}, {"rows_b", fmt::format("{}", b.value.size()), ""}});
   printResults({{"equal", "yes", ""}, {"rows", fmt::format("{}", a.value.size()), ""}});
   return 0;
+}
+
+}  // namespace
+
+int runCompare(const CompareOptions& options) {
+  const bool cacheA = isCache(options.a), cacheB = isCache(options.b);
+  if (cacheA != cacheB)
+    throw std::runtime_error(fmt::format("{} is a state cache, {} is none: expected two of a kind",
+                                         cacheA ? options.a : options.b, cacheA ? options.b : options.a));
+  return cacheA ? compareCaches(options) : compareLogs(options);
 }
 
 }  // namespace medulla

@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <set>
 
 #include "app/commands/commands.h"
+#include "app/files/golden_report.h"
 #include "app/interrupt.h"
+#include "render/flip.h"
 
 namespace medulla {
 
@@ -13,8 +17,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What a golden image was rendered with: decides which tier of the gate applies.
+// What a golden image says of itself: its scene, relative to its folder; what it was rendered with, which decides the
+// tier of the gate; and the hash of the state, which tells drift of the physics from drift of the pixels.
+constexpr const char* kSceneKey = "medulla:scene";
 constexpr const char* kRendererKey = "medulla:renderer";
+constexpr const char* kProcessorKey = "medulla:processor";
 constexpr const char* kStateKey = "medulla:state";
 
 struct Moment {
@@ -23,14 +30,92 @@ struct Moment {
   Image image;
 };
 
-std::vector<std::string> allScenes() {
+std::string textOf(const std::vector<PngText>& texts, const std::string& key) {
+  for (const PngText& t : texts)
+    if (t.keyword == key) return t.text;
+  return {};
+}
+
+std::string stemOf(const std::string& path) {
+  return fs::path(path).stem().string();
+}
+
+std::string processorName() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("model name")) return line.substr(std::min(line.find(": ") + 2, line.size()));
+  return "unknown processor";
+}
+
+std::vector<std::string> filesOf(const fs::path& folder, const std::string& extension) {
   std::vector<std::string> paths;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator("scenes", error))
-    if (entry.path().extension() == ".xml") paths.push_back(entry.path().string());
-  if (paths.empty()) throw std::runtime_error("no scene named and none found: expected scenes/*.xml in this folder");
+  for (const auto& entry : fs::directory_iterator(folder, error))
+    if (entry.path().extension() == extension) paths.push_back(entry.path().string());
   std::sort(paths.begin(), paths.end());
   return paths;
+}
+
+// A folder of golden images knows its scenes; without one they are those of the current folder's scenes/.
+std::vector<std::string> scenesOf(const GoldenOptions& options) {
+  if (!options.scenes.empty()) return options.scenes;
+  std::vector<std::string> paths;
+  for (const std::string& name : options.update)
+    if (fs::path(name).extension() == ".xml") paths.push_back(name);
+  if (!paths.empty() && paths.size() == options.update.size()) return paths;
+  if (options.folder.empty()) {
+    paths = filesOf("scenes", ".xml");
+    if (paths.empty()) throw std::runtime_error("no scene named and none found: expected scenes/*.xml in this folder");
+    return paths;
+  }
+  std::set<std::string> known;
+  for (const std::string& image : filesOf(options.folder, ".png")) {
+    std::vector<PngText> texts;
+    readPng(image, &texts);
+    const std::string scene = textOf(texts, kSceneKey);
+    if (!scene.empty()) known.insert((fs::path(options.folder) / scene).lexically_normal().string());
+  }
+  if (known.empty())
+    throw std::runtime_error(
+        options.folder + ": no golden image here names its scene: expected a SCENE, or --update SCENE to make them");
+  return {known.begin(), known.end()};
+}
+
+std::string folderOf(const std::string& scene, const GoldenOptions& options) {
+  if (!options.folder.empty()) return options.folder;
+  return (fs::absolute(scene).parent_path().parent_path() / "golden_images").lexically_normal().string();
+}
+
+// Two scenes of one name would share their images.
+void requireDistinctNames(const std::vector<std::string>& scenes, const GoldenOptions& options) {
+  std::set<std::string> taken;
+  for (const std::string& scene : scenes)
+    if (!taken.insert((fs::path(folderOf(scene, options)) / stemOf(scene)).string()).second)
+      throw std::runtime_error(
+          fmt::format("{}: two scenes of the name {} for one folder of golden images", scene, stemOf(scene)));
+}
+
+// NAME of --update: a scene by file or name, or one of its moments.
+bool namesScene(const std::string& name, const std::string& scene) {
+  return name == stemOf(scene) || fs::path(name).lexically_normal() == fs::path(scene).lexically_normal();
+}
+bool namesMomentOf(const std::string& name, const std::string& scene) {
+  const std::string prefix = stemOf(scene) + "_";
+  return name.starts_with(prefix) && name.size() > prefix.size() &&
+         name.find_first_not_of("0123456789", prefix.size()) == std::string::npos;
+}
+
+std::vector<Moment> momentsOf(const Scene& scene) {
+  if (scene.goldenTimes.empty())
+    throw std::runtime_error(scene.path + ": names no golden moments: expected <output golden=\"...\"/>");
+  std::vector<Moment> moments;
+  for (const double time : scene.goldenTimes) {
+    Moment moment;
+    moment.frame = std::min(static_cast<int>(std::lround(time * scene.fps)), pictureCount(scene) - 1);
+    moment.name = fmt::format("{}_{}", stemOf(scene.path), moment.frame);
+    moments.push_back(std::move(moment));
+  }
+  return moments;
 }
 
 std::vector<Moment> renderMoments(const std::string& path, const std::string& context, std::string& renderedWith) {
@@ -38,21 +123,11 @@ std::vector<Moment> renderMoments(const std::string& path, const std::string& co
   run.scene = path;
   const LoadedScene loaded = loadRun(run);
   const Scene& scene = loaded.scene;
+  std::vector<Moment> moments = momentsOf(scene);
   Simulation simulation(loaded);
   Renderer renderer({.width = scene.width, .height = scene.height, .context = context});
   renderedWith = renderer.description();
   const SceneView view(loaded, simulation.current(), renderer);
-  if (scene.goldenTimes.empty())
-    throw std::runtime_error(path + ": names no golden moments: expected <output golden=\"...\"/>");
-  const int pictures = static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9));
-  std::vector<Moment> moments;
-  for (double time : scene.goldenTimes) {
-    Moment moment;
-    moment.frame = std::min(static_cast<int>(std::lround(time * scene.fps)), pictures - 1);
-    moment.name = fmt::format("{}_{}", fs::path(path).stem().string(), moment.frame);
-    moments.push_back(std::move(moment));
-  }
-  std::sort(moments.begin(), moments.end(), [](const Moment& a, const Moment& b) { return a.frame < b.frame; });
   PictureState state;
   Picture picture;
   std::size_t next = 0;
@@ -70,76 +145,115 @@ std::vector<Moment> renderMoments(const std::string& path, const std::string& co
   return moments;
 }
 
-std::string textOf(const std::vector<PngText>& texts, const std::string& key) {
-  for (const PngText& t : texts)
-    if (t.keyword == key) return t.text;
-  return {};
-}
-
-// Says on standard output how the picture compares; true when it passes.
-bool passes(const Moment& moment, const std::string& goldenPath, const std::string& renderedWith,
-            const GoldenOptions& options) {
-  const auto fail = [&](const std::string& why) {
-    fmt::print("{} failed: {}\n", moment.name, why);
-    return false;
-  };
-  if (!fs::exists(goldenPath)) return fail(goldenPath + " does not exist");
+GoldenResult compare(const Moment& moment, const std::string& goldenPath, const std::string& renderedWith) {
+  GoldenResult r;
+  r.name = moment.name;
+  if (!fs::exists(goldenPath)) {
+    r.verdict = goldenPath + " does not exist";
+    return r;
+  }
   std::vector<PngText> texts;
-  const Image golden = readPng(goldenPath, &texts);
-  if (golden.width != moment.image.width || golden.height != moment.image.height)
-    return fail(
-        fmt::format("size {}x{}, golden {}x{}", moment.image.width, moment.image.height, golden.width, golden.height));
+  Image golden = readPng(goldenPath, &texts);
+  r.stored = {textOf(texts, kRendererKey), textOf(texts, kProcessorKey)};
+  if (golden.width != moment.image.width || golden.height != moment.image.height) {
+    r.verdict =
+        fmt::format("size {}x{}, golden {}x{}", moment.image.width, moment.image.height, golden.width, golden.height);
+    return r;
+  }
   const ImageDifference d = compareImages(moment.image, golden);
   // Same renderer and same state: the very same bytes. Another Mesa, instruction set or mathematical library: within
   // the noise of those, which a missing shadow or the next picture of the video exceeds.
-  const bool sameRenderer = textOf(texts, kRendererKey) == renderedWith;
-  const bool sameState = textOf(texts, kStateKey) == moment.state;
-  const bool exact = sameRenderer && sameState;
-  const std::string figures =
-      fmt::format("{:.4f} % of pixels over 4, {} over 16, PSNR {:.1f} dB; state {}, renderer {}", d.overFourPercent,
-                  d.overSixteen, d.psnr, sameState ? "as stored" : "differs", sameRenderer ? "as stored" : "differs");
-  if (exact ? d.equal : withinTolerance(d)) {
-    fmt::print("{} ok: {}\n", moment.name, d.equal ? "equal" : figures);
-    return true;
+  const bool sameRenderer = r.stored.renderer == renderedWith, sameState = textOf(texts, kStateKey) == moment.state;
+  r.passed = sameRenderer && sameState ? d.equal : withinTolerance(d);
+  if (d.equal) {
+    r.verdict = "equal";
+    return r;
   }
-  fs::create_directories(options.failures);
-  writePng(fmt::format("{}/{}_actual.png", options.failures, moment.name), moment.image);
-  writePng(fmt::format("{}/{}_difference.png", options.failures, moment.name),
-           amplifiedDifference(moment.image, golden));
-  return fail(fmt::format("{}; see {}/{}_*.png", figures, options.failures, moment.name));
+  r.verdict = fmt::format("{:.4f} % of pixels over 4, {} over 16, PSNR {:.1f} dB, FLIP {:.5f}; state {}, renderer {}",
+                          d.overFourPercent, d.overSixteen, d.psnr, flipMean(moment.image, golden),
+                          sameState ? "as stored" : "differs", sameRenderer ? "as stored" : "differs");
+  r.expected = std::move(golden);
+  r.actual = moment.image;
+  return r;
 }
 
 std::string repeatingCommand(const std::string& path, const GoldenOptions& options) {
   std::string command = "medulla golden " + path;
-  if (!options.images.empty()) command += " --images " + options.images;
+  if (!options.folder.empty()) command += " --dir " + options.folder;
   if (options.context != "auto") command += " --context " + options.context;
   return command + " --failures " + options.failures;
+}
+
+void updateScene(const std::string& path, const GoldenOptions& options) {
+  std::string renderedWith;
+  const std::string folder = folderOf(path, options);
+  fs::create_directories(folder);
+  const std::string scene = fs::proximate(fs::absolute(path), fs::absolute(folder)).string();
+  const bool whole = std::any_of(options.update.begin(), options.update.end(),
+                                 [&](const std::string& name) { return namesScene(name, path); });
+  for (const Moment& m : renderMoments(path, options.context, renderedWith)) {
+    if (!whole && std::find(options.update.begin(), options.update.end(), m.name) == options.update.end()) continue;
+    const std::string image = fmt::format("{}/{}.png", folder, m.name);
+    writePng(
+        image, m.image,
+        {{kSceneKey, scene}, {kRendererKey, renderedWith}, {kProcessorKey, processorName()}, {kStateKey, m.state}});
+    fmt::print("{} written\n", image);
+  }
+}
+
+int update(const std::vector<std::string>& scenes, const GoldenOptions& options) {
+  std::set<std::string> chosen;
+  for (const std::string& name : options.update) {
+    const auto scene = std::find_if(scenes.begin(), scenes.end(), [&](const std::string& path) {
+      return namesScene(name, path) || namesMomentOf(name, path);
+    });
+    if (scene == scenes.end()) throw std::runtime_error("--update " + name + ": no such scene and no moment of one");
+    const std::vector<Moment> moments = momentsOf(readScene(*scene));
+    const bool known = namesScene(name, *scene) ||
+                       std::any_of(moments.begin(), moments.end(), [&](const Moment& m) { return m.name == name; });
+    if (!known) throw std::runtime_error(fmt::format("--update {}: {} has no such moment", name, *scene));
+    chosen.insert(*scene);
+  }
+  for (const std::string& path : chosen) updateScene(path, options);
+  return 0;
+}
+
+// Says on standard output how each moment compares; true when all pass.
+bool compareScene(const std::string& path, const GoldenOptions& options, std::vector<GoldenResult>& results,
+                  std::string& renderedWith) {
+  bool allPass = true;
+  for (const Moment& m : renderMoments(path, options.context, renderedWith)) {
+    GoldenResult r = compare(m, fmt::format("{}/{}.png", folderOf(path, options), m.name), renderedWith);
+    r.scene = path;
+    fmt::print("{} {}: {}\n", r.name, r.passed ? "ok" : "failed", r.verdict);
+    if (!r.passed && !m.image.pixels.empty()) {
+      fs::create_directories(options.failures);
+      writePng(fmt::format("{}/{}_actual.png", options.failures, m.name), m.image);
+      if (!r.expected.pixels.empty())
+        writePng(fmt::format("{}/{}_difference.png", options.failures, m.name),
+                 amplifiedDifference(r.actual, r.expected));
+    }
+    allPass = allPass && r.passed;
+    results.push_back(std::move(r));
+  }
+  if (!allPass) fmt::print(stderr, "repeat with: {}\n", repeatingCommand(path, options));
+  return allPass;
 }
 
 }  // namespace
 
 int runGolden(const GoldenOptions& options) {
-  const std::vector<std::string> scenes = options.scenes.empty() ? allScenes() : options.scenes;
+  const std::vector<std::string> scenes = scenesOf(options);
+  requireDistinctNames(scenes, options);
+  if (!options.update.empty()) return update(scenes, options);
   bool allPass = true;
-  for (const std::string& path : scenes) {
-    std::string renderedWith;
-    const std::vector<Moment> moments = renderMoments(path, options.context, renderedWith);
-    const fs::path folder = options.images.empty() ? fs::absolute(path).parent_path().parent_path() / "golden_images"
-                                                   : fs::path(options.images);
-    bool scenePasses = true;
-    for (const Moment& moment : moments) {
-      const std::string goldenPath = (folder / (moment.name + ".png")).string();
-      if (options.update) {
-        fs::create_directories(folder);
-        writePng(goldenPath, moment.image, {{kRendererKey, renderedWith}, {kStateKey, moment.state}});
-        fmt::print("{} written\n", goldenPath);
-      } else {
-        scenePasses = passes(moment, goldenPath, renderedWith, options) && scenePasses;
-      }
-    }
-    if (!scenePasses) fmt::print(stderr, "repeat with: {}\n", repeatingCommand(path, options));
-    allPass = allPass && scenePasses;
-  }
+  std::string renderedWith;
+  std::vector<GoldenResult> results;
+  for (const std::string& path : scenes) allPass = compareScene(path, options, results, renderedWith) && allPass;
+  fs::create_directories(options.failures);
+  const std::string report = options.failures + "/report.html";
+  writeGoldenReport(report, results, {renderedWith, processorName()});
+  fmt::print("report {}\n", report);
   return allPass ? 0 : 3;
 }
 

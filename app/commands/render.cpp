@@ -1,142 +1,224 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <memory>
+#include <tuple>
+#include <utility>
 
 #include "app/commands/commands.h"
+#include "app/files/content_hash.h"
+#include "app/files/input_error.h"
+#include "app/files/output_file.h"
+#include "app/interrupt.h"
+#include "app/picture_outputs.h"
 #include "app/progress.h"
-#include "render/video_writer.h"
 
 namespace medulla {
 
 namespace {
 
-namespace fs = std::filesystem;
-
-bool isVideo(const std::string& path) {
-  return fs::path(path).extension() == ".mp4";
-}
-
-std::string withoutSlash(std::string path) {
-  while (path.size() > 1 && path.back() == '/') path.pop_back();
-  return path;
-}
-
-// A folder of numbered PNG files. They collect in a folder of their own beside it and move in when all are there: a run
-// that ends early harms no earlier picture.
-class PngFolder {
- public:
-  explicit PngFolder(const std::string& path)
-      : folder_(path), collecting_(fmt::format("{}.{}.part", withoutSlash(path), getpid())) {
-    std::error_code error;
-    fs::create_directories(folder_, error);
-    if (!error) fs::create_directory(collecting_, error);
-    if (error) throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", path, error.message()));
-  }
-  ~PngFolder() {
-    std::error_code ignored;
-    fs::remove_all(collecting_, ignored);
-    fs::remove(folder_, ignored);  // only if nothing came into it
-  }
-  PngFolder(const PngFolder&) = delete;
-  PngFolder& operator=(const PngFolder&) = delete;
-  void write(int number, const Image& image) const {
-    writePng((collecting_ / fmt::format("{:05d}.png", number)).string(), image);
-  }
-  void finish() const {
-    for (const auto& entry : fs::directory_iterator(collecting_))
-      fs::rename(entry.path(), folder_ / entry.path().filename());
-  }
-
- private:
-  fs::path folder_, collecting_;
-};
-
-// Where pictures go: any number of videos and folders of numbered PNG files.
-class PictureOutputs {
- public:
-  PictureOutputs(const std::vector<std::string>& paths, int width, int height, double fps) {
-    for (const std::string& path : paths) {
-      if (isVideo(path)) {
-        videos_.emplace_back(path, width, height, fps);
-        continue;
-      }
-      if (!fs::path(path).extension().empty() && !fs::is_directory(path))
-        throw std::runtime_error(fmt::format("{}: expected FILE.mp4 or a folder for PNG files", path));
-      folders_.push_back(std::make_unique<PngFolder>(path));
-    }
-  }
-  void write(int number, const Image& image) {
-    for (VideoWriter& video : videos_) video.write(image);
-    for (const auto& folder : folders_) folder->write(number, image);
-  }
-  void finish() {
-    for (VideoWriter& video : videos_) video.finish();
-    for (const auto& folder : folders_) folder->finish();
-  }
-
- private:
-  std::vector<VideoWriter> videos_;
-  std::vector<std::unique_ptr<PngFolder>> folders_;
-};
-
 void applyOverrides(const RenderOptions& options, Scene& scene) {
-  if (options.size) std::tie(scene.width, scene.height) = *options.size;
+  if (options.size) {
+    std::tie(scene.width, scene.height) = *options.size;
+    const auto valid = [](int n) { return n >= 16 && n <= 8192 && n % 2 == 0; };
+    if (!valid(scene.width) || !valid(scene.height))
+      throw std::runtime_error(fmt::format(
+          "--size {}x{}: expected even numbers from 16 to 8192 (video needs them even)", scene.width, scene.height));
+  }
   if (options.fps) scene.fps = *options.fps;
 }
 
-std::pair<int, int> frameRange(const RenderOptions& options, const Scene& scene) {
-  const int count = static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9));
-  if (!options.frames) return {0, count};
-  const auto [first, last] = *options.frames;
+// The pictures to draw: those of a range, numbered from its first, or one at a time of its own.
+struct Wanted {
+  std::vector<double> times;  // s, increasing
+  int first = 0;
+  int last() const { return first + static_cast<int>(times.size()); }
+};
+
+Wanted wantedOf(const RenderOptions& options, const Scene& scene) {
+  if (options.still) {
+    if (*options.still > scene.duration)
+      throw std::runtime_error(fmt::format("--still {}: expected a time from 0 to {} s, the scene's duration",
+                                           *options.still, scene.duration));
+    return {{*options.still}, 0};
+  }
+  const int count = pictureCount(scene);
+  const auto [first, last] = options.frames.value_or(std::make_pair(0, count));
   if (first < 0 || first >= last || last > count)
     throw std::runtime_error(
         fmt::format("--frames {}:{}: expected 0 <= A < B <= {}, the scene's number of pictures", first, last, count));
-  return *options.frames;
+  return {pictureTimes(scene, first, last), first};
+}
+
+// Draws states and hands the pictures on.
+class Artist {
+ public:
+  Artist(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, const DynamicsFrame& rest,
+         StageTimes& times)
+      : options_(&options),
+        times_(&times),
+        renderer_(rendererSettings(loaded.scene.width, loaded.scene.height, options.context, options.quality)),
+        view_(loaded, rest, renderer_),
+        outputs_(options.outputs, outputSettings(loaded, options, wanted, renderer_.description())),
+        progress_("render", static_cast<double>(wanted.times.size()), "pictures") {}
+
+  void draw(int number, const PictureState& state) {
+    if (!outputs_.has(number)) {
+      times_->start("compose");
+      view_.compose(state, options_->view, picture_);
+      renderer_.render(picture_, image_, times_);
+      times_->start("hand over");
+      outputs_.write(number, image_);
+      ++drawn_;
+    }
+    progress_.update(++done_);
+    times_->stop();
+  }
+  void finish() {
+    times_->start("end files");
+    outputs_.finish();
+    times_->stop();
+  }
+  int drawn() const { return drawn_; }
+
+ private:
+  static PictureOutputs::Settings outputSettings(const LoadedScene& loaded, const RenderOptions& options,
+                                                 const Wanted& wanted, const std::string& renderer) {
+    const Scene& scene = loaded.scene;
+    const std::string drawing =
+        fmt::format("{}x{} {} {} {} {} {}", scene.width, scene.height, scene.fps, static_cast<int>(options.view.view),
+                    options.view.showProxy, static_cast<int>(options.quality), renderer);
+    const std::uint64_t run = contentHash(drawing, runHash(loaded, true));
+    return {scene.width,
+            scene.height,
+            scene.fps,
+            options.still.has_value(),
+            {wanted.first, wanted.last(), run, options.resume}};
+  }
+
+  const RenderOptions* options_;
+  StageTimes* times_;
+  Renderer renderer_;
+  SceneView view_;
+  PictureOutputs outputs_;
+  Progress progress_;
+  Picture picture_;
+  Image image_;
+  int drawn_ = 0, done_ = 0;
+};
+
+// Wall time goes on while stages overlap with the encoder; CPU is that of all threads then.
+void printTimings(const StageTimes& times, int pictures) {
+  fmt::print(stderr, "{:<12}{:>12}{:>12}{:>18}{:>18}\n", "stage", "wall [s]", "cpu [s]", "wall [ms/picture]",
+             "cpu [ms/picture]");
+  StageTimes::Stage sum{"sum", 0, 0};
+  const auto print = [pictures](const StageTimes::Stage& s) {
+    const double each = 1e3 / std::max(pictures, 1);
+    fmt::print(stderr, "{:<12}{:>12.3f}{:>12.3f}{:>18.2f}{:>18.2f}\n", s.name, s.wall, s.cpu, each * s.wall,
+               each * s.cpu);
+  };
+  for (const StageTimes::Stage& s : times.stages()) {
+    print(s);
+    sum.wall += s.wall;
+    sum.cpu += s.cpu;
+  }
+  print(sum);
+}
+
+void printFiles(const RenderOptions& options, const Artist& artist, double wall) {
+  for (const std::string& path : options.outputs)
+    fmt::print("file {}\n", std::filesystem::absolute(path).lexically_normal().string());
+  fmt::print("pictures {}\n", artist.drawn());
+  fmt::print("pictures_per_second {:.4g}\n", artist.drawn() / wall);
+}
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Of the cached run, the pictures that were asked for.
+std::vector<int> cachedNumbers(const CacheReader& cache, const Wanted& wanted, const RenderOptions& options) {
+  std::vector<int> numbers;
+  for (const double time : wanted.times) {
+    const double number = time * cache.layout().fps;
+    if (std::abs(number - std::round(number)) > 1e-6)
+      throw inputError(options.cachePath, 0,
+                       fmt::format("holds pictures every 1/{:g} s, none at {:g} s", cache.layout().fps, time));
+    numbers.push_back(static_cast<int>(std::lround(number)));
+    if (numbers.back() >= cache.pictures())
+      throw inputError(options.cachePath, 0,
+                       fmt::format("holds pictures 0 to {}, not picture {}", cache.pictures() - 1, numbers.back()));
+  }
+  return numbers;
+}
+
+void requireOwnCache(const CacheReader& cache, const LoadedScene& loaded, const RenderOptions& options) {
+  const CacheLayout expected = cacheLayout(loaded);
+  const CacheLayout& found = cache.layout();
+  if (found.motionHash != expected.motionHash || found.bodies != expected.bodies || found.tools != expected.tools)
+    throw inputError(
+        options.cachePath, 0,
+        fmt::format("is of another scene or stale: {}, a file that it names, an override or the program has "
+                    "changed; write it anew with medulla replay --cache",
+                    loaded.scene.path));
+  if (found.fps != expected.fps)
+    throw inputError(options.cachePath, 0,
+                     fmt::format("holds {:g} pictures per second, expected {:g}", found.fps, expected.fps));
+}
+
+void renderCache(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, StageTimes& times) {
+  CacheReader cache(options.cachePath);
+  requireOwnCache(cache, loaded, options);
+  const std::vector<int> numbers = cachedNumbers(cache, wanted, options);
+  PictureState state;
+  cache.read(0, state);  // the first picture is the scene at rest
+  Artist artist(loaded, options, wanted, state.frame, times);
+  const auto start = std::chrono::steady_clock::now();
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    checkInterrupt();
+    times.start("read cache");
+    cache.read(numbers[k], state);
+    artist.draw(wanted.first + static_cast<int>(k), state);
+  }
+  artist.finish();
+  printFiles(options, artist, secondsSince(start));
+  fmt::print("hash {:016x}\n", cache.finalHash());
+}
+
+void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, StageTimes& times) {
+  Simulation simulation(loaded);
+  Artist artist(loaded, options, wanted, simulation.current(), times);
+  PictureTimes pictures(wanted.times, wanted.first);
+  const double cpuStart = processCpuSeconds();
+  const auto start = std::chrono::steady_clock::now();
+  times.start("simulate");
+  const auto afterFrame = [&] {
+    pictures.afterFrame(simulation, [&](int number, const PictureState& state) { artist.draw(number, state); });
+    times.start("simulate");
+  };
+  runToEnd(loaded, options.run, simulation, afterFrame, [&] { artist.finish(); });
+  const double wall = secondsSince(start);
+  printFiles(options, artist, wall);
+  printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));
 }
 
 }  // namespace
 
 int runRender(const RenderOptions& options) {
+  StageTimes times;
+  times.start("start");
   LoadedScene loaded = loadRun(options.run);
   applyOverrides(options, loaded.scene);
-  const Scene& scene = loaded.scene;
-  const std::pair<int, int> range = frameRange(options, scene);
-  const int first = range.first, last = range.second;  // the lambda below: clang 14 captures no structured bindings
-
+  const Wanted wanted = wantedOf(options, loaded.scene);
   requireDistinctOutputs(loaded, options.run, options.outputs);
-  Simulation simulation(loaded);
-  PictureOutputs outputs(options.outputs, scene.width, scene.height, scene.fps);
-  Renderer renderer({.width = scene.width, .height = scene.height, .context = options.context});
-  const SceneView view(loaded, simulation.current(), renderer);
-
-  Progress progress("render", last - first, "pictures");
-  const double cpuStart = processCpuSeconds();
-  const auto start = std::chrono::steady_clock::now();
-  PictureState state;
-  Picture picture;
-  Image image;
-  int next = first;
-  const auto drawFrame = [&] {
-    const double end = simulation.record().start + simulation.record().duration;
-    for (; next < last && next / scene.fps <= end + 1e-9; ++next) {
-      stateAt(simulation.record(), next / scene.fps, state);
-      view.compose(state, options.view, picture);
-      renderer.render(picture, image);
-      outputs.write(next, image);
-      progress.update(next - first + 1);
-    }
-  };
-  runToEnd(loaded, options.run, simulation, drawFrame, [&] { outputs.finish(); });
-  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  for (const std::string& path : options.outputs)
-    fmt::print("file {}\n", fs::absolute(path).lexically_normal().string());
-  fmt::print("pictures {}\n", last - first);
-  fmt::print("pictures_per_second {:.4g}\n", (last - first) / wall);
-  printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));
+  requireDistinctFiles(options.outputs, {options.cachePath});
+  if (options.still) loaded.scene.duration = *options.still;  // nothing later is asked for
+  if (options.cachePath.empty())
+    renderRun(loaded, options, wanted, times);
+  else
+    renderCache(loaded, options, wanted, times);
+  if (options.timings) printTimings(times, static_cast<int>(wanted.times.size()));
   return 0;
 }
 

@@ -1,23 +1,19 @@
 #include "app/commands/run.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
+#include "app/files/content_hash.h"
 #include "app/files/log_file.h"
+#include "app/files/state_cache.h"
 #include "app/files/surface_file.h"
+#include "app/files/text_file.h"
 #include "app/interrupt.h"
 
 namespace medulla {
-
-double processCpuSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) { return double(t.tv_sec) + 1e-6 * double(t.tv_usec); };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
 
 void recordFrames(const Simulation& simulation, bool last, std::vector<RecordedFrame>& moments) {
   const double start = simulation.previous().time, end = simulation.current().time;
@@ -27,6 +23,19 @@ void recordFrames(const Simulation& simulation, bool last, std::vector<RecordedF
     const double alpha = std::clamp((m.time - start) / (end - start), 0.0, 1.0);
     blendFrames(simulation.previous(), simulation.current(), alpha, m.frame);
   }
+}
+
+CacheLayout cacheLayout(const LoadedScene& loaded) {
+  CacheLayout layout;
+  layout.motionHash = runHash(loaded, false);
+  layout.fps = loaded.scene.fps;
+  for (std::size_t b = 0; b < loaded.models.size(); ++b) {
+    const SoftBodyModel& model = *loaded.models[b];
+    layout.bodies.push_back({loaded.scene.bodies[b].name, static_cast<int>(model.spheres.size()),
+                             static_cast<int>(model.restNodes.size())});
+  }
+  for (const SceneTool& tool : loaded.scene.tools) layout.tools.push_back(tool.name);
+  return layout;
 }
 
 LoadedScene loadRun(const RunOptions& options) {
@@ -105,6 +114,26 @@ class RestWatch {
   bool atRest_ = false;
 };
 
+class CacheRecorder {
+ public:
+  CacheRecorder(const LoadedScene& loaded, const RunOptions& options)
+      : pictures_(pictureTimes(loaded.scene, 0, pictureCount(loaded.scene)), 0) {
+    if (!options.cachePath.empty()) file_.emplace(options.cachePath, cacheLayout(loaded));
+  }
+  void afterFrame(const Simulation& simulation) {
+    if (!file_) return;
+    pictures_.afterFrame(simulation,
+                         [&](int, const PictureState& state) { file_->write(state, simulation.world().stateHash()); });
+  }
+  void commit(const Simulation& simulation) {
+    if (file_) file_->commit(simulation.world().stateHash());
+  }
+
+ private:
+  std::optional<CacheWriter> file_;
+  PictureTimes pictures_;
+};
+
 class LogRecorder {
  public:
   LogRecorder(const LoadedScene& loaded, const RunOptions& options) : everyTick_(options.logEveryTick) {
@@ -145,31 +174,64 @@ class LogRecorder {
 
 }  // namespace
 
-void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options,
-                            const std::vector<std::string>& pictures) {
-  const Scene& scene = loaded.scene;
-  std::vector<std::string> inputs{options.scene}, outputs = pictures;
+// Every file that a run reads; some may be empty or missing.
+static std::vector<std::string> inputFiles(const Scene& scene) {
+  std::vector<std::string> inputs{scene.path};
   for (const SceneBody& body : scene.bodies) {
-    inputs.insert(inputs.end(), {body.modelPath, body.referencePath});
-    if (!body.referencePath.empty())
-      inputs.push_back(std::filesystem::path(body.referencePath).replace_extension(".time").string());
-  }
-  for (const SceneStatic& item : scene.statics)
-    if (!item.meshPath.empty()) inputs.push_back(item.meshPath);
-  for (const SceneTool& tool : scene.tools) inputs.push_back(tool.trajectoryPath);
-  for (const SceneBody& body : scene.bodies) {
+    inputs.push_back(body.modelPath);
     for (const SceneFix& fix : body.fixes) inputs.push_back(fix.nodes.verticesPath);
     for (const SceneLoad& load : body.loads) inputs.insert(inputs.end(), {load.nodes.verticesPath, load.forcesPath});
+    if (body.referencePath.empty()) continue;
+    inputs.push_back(body.referencePath);
+    inputs.push_back(std::filesystem::path(body.referencePath).replace_extension(".time").string());
   }
+  for (const SceneStatic& item : scene.statics) inputs.push_back(item.meshPath);
+  for (const SceneTool& tool : scene.tools) inputs.push_back(tool.trajectoryPath);
+  std::erase(inputs, "");
+  return inputs;
+}
+
+void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options,
+                            const std::vector<std::string>& pictures) {
+  std::vector<std::string> outputs = pictures;
   outputs.push_back(options.logPath);
+  outputs.push_back(options.cachePath);
   for (const SurfaceRequest& request : options.surfaces) outputs.push_back(request.path);
-  requireDistinctFiles(outputs, inputs);
+  requireDistinctFiles(outputs, inputFiles(loaded.scene));
+}
+
+// The scene counts by what it says, the files that it names by their bytes: where they lie does not matter.
+std::uint64_t runHash(const LoadedScene& loaded, bool whole) {
+  const std::uint64_t scene = whole ? loaded.scene.contentHash : loaded.scene.motionHash;
+  std::uint64_t hash = contentHash(fmt::format("{} {:016x}", MEDULLA_VERSION, scene));
+  for (const std::string& path : inputFiles(loaded.scene))
+    if (path != loaded.scene.path && std::filesystem::exists(path)) hash = contentHash(readTextFile(path), hash);
+  return hash;
+}
+
+int pictureCount(const Scene& scene) {
+  return static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9));
+}
+
+std::vector<double> pictureTimes(const Scene& scene, int first, int last) {
+  std::vector<double> times;
+  for (int k = first; k < last; ++k) times.push_back(k / scene.fps);
+  return times;
+}
+
+void PictureTimes::afterFrame(const Simulation& simulation, const std::function<void(int, const PictureState&)>& each) {
+  const double end = simulation.record().start + simulation.record().duration;
+  for (; next_ < times_.size() && times_[next_] <= end + 1e-9; ++next_) {
+    stateAt(simulation.record(), times_[next_], state_);
+    each(firstNumber_ + static_cast<int>(next_), state_);
+  }
 }
 
 void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
               const std::function<void()>& afterFrame, const std::function<void()>& finish) {
   SurfaceRecorder surfaces(loaded, options);
   LogRecorder log(loaded, options);
+  CacheRecorder cache(loaded, options);
   RestWatch rest(loaded);
   for (const BodyOverlap& o : simulation.world().startOverlaps())
     fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n",
@@ -182,10 +244,12 @@ void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& 
     last = simulation.finished() || rest.atRest();
     log.afterFrame(simulation);
     surfaces.afterFrame(simulation, last);
+    cache.afterFrame(simulation);
     afterFrame();
   }
   if (finish) finish();
   log.commit();
+  cache.commit(simulation);
   surfaces.write(simulation);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <optional>
@@ -8,7 +9,9 @@
 #include <vector>
 
 #include "app/files/report_file.h"
+#include "app/files/state_cache.h"
 #include "app/simulation.h"
+#include "render/stage_times.h"
 
 // What `replay` and `render` share: a scene run to its end in logical time, with its log and surface files.
 namespace medulla {
@@ -25,6 +28,7 @@ struct RunOptions {
   std::string logPath;
   bool logEveryTick = false;
   std::vector<SurfaceRequest> surfaces;
+  std::string cachePath;   // what every picture shows, for `render --cache`; empty: none
   bool untilRest = false;  // ends when nothing moves any more; the scene's duration is the longest it may take
 };
 
@@ -42,8 +46,30 @@ struct RecordedFrame {
 // Fills in those moments that the last dynamics frame has reached; all that are still open after the `last` one.
 void recordFrames(const Simulation& simulation, bool last, std::vector<RecordedFrame>& moments);
 
-// Process CPU time over all threads, s.
-double processCpuSeconds();
+// The pictures of a run in order, each once the simulation has passed its time.
+class PictureTimes {
+ public:
+  PictureTimes(std::vector<double> times, int firstNumber) : times_(std::move(times)), firstNumber_(firstNumber) {}
+  // Calls `each` with the picture's number and its state (reused) for those that the last dynamics frame has reached.
+  void afterFrame(const Simulation& simulation, const std::function<void(int, const PictureState&)>& each);
+
+ private:
+  std::vector<double> times_;  // s, increasing
+  int firstNumber_;
+  std::size_t next_ = 0;
+  PictureState state_;
+};
+
+// Pictures [first, last) of a scene at its own rate; how many it has in all.
+std::vector<double> pictureTimes(const Scene& scene, int first, int last);
+int pictureCount(const Scene& scene);
+
+// What tells one run from another: everything that its motion follows from, this program's version included; or with
+// `whole` everything that its pictures do, but for options of the drawing.
+std::uint64_t runHash(const LoadedScene& loaded, bool whole);
+
+// Of a cache of this run.
+CacheLayout cacheLayout(const LoadedScene& loaded);
 
 LoadedScene loadRun(const RunOptions& options);
 

@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <set>
 #include <sstream>
+#include <string_view>
 
+#include "app/files/content_hash.h"
 #include "app/files/scene_overrides.h"
 #include "app/files/scene_rules.h"
 #include "app/files/xml_element.h"
@@ -414,6 +416,25 @@ void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene)
   }
 }
 
+// Each name, value and text ends in a zero, each element in two: so no two trees have the same bytes.
+std::uint64_t hashOf(const XmlElement& e, bool motionOnly, std::uint64_t hash) {
+  const auto add = [&hash](const std::string& word) {
+    hash = contentHash(std::string_view("\0", 1), contentHash(word, hash));
+  };
+  add(e.name);
+  for (const XmlAttribute& a : e.attributes) {
+    if (motionOnly && a.name == "look") continue;
+    add(a.name);
+    add(a.value);
+  }
+  add(e.text);
+  for (const XmlElement& child : e.children) {
+    const bool drawing = child.name == "camera" || child.name == "light" || child.name == "output";
+    if (!(motionOnly && drawing)) hash = hashOf(child, motionOnly, hash);
+  }
+  return contentHash(std::string_view("\0", 1), hash);
+}
+
 }  // namespace
 
 Scene readScene(const std::string& path, const std::vector<SceneOverride>& overrides) {
@@ -432,6 +453,8 @@ Scene readScene(const std::string& path, const std::vector<SceneOverride>& overr
   readCamera(onlyChild(root, "camera"), scene);
   readLight(onlyChild(root, "light"), scene);
   readOutput(onlyChild(root, "output"), durationOverridden, scene);
+  scene.contentHash = hashOf(root, false, contentHash({}));
+  scene.motionHash = hashOf(root, true, contentHash({}));
   return scene;
 }
 

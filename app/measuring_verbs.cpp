@@ -1,0 +1,109 @@
+#include <algorithm>
+#include <memory>
+
+#include "app/commands/commands.h"
+#include "app/files/number_text.h"
+#include "app/verbs.h"
+
+// The verbs that hold methods, steps and models against each other.
+namespace medulla {
+
+namespace {
+
+struct ChartArguments {
+  RunArguments run;
+  ChartOptions options;
+  std::vector<std::string> steps = {"0.1", "0.2", "0.5", "1", "2", "5", "10", "20"};
+};
+
+std::vector<double> numbersOf(const std::string& option, const std::vector<std::string>& words, double low, double high,
+                              double unit, const std::string& expected) {
+  std::vector<double> out;
+  for (const std::string& word : words) {
+    const auto value = parseNumber<double>(word);
+    if (!value || *value < low || *value > high) usageError(option, word, expected);
+    out.push_back(unit * *value);
+  }
+  return out;
+}
+
+std::vector<double> stepsOf(const std::string& option, const std::vector<std::string>& words) {
+  return numbersOf(option, words, 1e-3, 50, 1e-3, "milliseconds from 0.001 to 50");
+}
+
+ChartOptions chartOptions(const ChartArguments& a) {
+  ChartOptions options = a.options;
+  options.run = runOptions(a.run);
+  options.steps = stepsOf("--steps", a.steps);
+  return options;
+}
+
+struct StabilityArguments {
+  RunArguments run;
+  StabilityOptions options;
+  std::vector<std::string> steps = {"0.1", "0.5", "2", "10", "50"}, trialSteps = {"1", "10", "50"},
+                           young = {"1e2", "1e3", "1e4", "1e5", "1e6", "1e7", "1e8", "1e9"};
+};
+
+StabilityOptions stabilityOptions(const StabilityArguments& a) {
+  StabilityOptions options = a.options;
+  options.run = runOptions(a.run);
+  options.steps = stepsOf("--steps", a.steps);
+  options.trialSteps = stepsOf("--trial-steps", a.trialSteps);
+  options.young = numbersOf("--young", a.young, 1e-3, 1e12, 1, "Pa from 0.001 to 1e12");
+  return options;
+}
+
+}  // namespace
+
+Verb addChart(CLI::App& app) {
+  const auto arguments = std::make_shared<ChartArguments>();
+  ChartArguments& a = *arguments;
+  CLI::App* c =
+      app.add_subcommand("chart", "run a scene by several methods and steps, and draw their time against their error");
+  addSceneOptions(*c, a.run);
+  c->add_option(
+       "-o,--output", a.options.folder,
+       "folder for chart.csv, .gnuplot and .svg, and of several --models spheres.csv, .gnuplot and .svg; made where "
+       "missing")
+      ->type_name("DIR")
+      ->required();
+  c->add_option("--steps", a.steps, "substeps to run with, ms; the nearest whole shares of a dynamics frame are taken")
+      ->type_name("MS,MS,...")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->capture_default_str();
+  a.options.methods = chartMethodNames();
+  c->add_option("--methods", a.options.methods,
+                "curves; the first method's finest run is the reference where no body names one")
+      ->check(CLI::IsMember(chartMethodNames()))
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->capture_default_str();
+  c->add_option("--models", a.options.models,
+                "models of the same mesh with other numbers of spheres, for curves of their own (repeatable)")
+      ->type_name("[BODY=]FILE")
+      ->allow_extra_args(false);
+  return {c, [arguments] { return runChart(chartOptions(*arguments)); }};
+}
+
+Verb addStability(CLI::App& app) {
+  const auto arguments = std::make_shared<StabilityArguments>();
+  StabilityArguments& a = *arguments;
+  CLI::App* c =
+      app.add_subcommand("stability", "torture a scene's first body by every method and step, and draw what survives");
+  addSceneOptions(*c, a.run);
+  c->add_option("-o,--output", a.options.folder,
+                "folder for map.csv, trials.csv, stability.gnuplot and stability.svg; made where missing")
+      ->type_name("DIR")
+      ->required();
+  const auto addList = [&](const char* name, std::vector<std::string>& values, const char* help, const char* type) {
+    c->add_option(name, values, help)->type_name(type)->delimiter(',')->allow_extra_args(false)->capture_default_str();
+  };
+  addList("--steps", a.steps, "steps of the map, ms", "MS,MS,...");
+  addList("--young", a.young, "stiffnesses of the map, Pa", "PA,PA,...");
+  addList("--trial-steps", a.trialSteps, "steps of the trials, ms", "MS,MS,...");
+  return {c, [arguments] { return runStability(stabilityOptions(*arguments)); }};
+}
+
+}  // namespace medulla

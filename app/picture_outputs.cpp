@@ -1,0 +1,143 @@
+#include "app/picture_outputs.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "app/files/output_file.h"
+#include "app/files/text_file.h"
+
+namespace medulla {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kRunFile = "run";  // in the folder where pictures collect: which run's they are
+
+std::string withoutSlash(std::string path) {
+  while (path.size() > 1 && path.back() == '/') path.pop_back();
+  return path;
+}
+
+std::string pngName(int number) {
+  return fmt::format("{:05d}.png", number);
+}
+
+// A file that a power cut left short has its name already; its last chunk is missing then.
+bool isWholePng(const fs::path& path) {
+  constexpr char end[] = {0, 0, 0, 0, 'I', 'E', 'N', 'D', '\xae', '\x42', '\x60', '\x82'};
+  std::ifstream file(path, std::ios::binary);
+  char last[sizeof end] = {};
+  return file.seekg(-std::streamoff(sizeof end), std::ios::end) && file.read(last, sizeof last) &&
+         std::memcmp(last, end, sizeof end) == 0;
+}
+
+}  // namespace
+
+PngFolder::PngFolder(const std::string& path, const Slice& slice)
+    : folder_(path),
+      collecting_(fmt::format("{}.{}-{}.part", withoutSlash(path), slice.first, slice.last)),
+      keep_(slice.resume) {
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  if (!error) fs::create_directory(collecting_, error);
+  if (error) throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", path, error.message()));
+  try {
+    lock();
+    takeOver(slice);
+  } catch (...) {
+    if (lock_ >= 0) close(lock_);
+    fs::remove(folder_, error);  // only if it is empty
+    throw;
+  }
+}
+
+void PngFolder::lock() {
+  lock_ = open(collecting_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (lock_ >= 0 && flock(lock_, LOCK_EX | LOCK_NB) == 0) return;
+  const bool taken = errno == EWOULDBLOCK;
+  throw std::runtime_error(fmt::format("{}: {}", collecting_.string(),
+                                       taken ? "another run is drawing these pictures" : std::strerror(errno)));
+}
+
+void PngFolder::takeOver(const Slice& slice) const {
+  const std::string run = fmt::format("{:016x}\n", slice.run);
+  const fs::path name = collecting_ / kRunFile;
+  const bool same = fs::exists(name) && readTextFile(name.string()) == run;
+  if (slice.resume && fs::exists(name) && !same)
+    throw std::runtime_error(fmt::format(
+        "{}: holds pictures of another run, by its scene, options or OpenGL: remove it, or render without --resume",
+        collecting_.string()));
+  for (const auto& entry : fs::directory_iterator(collecting_)) {
+    const bool picture = entry.path().extension() == ".png" && isWholePng(entry.path());
+    if (!(slice.resume && same && picture)) fs::remove_all(entry.path());
+  }
+  writeText(name.string(), run);
+}
+
+PngFolder::~PngFolder() {
+  std::error_code ignored;
+  if (!keep_) fs::remove_all(collecting_, ignored);
+  fs::remove(folder_, ignored);  // only if nothing came into it
+  close(lock_);
+}
+
+bool PngFolder::has(int number) const {
+  return fs::exists(collecting_ / pngName(number));
+}
+
+void PngFolder::write(int number, const Image& image) const {
+  writePng((collecting_ / pngName(number)).string(), image);
+}
+
+void PngFolder::finish() {
+  std::vector<fs::path> pictures;
+  for (const auto& entry : fs::directory_iterator(collecting_))
+    if (entry.path().extension() == ".png") pictures.push_back(entry.path());
+  fs::create_directories(folder_);  // another slice that failed may have taken it away
+  for (const fs::path& picture : pictures) fs::rename(picture, folder_ / picture.filename());
+  keep_ = false;
+}
+
+PictureOutputs::PictureOutputs(const std::vector<std::string>& paths, const Settings& settings) {
+  for (const std::string& path : paths) {
+    const std::string extension = fs::path(path).extension().string();
+    if (settings.still) {
+      if (extension != ".png") throw std::runtime_error(path + ": expected FILE.png for a still");
+      const OutputFile writableAtAll(path);
+      stills_.push_back(path);
+    } else if (isVideoName(path)) {
+      videos_.emplace_back(path, settings.width, settings.height, settings.fps);
+    } else if (!extension.empty() && !fs::is_directory(path)) {
+      throw std::runtime_error(path + ": expected FILE.mp4, .webm, .gif or .webp, or a folder for PNG files");
+    } else {
+      folders_.push_back(std::make_unique<PngFolder>(path, settings.slice));
+    }
+  }
+}
+
+bool PictureOutputs::has(int number) const {
+  return videos_.empty() && stills_.empty() &&
+         std::all_of(folders_.begin(), folders_.end(), [number](const auto& folder) { return folder->has(number); });
+}
+
+void PictureOutputs::write(int number, const Image& image) {
+  for (VideoWriter& video : videos_) video.write(image);
+  for (const auto& folder : folders_) folder->write(number, image);
+  if (!stills_.empty()) still_ = image;
+}
+
+void PictureOutputs::finish() {
+  for (VideoWriter& video : videos_) video.finish();
+  for (const auto& folder : folders_) folder->finish();
+  for (const std::string& path : stills_) writePng(path, still_);
+}
+
+}  // namespace medulla

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/video_writer.h"
+
+namespace medulla {
+
+// A folder of numbered PNG files. They collect in DIR.A-B.part beside it and move in when all are there: a run that
+// ends early harms no earlier picture. Runs of other slices may fill the same folder at the same time.
+class PngFolder {
+ public:
+  struct Slice {
+    int first = 0, last = 0;  // pictures [first, last)
+    std::uint64_t run = 0;    // of all that the pictures follow from
+    bool resume = false;      // takes over what an ended run left of the same pictures, and leaves its own
+  };
+  // Throws std::runtime_error where the folder cannot be made, where another process is at this slice, and where what
+  // is to be resumed belongs to another run.
+  PngFolder(const std::string& path, const Slice& slice);
+  ~PngFolder();
+  PngFolder(const PngFolder&) = delete;
+  PngFolder& operator=(const PngFolder&) = delete;
+  bool has(int number) const;  // drawn before, and whole
+  void write(int number, const Image& image) const;
+  void finish();
+
+ private:
+  void lock();
+  void takeOver(const Slice& slice) const;
+
+  std::filesystem::path folder_, collecting_;
+  bool keep_;
+  int lock_ = -1;
+};
+
+// Where pictures go: any number of videos and folders of numbered PNG files; of a still, PNG files.
+class PictureOutputs {
+ public:
+  struct Settings {
+    int width = 0, height = 0;
+    double fps = 0;
+    bool still = false;
+    PngFolder::Slice slice;
+  };
+  // Throws std::runtime_error naming the path that cannot be written or is none of these.
+  PictureOutputs(const std::vector<std::string>& paths, const Settings& settings);
+  bool has(int number) const;  // nobody needs this picture any more
+  void write(int number, const Image& image);
+  void finish();
+
+ private:
+  std::vector<VideoWriter> videos_;
+  std::vector<std::unique_ptr<PngFolder>> folders_;
+  std::vector<std::string> stills_;
+  Image still_;
+};
+
+}  // namespace medulla

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "app/commands/run.h"
+
+// What the verbs of the command line share.
+namespace medulla {
+
+// A verb with what it does once its words are parsed: options that contradict each other are usage errors, too.
+struct Verb {
+  CLI::App* command;
+  std::function<int()> run;
+};
+
+[[noreturn]] void usageError(const std::string& option, const std::string& value, const std::string& expected);
+
+// Options as typed; turned into RunOptions after parsing.
+struct RunArguments {
+  std::string scene, log, logRate = "frame";
+  std::vector<std::string> sets, trajectories;
+  std::vector<std::vector<std::string>> surfaces;
+};
+void addSceneOptions(CLI::App& command, RunArguments& a);  // SCENE, --set, --trajectory
+RunOptions runOptions(const RunArguments& a);
+
+// measuring_verbs.cpp
+Verb addChart(CLI::App& app);
+Verb addStability(CLI::App& app);
+
+}  // namespace medulla

@@ -1,0 +1,203 @@
+#include "app/picture_outputs.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/own_scene.h"
+
+// Where pictures go, through the program: the same bytes however a run is cut up, and nothing half-finished under a
+// final name.
+namespace medulla {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Outputs : public OwnScene {
+ protected:
+  ProgramResult render(const std::vector<std::string>& more, const ProgramOptions& options = {}) const {
+    std::vector<std::string> words{"render", "own/organ.xml"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words, options);
+  }
+  // PNG bytes of pictures [0, count), by number.
+  std::vector<std::string> pictures(const std::string& name, int count) const {
+    std::vector<std::string> out;
+    for (int n = 0; n < count; ++n) out.push_back(read(fmt::format("{}/{:05d}.png", name, n)));
+    return out;
+  }
+  std::vector<std::string> contents() const {  // but for the scene
+    std::vector<std::string> names = folder.contents();
+    std::erase(names, "own");
+    return names;
+  }
+};
+
+TEST_F(Outputs, BytesDependOnNeitherRunNorThreadsNorContext) {
+  ProgramOptions alone;
+  alone.environment = {{"LP_NUM_THREADS", "0"}};
+  ProgramOptions one, two;
+  one.environment = {{"LP_NUM_THREADS", "1"}};
+  two.environment = {{"LP_NUM_THREADS", "2"}};
+  ASSERT_EQ(render({"-o", "a"}, two).exitCode, 0);
+  ASSERT_EQ(render({"-o", "b"}, one).exitCode, 0);
+  ASSERT_EQ(render({"-o", "c", "--context", "osmesa"}, alone).exitCode, 0);
+  const std::vector<std::string> expected = pictures("a", 12);
+  EXPECT_GT(expected[11].size(), 1000u);
+  EXPECT_EQ(pictures("b", 12), expected);
+  EXPECT_EQ(pictures("c", 12), expected);
+  const ProgramResult egl = render({"-o", "d", "--context", "egl"});
+  if (egl.exitCode == 1 && egl.err.find("no OpenGL context") != std::string::npos)
+    GTEST_SKIP() << "EGL cannot start here: " << egl.err;
+  EXPECT_EQ(pictures("d", 12), expected);
+}
+
+TEST_F(Outputs, AKilledRunIsResumedToTheSameBytes) {
+  write({.golden = "0", .duration = 2});
+  const std::vector<std::string> small{"--size", "64x48", "-o", "frames", "--resume"};
+  const fs::path collecting = folder / "frames.0-50.part";
+  ProgramOptions killed;
+  killed.signal = SIGKILL;
+  killed.interruptWhen = [&] { return fs::exists(collecting / "00006.png"); };
+  EXPECT_EQ(render(small, killed).exitCode, 128 + SIGKILL);
+  ASSERT_TRUE(fs::exists(collecting / "00005.png"));
+  EXPECT_FALSE(fs::exists(folder / "frames/00000.png"));
+  // As a power cut would leave them: a name without its bytes, and a file under a temporary name.
+  fs::resize_file(collecting / "00003.png", 50);
+  folder.write("frames.0-50.part/00049.png.partial-1", "x");
+  const auto earlier = fs::last_write_time(collecting / "00005.png");
+
+  // ^C keeps them, too.
+  ProgramOptions interrupted;
+  interrupted.interruptWhen = [&] { return fs::exists(collecting / "00020.png"); };
+  EXPECT_EQ(render(small, interrupted).exitCode, 130);
+  EXPECT_EQ(fs::last_write_time(collecting / "00005.png"), earlier);
+
+  expectRefused(render({"--size", "64x48", "-o", "frames", "--resume", "--view", "model"}), "pictures of another run");
+  const ProgramResult rest = render(small);
+  ASSERT_EQ(rest.exitCode, 0) << rest.err;
+  EXPECT_EQ(rest.out.find("pictures 50\n"), std::string::npos) << rest.out;
+  ASSERT_EQ(render({"--size", "64x48", "-o", "whole"}).exitCode, 0);
+  EXPECT_EQ(pictures("frames", 50), pictures("whole", 50));
+  EXPECT_EQ(contents().size(), 2u);
+}
+
+TEST_F(Outputs, WithoutResumeWhatAKilledRunLeftIsDrawnAnew) {
+  folder.write("x", "");
+  fs::create_directory(folder / "frames.0-12.part");
+  folder.write("frames.0-12.part/00000.png", "left by a killed run");
+  ASSERT_EQ(render({"--size", "64x48", "-o", "frames"}).exitCode, 0);
+  EXPECT_EQ(read("frames/00000.png").substr(1, 3), "PNG");
+  EXPECT_FALSE(fs::exists(folder / "frames.0-12.part"));
+}
+
+TEST_F(Outputs, TwoRunsDoNotDrawTheSamePicturesAtOnce) {
+  Image image{16, 16, std::vector<std::uint8_t>(4 * 16 * 16, 200)};
+  PngFolder first(folder / "frames", {.first = 0, .last = 12, .run = 1});
+  first.write(0, image);
+  expectRefused(render({"--size", "64x48", "-o", "frames"}), "another run is drawing these pictures");
+  EXPECT_EQ(render({"--size", "64x48", "--frames", "1:3", "-o", "frames"}).exitCode, 0);
+  first.finish();
+  EXPECT_TRUE(fs::exists(folder / "frames/00000.png"));
+  EXPECT_TRUE(fs::exists(folder / "frames/00002.png"));
+}
+
+TEST_F(Outputs, SeveralScenesInOneProcessHaveFilesOfTheirOwn) {
+  folder.write("own/second.xml", read("own/organ.xml"));
+  const ProgramResult both = run({"render", "own/organ.xml", "own/second.xml", "-o", "{scene}", "-o", "{scene}.gif",
+                                  "--log", "{scene}.csv", "--size", "64x48"});
+  ASSERT_EQ(both.exitCode, 0) << both.err;
+  ASSERT_EQ(render({"--size", "64x48", "-o", "alone"}).exitCode, 0);
+  EXPECT_EQ(pictures("organ", 12), pictures("alone", 12));
+  EXPECT_EQ(pictures("second", 12), pictures("alone", 12));
+  EXPECT_EQ(read("organ.csv"), read("second.csv"));
+  EXPECT_EQ(read("second.gif").substr(0, 6), "GIF89a");
+  expectRefused(run({"render", "own/organ.xml", "own/second.xml", "-o", "film.mp4"}), "{scene}", 2);
+  expectRefused(run({"render", "own/organ.xml", "own/organ.xml", "-o", "{scene}.mp4"}), "two outputs");
+}
+
+TEST_F(Outputs, AStillIsThePictureOfItsTimeAndAveragesFourTimesThePixels) {
+  ASSERT_EQ(render({"-o", "frames", "--frames", "8:9"}).exitCode, 0);
+  ASSERT_EQ(render({"--still", "0.32", "--quality", "standard", "-o", "a.png"}).exitCode, 0);
+  EXPECT_EQ(read("a.png"), read("frames/00008.png"));
+  ASSERT_EQ(render({"--still", "0.32"}).exitCode, 0);  // organ.png, the best
+  const Image best = readPng(folder / "organ.png"), standard = readPng(folder / "a.png");
+  EXPECT_EQ(best.width, 320);
+  const ImageDifference d = compareImages(best, standard);
+  EXPECT_GT(d.psnr, 24);  // the same picture
+  EXPECT_LT(d.psnr, 50);  // and another
+  ASSERT_EQ(render({"--still", "0.32", "--quality", "draft", "-o", "draft.png"}).exitCode, 0);
+  EXPECT_FALSE(compareImages(readPng(folder / "draft.png"), standard).equal);
+  expectRefused(render({"--still", "0.5", "-o", "b.png"}), "--still 0.5: expected a time from 0 to 0.48 s");
+  expectRefused(render({"--still", "0", "-o", "b.mp4"}), "b.mp4: expected FILE.png");
+  expectRefused(render({"--still", "-1", "-o", "b.png"}), "--still", 2);
+  EXPECT_FALSE(fs::exists(folder / "b.png"));
+}
+
+TEST_F(Outputs, FourKIsDrawn) {
+  ASSERT_EQ(render({"--still", "0", "--size", "3840x2160", "--quality", "standard"}).exitCode, 0);
+  const Image image = readPng(folder / "organ.png");
+  EXPECT_EQ(image.width, 3840);
+  EXPECT_EQ(image.height, 2160);
+}
+
+TEST_F(Outputs, SizesThatCannotBeDrawnAreRefused) {
+  for (const char* size : {"0x0", "0x480", "20000x720", "640x20000", "641x480", "640x481", "-640x480", "14x16"})
+    expectRefused(render({"--size", size, "-o", "a.mp4"}), std::string("--size ") + size);
+  expectRefused(render({"--set", "output.size=641 480", "-o", "a.mp4"}), "even");
+  EXPECT_TRUE(contents().empty());
+}
+
+TEST_F(Outputs, AFullDiskStopsTheRunAndLeavesNothing) {
+  ProgramOptions full;
+  full.fileSizeLimit = 1000;
+  for (const char* name : {"a.mp4", "a.webm", "a.gif", "a.webp", "frames", "frames --resume"}) {
+    const bool resume = std::string(name).find("resume") != std::string::npos;
+    std::vector<std::string> words{"--size", "96x64", "-o", resume ? "frames" : name};
+    if (resume) words.push_back("--resume");
+    expectRefused(render(words, full), "File too large");
+    if (resume) fs::remove_all(folder / "frames.0-12.part");  // the pictures before, for another try
+    EXPECT_TRUE(contents().empty()) << name << " left " << contents()[0];
+  }
+  expectRefused(render({"--still", "0", "-o", "a.png"}, full), "a.png: cannot be written: File too large");
+  expectRefused(run({"replay", "own/organ.xml", "--cache", "a.cache"}, full),
+                "a.cache: cannot be written: File too large");
+  EXPECT_TRUE(contents().empty());
+}
+
+TEST_F(Outputs, AnEncoderThatDiesStopsTheRun) {
+  fs::create_directory(folder / "bin");
+  folder.write("bin/ffmpeg", "#!/bin/sh\nhead -c 100000 > /dev/null\necho 'it died' >&2\nexit 1\n");
+  fs::permissions(folder / "bin/ffmpeg", fs::perms::owner_all);
+  ProgramOptions options;
+  options.path = folder / "bin:/bin:/usr/bin";
+  expectRefused(render({"-o", "a.mp4", "-o", "frames"}, options), "a.mp4: ffmpeg failed: it died");
+  EXPECT_EQ(contents(), std::vector<std::string>{"bin"});
+}
+
+TEST_F(Outputs, WithoutAnyContextTheReasonsAreSaid) {
+  ProgramOptions none;  // Mesa is told to offer OpenGL 2.1 alone
+  none.environment = {{"MESA_GL_VERSION_OVERRIDE", "2.1"}};
+  expectRefused(render({"-o", "frames"}, none), "no OpenGL context to draw with: osmesa: ");
+  expectRefused(render({"-o", "frames"}, none), "; egl: ");
+  expectRefused(render({"-o", "frames", "--context", "egl"}, none), "no OpenGL context to draw with: egl: ");
+  EXPECT_TRUE(contents().empty());
+}
+
+TEST_F(Outputs, TimingsGoToStandardError) {
+  const ProgramResult r = render({"-o", "frames", "--size", "64x48", "--timings"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  for (const char* stage : {"stage ", "start ", "simulate ", "compose ", "light ", "draw ", "hand over ", "sum "})
+    EXPECT_NE(("\n" + r.err).find(std::string("\n") + stage), std::string::npos) << stage << " is missing in\n"
+                                                                                 << r.err;
+  EXPECT_EQ(r.out.find("stage"), std::string::npos);
+}
+
+TEST_F(Outputs, WhatCannotBeResumedIsWrongUsage) {
+  expectRefused(render({"--resume"}), "--resume", 2);
+  expectRefused(render({"--resume", "-o", "a.mp4"}), "a.mp4", 2);
+  expectRefused(render({"--still", "0", "--frames", "0:1"}), "--still", 2);
+  folder.write("a.txt", "");
+  expectRefused(render({"-o", "a.txt"}), "expected FILE.mp4, .webm, .gif or .webp, or a folder");
+}
+
+}  // namespace
+}  // namespace medulla
