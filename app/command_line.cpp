@@ -52,7 +52,7 @@ std::optional<std::pair<int, int>> splitPair(const std::string& text, char separ
 // Options as typed; turned into RunOptions after parsing.
 struct RunArguments {
   std::string scene, log, logRate = "frame";
-  std::vector<std::string> sets, trajectories;
+  std::vector<std::string> sets, trajectories, records;
   std::vector<std::vector<std::string>> surfaces;
 };
 
@@ -62,7 +62,10 @@ void addSceneOptions(CLI::App& command, RunArguments& a) {
       .add_option("--set", a.sets, "replace one value of the scene, e.g. body.gallbladder.surface=skin (repeatable)")
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
-  command.add_option("--trajectory", a.trajectories, "read a tool's motion from another file (repeatable)")
+  command
+      .add_option("--trajectory", a.trajectories,
+                  "read a tool's motion from another file: a trajectory (CSV), or XML that describes a recording of "
+                  "another program (repeatable)")
       ->type_name("[TOOL=]FILE")
       ->allow_extra_args(false);
 }
@@ -75,10 +78,27 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
       ->check(CLI::IsMember({"frame", "tick"}))
       ->capture_default_str();
   command
+      .add_option("--record", a.records,
+                  "write a tool's motion and force, tick by tick, as a trajectory; read back by --trajectory it gives "
+                  "the same hash (repeatable)")
+      ->type_name("[TOOL=]FILE")
+      ->allow_extra_args(false);
+  command
       .add_option("--surface-at", a.surfaces, "write the bodies' surfaces at time T (s) or \"end\" as OBJ (repeatable)")
       ->type_name("T FILE.obj")
       ->type_size(2)
       ->allow_extra_args(false);
+}
+
+// From [TOOL=]FILE.
+std::map<std::string, std::string> filesByTool(const std::vector<std::string>& words) {
+  std::map<std::string, std::string> out;
+  for (const std::string& word : words) {
+    const std::size_t equals = word.find('=');
+    const bool named = equals != std::string::npos;
+    out[named ? word.substr(0, equals) : ""] = named ? word.substr(equals + 1) : word;
+  }
+  return out;
 }
 
 RunOptions runOptions(const RunArguments& a) {
@@ -89,13 +109,8 @@ RunOptions runOptions(const RunArguments& a) {
     if (equals == std::string::npos || equals == 0) usageError("--set", set, "PATH=VALUE");
     options.overrides.push_back({set.substr(0, equals), set.substr(equals + 1)});
   }
-  for (const std::string& t : a.trajectories) {
-    const std::size_t equals = t.find('=');
-    if (equals == std::string::npos)
-      options.trajectories[""] = t;
-    else
-      options.trajectories[t.substr(0, equals)] = t.substr(equals + 1);
-  }
+  options.trajectories = filesByTool(a.trajectories);
+  options.records = filesByTool(a.records);
   options.logPath = a.log;
   options.logEveryTick = a.logRate == "tick";
   for (const auto& request : a.surfaces) {

@@ -130,13 +130,14 @@ int runRender(const RenderOptions& options) {
       progress.update(next - first + 1);
     }
   };
-  runToEnd(loaded, options.run, simulation, drawFrame, [&] { outputs.finish(); });
+  const std::vector<Result> forces = runToEnd(loaded, options.run, simulation, drawFrame, [&] { outputs.finish(); });
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   for (const std::string& path : options.outputs)
     fmt::print("file {}\n", fs::absolute(path).lexically_normal().string());
   fmt::print("pictures {}\n", last - first);
   fmt::print("pictures_per_second {:.4g}\n", (last - first) / wall);
   printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));
+  printResults(forces);
   return 0;
 }
 
