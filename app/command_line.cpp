@@ -340,6 +340,16 @@ Verb addCompare(CLI::App& app) {
   return {c, [arguments] { return runCompare(compareOptions(*arguments)); }};
 }
 
+Verb addPlot(CLI::App& app) {
+  const auto options = std::make_shared<PlotOptions>();
+  CLI::App* c = app.add_subcommand(
+      "plot",
+      "draw a log over time: force, penetration, volume, energies, modelled nodes; contact and grab are shaded");
+  c->add_option("LOG", options->log, "log of a run (CSV)")->required();
+  c->add_option("-o,--output", options->output, "picture to write")->type_name("FILE.png|FILE.svg")->required();
+  return {c, [options] { return runPlot(*options); }};
+}
+
 struct ChartArguments {
   RunArguments run;
   ChartOptions options;
@@ -442,8 +452,8 @@ int dispatch(int argc, char** argv) {
   bool version = false;
   app.add_flag("--version", version, "version, and those of Mesa, Embree and the compiler");
   std::vector<Verb> verbs;
-  for (const auto add :
-       {addRender, addReplay, addCheck, addInfo, addBuild, addNew, addGolden, addCompare, addChart, addStability})
+  for (const auto add : {addRender, addReplay, addCheck, addInfo, addBuild, addNew, addGolden, addCompare, addPlot,
+                         addChart, addStability})
     verbs.push_back(add(app));
   try {
     app.parse(argc, argv);

@@ -261,6 +261,19 @@ TEST_F(Recording, EveryMistakeInTheDescriptionIsNamedWithTheNearestName) {
   }
 }
 
+// The shipped recording undoes its tracker's frame: the hand rests where its maker's first pose is, turned as there.
+TEST(RecordingFile, TheShippedOneLiesWhereItsMakerPutIt) {
+  const Trajectory t = readRecording(readRecordingMap(std::string(MEDULLA_SOURCE_DIR) + "/scenes/recorded/hand.xml"));
+  const Quaterniond rest(0.928064, 0.162212, 0.335238, 0);
+  const ToolSample start = sampleTrajectory(t, 0.2), press = sampleTrajectory(t, 2.45), hold = sampleTrajectory(t, 5.6);
+  EXPECT_LT((start.position - Vector3d(-0.02, -0.062, 0.066)).norm(), 2e-4);
+  EXPECT_LT((press.position - Vector3d(-0.0525, -0.0385, 0.02)).norm(), 1e-4);
+  EXPECT_LT(press.worldFromTool.angularDistance(rest), 1e-4);
+  EXPECT_LT(press.grip, 0.5);
+  EXPECT_GT(hold.grip, 0.55);
+  EXPECT_LT(t.samples.back().grip, 0.1);
+}
+
 // ---- 30 Hz ------------------------------------------------------------------------------------------------
 
 // A press of 12 mm as a hand does it, minimum jerk (Flash and Hogan 1985), seen 30 times a second.

@@ -58,6 +58,11 @@ struct CompareOptions {
 };
 int runCompare(const CompareOptions& options);
 
+struct PlotOptions {
+  std::string log, output;  // output: FILE.png or FILE.svg
+};
+int runPlot(const PlotOptions& options);
+
 struct ChartOptions {
   RunOptions run;                    // scene, overrides and trajectories
   std::string folder;                // for chart.csv, chart.gnuplot and chart.svg; made where missing
