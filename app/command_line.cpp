@@ -138,7 +138,9 @@ RenderOptions renderOptions(const RenderArguments& a) {
   options.outputs = a.outputs;
   if (options.outputs.empty()) options.outputs = {std::filesystem::path(a.run.scene).stem().string() + ".mp4"};
   options.view.view = a.view == "model" ? ViewKind::model : a.view == "both" ? ViewKind::both : ViewKind::tissue;
-  options.view.showProxy = std::find(a.show.begin(), a.show.end(), "proxy") != a.show.end();
+  const auto shown = [&](const char* what) { return std::find(a.show.begin(), a.show.end(), what) != a.show.end(); };
+  options.view.showProxy = shown("proxy");
+  options.view.showForce = shown("force");
   if (!a.size.empty()) {
     options.size = splitPair(a.size, 'x');
     const auto valid = [](int n) { return n >= 16 && n <= 8192 && n % 2 == 0; };
@@ -169,8 +171,10 @@ Verb addRender(CLI::App& app) {
   c->add_option("--view", a.view, "skin; or spheres, links and attachments; or both")
       ->check(CLI::IsMember({"tissue", "model", "both"}))
       ->capture_default_str();
-  c->add_option("--show", a.show, "draw also: proxy (proxy sphere, device and the spring between them)")
-      ->check(CLI::IsMember({"proxy"}))
+  c->add_option("--show", a.show,
+                "draw also (repeatable): proxy (proxy sphere, device and the spring between them); force (on the hand: "
+                "an arrow at the proxy, and a strip chart of the last seconds)")
+      ->check(CLI::IsMember({"proxy", "force"}))
       ->allow_extra_args(false);
   c->add_option("--size", a.size, "picture size in pixels (default: the scene's)")->type_name("WxH");
   c->add_option("--fps", a.fps, "pictures per second, 1 to 240 (default: the scene's)");

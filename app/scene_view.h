@@ -12,6 +12,7 @@ namespace medulla {
 struct ViewOptions {
   ViewKind view = ViewKind::tissue;
   bool showProxy = false;  // proxy sphere, device and the spring between them
+  bool showForce = false;  // ForceView's arrow and strip chart
 };
 
 class SceneView {

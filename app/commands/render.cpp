@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "app/commands/commands.h"
+#include "app/force_view.h"
 #include "app/progress.h"
 #include "render/video_writer.h"
 
@@ -112,6 +113,7 @@ int runRender(const RenderOptions& options) {
   PictureOutputs outputs(options.outputs, scene.width, scene.height, scene.fps);
   Renderer renderer({.width = scene.width, .height = scene.height, .context = options.context});
   const SceneView view(loaded, simulation.current(), renderer);
+  ForceView forceView(loaded);
 
   Progress progress("render", last - first, "pictures");
   const double cpuStart = processCpuSeconds();
@@ -121,10 +123,12 @@ int runRender(const RenderOptions& options) {
   Image image;
   int next = first;
   const auto drawFrame = [&] {
+    if (options.view.showForce) forceView.afterFrame(simulation);
     const double end = simulation.record().start + simulation.record().duration;
     for (; next < last && next / scene.fps <= end + 1e-9; ++next) {
       stateAt(simulation.record(), next / scene.fps, state);
       view.compose(state, options.view, picture);
+      if (options.view.showForce) forceView.compose(state, picture);
       renderer.render(picture, image);
       outputs.write(next, image);
       progress.update(next - first + 1);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "app/files/input_error.h"
+#include "app/round_number.h"
 
 namespace medulla {
 
@@ -130,9 +131,13 @@ std::vector<Panel> panelsOf(const LogTable& log, const Series& time) {
   volume.title = "volume, % of rest";
   nodes.title = "surface nodes modelled";
   nodes.fromZero = true;
+  const bool crowd = bodies.size() > std::size(kColours);  // alike then, and named once
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    volume.curves.push_back(line(bodies[b], b, 1.8, scaled(column(log, bodies[b] + ".volume_ratio"), 100)));
-    nodes.curves.push_back(line(bodies[b], b, 1.8, column(log, bodies[b] + ".dynamic_nodes")));
+    const std::string name = !crowd ? bodies[b] : b == 0 ? fmt::format("{} bodies", bodies.size()) : "";
+    const std::size_t colour = crowd ? 0 : b;
+    const double width = crowd ? 0.7 : 1.8;
+    volume.curves.push_back(line(name, colour, width, scaled(column(log, bodies[b] + ".volume_ratio"), 100)));
+    nodes.curves.push_back(line(name, colour, width, column(log, bodies[b] + ".dynamic_nodes")));
   }
   energy.title = "energy, mJ";
   energy.logarithmic = true;
@@ -177,14 +182,6 @@ std::string shades(const std::vector<Span>& spans, const char* colour) {
   return out;
 }
 
-// The least 1, 2 or 5 times a power of ten that is no smaller.
-double niceStep(double step) {
-  const double power = std::pow(10, std::floor(std::log10(step)));
-  for (const double digit : {1.0, 2.0, 5.0})
-    if (digit * power >= step * (1 - 1e-9)) return digit * power;
-  return 10 * power;
-}
-
 std::string axesOf(const Panel& panel) {
   double least = panel.curves[0].values[0], most = least;
   for (const Curve& c : panel.curves) {
@@ -199,7 +196,7 @@ std::string axesOf(const Panel& panel) {
   }
   if (panel.fromZero) least = std::min(least, 0.0);
   // A constant is drawn with room around it.
-  const double step = niceStep(std::max({(most - least) / 4, 1e-3 * std::abs(most), 1e-6}));
+  const double step = nextRoundNumber(std::max({(most - least) / 4, 1e-3 * std::abs(most), 1e-6}));
   const double low = std::floor(least / step + 1e-9) * step,
                high = std::max(std::ceil(most / step - 1e-9) * step, low + step);
   return fmt::format("unset logscale y\nset yrange [{:.9g}:{:.9g}]\nset ytics {:.9g}\nset format y '%g'\n", low, high,
@@ -214,8 +211,8 @@ std::string drawingOf(const Panel& panel, std::size_t index, bool explainsShades
                        panel.curves[c].style, panel.curves[c].title);
   if (explainsShades)
     out += fmt::format(
-        ", \\\n  NaN with boxes fs solid 1 border lc '#aaaaaa' fc rgb '{}' title 'contact'"
-        ", \\\n  NaN with boxes fs solid 1 border lc '#aaaaaa' fc rgb '{}' title 'grab'",
+        ", \\\n  NaN with filledcurves y1=0 fs solid 1 noborder fc rgb '{}' title 'contact'"
+        ", \\\n  NaN with filledcurves y1=0 fs solid 1 noborder fc rgb '{}' title 'grab'",
         kContactShade, kHeldShade);
   return out + "\n";
 }
@@ -226,12 +223,13 @@ std::string plotScript(const LogTable& log, const std::string& title, PlotFormat
   if (log.value.empty()) throw inputError(log.path, 0, "no rows after the header, expected a log of a run (--log)");
   const Series time = column(log, "t");
   const std::vector<Panel> panels = panelsOf(log, time);
-  constexpr double kPanel = 112, kGap = 36, kHead = 62, kFoot = 52;  // pixels of the SVG
+  constexpr double kPanel = 124, kGap = 36, kHead = 62, kFoot = 58;  // pixels of the SVG
   const double height = kHead + kFoot + static_cast<double>(panels.size()) * (kPanel + kGap) - kGap;
   std::string out =
       format == PlotFormat::svg
           ? fmt::format("set terminal svg size 1000,{:.0f} dynamic font 'Helvetica,13'", height)
-          : fmt::format("set terminal pngcairo size 2000,{:.0f} font 'Sans,9.5' fontscale 2 linewidth 2", 2 * height);
+          : fmt::format("set terminal pngcairo size 2000,{:.0f} font 'Helvetica,10' fontscale 2 linewidth 2",
+                        2 * height);
   out += " enhanced background 'white'\n";
   for (std::size_t p = 0; p < panels.size(); ++p)
     for (std::size_t c = 0; c < panels[p].curves.size(); ++c)
@@ -240,10 +238,11 @@ std::string plotScript(const LogTable& log, const std::string& title, PlotFormat
   const double end = std::max(time.back(), begin + 1e-3);
   out += fmt::format(
       "set border 3 lc '#555555'\nset tics nomirror out scale 0.6\nset grid lc '#d4d4d4' lt 1 lw 0.6\n"
-      "set key at graph 1.015, graph 1.05 left top Left reverse samplen 1.6 spacing 1.05 noautotitle\n"
+      "set key at graph 1.015, graph 1.05 left top Left reverse vertical maxrows 8 samplen 1.6 spacing {} "
+      "noautotitle\n"
       "set xrange [{:.6g}:{:.6g}]\nset lmargin at screen 0.065\nset rmargin at screen 0.85\n"
-      "set multiplot\nset label 1 \"{}\" noenhanced at screen 0.065, screen {:.5f} left font ',15'\n",
-      begin, end, title, 1 - 0.36 * kHead / height);
+      "set multiplot\nset label 1 \"{}\" noenhanced at screen 0.065, screen {:.5f} left font ',16'\n",
+      format == PlotFormat::svg ? 0.95 : 1.2, begin, end, title, 1 - 0.36 * kHead / height);
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const double top = kHead + static_cast<double>(p) * (kPanel + kGap), bottom = top + kPanel;
     if (p + 1 == panels.size()) out += "set format x '%g'\nset xlabel 'time, s' offset 0,0.4\n";
