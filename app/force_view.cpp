@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "app/round_number.h"
+#include "app/scene_view.h"
 
 namespace medulla {
 
@@ -16,10 +17,6 @@ constexpr double kWindow = 5;  // s
 // Linear RGB, bright on tissue and on the chart's dark paper, told apart by lightness too.
 constexpr glm::vec4 kColours[] = {
     {0.95f, 0.75f, 0.05f, 1}, {0.10f, 0.60f, 0.95f, 1}, {0.15f, 0.80f, 0.35f, 1}, {0.90f, 0.35f, 0.75f, 1}};
-
-glm::vec3 toGlm(const Eigen::Vector3d& v) {
-  return {float(v.x()), float(v.y()), float(v.z())};
-}
 
 }  // namespace
 

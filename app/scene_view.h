@@ -9,6 +9,9 @@
 // Physics to draw lists: the one place where Eigen becomes GLM.
 namespace medulla {
 
+glm::vec3 toGlm(const Eigen::Vector3d& v);
+glm::quat toGlm(const Eigen::Quaterniond& q);
+
 struct ViewOptions {
   ViewKind view = ViewKind::tissue;
   bool showProxy = false;  // proxy sphere, device and the spring between them

@@ -152,8 +152,8 @@ vec2 onPixel(vec2 p) {
 
 void drawGrid(const StripChart& chart, const Layout& layout, Ink& ink) {
   for (const float v : {0.f, 0.5f, 1.f}) ink.stroke(onPixel(layout.at(0, v)), onPixel(layout.at(1, v)), layout.thin);
-  for (float t = std::floor(chart.now); t > chart.now - chart.seconds; --t) {
-    const float u = 1 - (chart.now - t) / chart.seconds;
+  for (int t = int(chart.now); float(t) > chart.now - chart.seconds; --t) {
+    const float u = 1 - (chart.now - float(t)) / chart.seconds;
     ink.stroke(onPixel(layout.at(u, 0)), onPixel(layout.at(u, 1)), layout.thin);
   }
   ink.apply(kGrid, 1);

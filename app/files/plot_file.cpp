@@ -237,7 +237,7 @@ std::string plotScript(const LogTable& log, const std::string& title, PlotFormat
   const double begin = time.size() > 1 ? 2 * time[0] - time[1] : time[0];  // the first row tells how a frame ended
   const double end = std::max(time.back(), begin + 1e-3);
   out += fmt::format(
-      "set border 3 lc '#555555'\nset tics nomirror out scale 0.6\nset grid lc '#d4d4d4' lt 1 lw 0.6\n"
+      "set border 3 lc '#555555'\nset tics nomirror out scale 0.6\nunset mytics\nset grid lc '#d4d4d4' lt 1 lw 0.6\n"
       "set key at graph 1.015, graph 1.05 left top Left reverse vertical maxrows 8 samplen 1.6 spacing {} "
       "noautotitle\n"
       "set xrange [{:.6g}:{:.6g}]\nset lmargin at screen 0.065\nset rmargin at screen 0.85\n"

@@ -68,7 +68,7 @@ std::string locate(const RecordingColumns& columns, const std::vector<std::strin
       {&columns.time, &out.time},     {&columns.position, &out.position}, {&columns.quaternion, &out.quaternion},
       {&columns.matrix, &out.matrix}, {&columns.grip, &out.grip},         {&columns.force, &out.force}};
   for (const auto& [choice, cells] : choices)
-    if (const std::string fault = locate(*choice, header, count, *cells); !fault.empty()) return fault;
+    if (std::string fault = locate(*choice, header, count, *cells); !fault.empty()) return fault;
   return "";
 }
 
