@@ -213,8 +213,8 @@ Verb addCheck(CLI::App& app) {
 
 Verb addInfo(CLI::App& app) {
   const auto path = std::make_shared<std::string>();
-  CLI::App* c = app.add_subcommand("info", "tell what is in a model or a scene");
-  c->add_option("FILE", *path, "model or scene file (XML)")->required();
+  CLI::App* c = app.add_subcommand("info", "tell what is in a model, a scene, a trajectory or a recording");
+  c->add_option("FILE", *path, "model, scene or recording (XML), or trajectory (CSV)")->required();
   return {c, [path] { return runInfo(*path); }};
 }
 

@@ -8,23 +8,29 @@ namespace medulla {
 
 using Forces = std::vector<Eigen::Vector3d>;
 
-// Correlation of later[shift + i] with earlier[i], each less its mean over the whole; 0 where one of them is constant.
-static double correlationAt(const Forces& later, const Forces& earlier, std::size_t shift) {
-  double both = 0, one = 0, other = 0;
-  for (std::size_t i = 0; i + shift < later.size(); ++i) {
-    both += later[i + shift].dot(earlier[i]);
-    one += later[i + shift].squaredNorm();
-    other += earlier[i].squaredNorm();
-  }
-  return one > 0 && other > 0 ? both / std::sqrt(one * other) : 0;
-}
+// Forces less their mean, with the sum of the squares of those before each.
+struct Signal {
+  Forces forces;
+  std::vector<double> squares;  // one more than forces
 
-static Forces withoutMean(Forces forces) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& f : forces) mean += f;
-  mean /= static_cast<double>(forces.size());
-  for (Eigen::Vector3d& f : forces) f -= mean;
-  return forces;
+  explicit Signal(Forces values) : forces(std::move(values)), squares(1, 0.0) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& f : forces) mean += f;
+    mean /= static_cast<double>(forces.size());
+    for (Eigen::Vector3d& f : forces) {
+      f -= mean;
+      squares.push_back(squares.back() + f.squaredNorm());
+    }
+  }
+};
+
+// Correlation of later[shift + i] with earlier[i]; 0 where one of them is constant.
+static double correlationAt(const Signal& later, const Signal& earlier, std::size_t shift) {
+  const std::size_t count = later.forces.size() - shift;
+  double both = 0;
+  for (std::size_t i = 0; i < count; ++i) both += later.forces[i + shift].dot(earlier.forces[i]);
+  const double squares = (later.squares.back() - later.squares[shift]) * earlier.squares[count];
+  return squares > 0 ? both / std::sqrt(squares) : 0;
 }
 
 static bool changes(const Forces& forces) {
@@ -33,8 +39,8 @@ static bool changes(const Forces& forces) {
 
 static void findLag(const Forces& simulated, const Forces& measured, double tickDuration, ForceMatch& match) {
   if (!changes(simulated) || !changes(measured)) return;
-  const Forces s = withoutMean(simulated), m = withoutMean(measured);
-  const auto longest = std::min(static_cast<std::size_t>(std::lround(0.5 / tickDuration)), s.size() / 4);
+  const Signal s(simulated), m(measured);
+  const auto longest = std::min(static_cast<std::size_t>(std::lround(0.5 / tickDuration)), simulated.size() / 4);
   match.lag = 0;
   match.correlation = correlationAt(s, m, 0);
   for (std::size_t shift = 1; shift <= longest; ++shift) {

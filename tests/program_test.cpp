@@ -214,6 +214,27 @@ TEST(Program, InfoTellsOfModelsAndScenes) {
   expectRefusal(runProgram({"info", folder / "none.xml"}), 1, {"none.xml"});
 }
 
+TEST(Program, InfoTellsOfTrajectoriesAndRecordings) {
+  const std::string scenes = std::string(MEDULLA_SOURCE_DIR) + "/scenes/";
+  const ProgramResult recording = runProgram({"info", scenes + "recorded/hand.xml"}),
+                      trajectory = runProgram({"info", scenes + "gallbladder.csv"});
+  EXPECT_EQ(valueOf(recording.out, "kind"), "trajectory") << recording.err;
+  EXPECT_EQ(valueOf(recording.out, "samples"), "292");
+  EXPECT_EQ(valueOf(recording.out, "gap_max"), "0.034 s");
+  for (const ProgramResult* r : {&recording, &trajectory}) EXPECT_EQ(valueOf(r->out, "grip_closings"), "1") << r->err;
+  EXPECT_EQ(valueOf(trajectory.out, "to"), "12 s");
+  const TemporaryFolder folder;
+  folder.write("bad.csv", "t,x\n");
+  expectRefusal(runProgram({"info", folder / "bad.csv"}), 1, {"bad.csv:1", "t[s]"});
+}
+
+TEST(Program, TheRecordedSceneRuns) {
+  const ProgramResult r = runProgram(
+      {"replay", std::string(MEDULLA_SOURCE_DIR) + "/scenes/recorded/gallbladder.xml", "--set", "clock.duration=6.2"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_GT(std::stod(valueOf(r.out, "force_max")), 0.1);
+}
+
 TEST(Program, RepairsAreToldInOneLine) {
   const TemporaryFolder folder;
   const std::string mesh = readFile(std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj");

@@ -27,7 +27,7 @@ int runNew(const NewOptions& options);
 
 int runCheck(const RunOptions& options);
 
-// What a model or scene file holds, told apart by its root element.
+// What a model, a scene, a recording (told apart by their root element) or a trajectory (.csv) holds.
 int runInfo(const std::string& path);
 
 int runReplay(const RunOptions& options);
