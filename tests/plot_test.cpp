@@ -89,6 +89,20 @@ TEST(Plot, WritesPngAndSvgOfWhatALogHolds) {
   EXPECT_EQ(plot(folder / "run.csv", folder / "none/a.png").exitCode, 1);
 }
 
+// gnuplot runs what stands between backticks, unless it is told not to.
+TEST(Plot, NamesAreTextAndNothingElse) {
+  const TemporaryFolder folder;
+  const std::string name = "s`touch " + folder / "made" + "`'\"\\";
+  folder.write("run.csv", "t," + name + ".volume_ratio," + name +
+                              ".dynamic_nodes,energy.kinetic,energy.elastic\n1,1,2,3,4\n2,1,2,3,4\n");
+  const std::string script = plotScript(readLog(folder / "run.csv"), "a`b'c", PlotFormat::svg);
+  EXPECT_TRUE(has(script, "set label 1 'a`b''c' noenhanced"));
+  if (std::system("gnuplot --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "gnuplot is not installed";
+  const ProgramResult r = plot(folder / "run.csv", folder / "a.svg");
+  EXPECT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_EQ(folder.contents().size(), 2u);
+}
+
 TEST(Plot, RefusesInOneLineAndLeavesNothing) {
   const TemporaryFolder folder;
   folder.write("run.csv", shortLog());

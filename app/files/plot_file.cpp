@@ -153,6 +153,17 @@ std::vector<Panel> panelsOf(const LogTable& log, const Series& time) {
 
 // ---- The script ------------------------------------------------------------------------------------------
 
+// Names come from a file: in single quotes gnuplot takes them as they are, where double quotes would run what stands
+// between backticks.
+std::string quotedName(const std::string& name) {
+  std::string out = "'";
+  for (const char c : name) {
+    if (c == '\'') out += c;
+    out += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
+  }
+  return out + "'";
+}
+
 // A here-document of time and value. More rows than can be seen are drawn as the least and the largest of each bin, in
 // their order, so that no peak is lost.
 std::string block(const std::string& name, const Series& time, const Series& values) {
@@ -205,10 +216,11 @@ std::string axesOf(const Panel& panel) {
 
 std::string drawingOf(const Panel& panel, std::size_t index, bool explainsShades) {
   std::string out = "unset object\n" + shades(panel.contact, kContactShade) + shades(panel.held, kHeldShade);
-  out += fmt::format("{}set label 2 \"{}\" noenhanced at graph 0, graph 1.09 left\nplot ", axesOf(panel), panel.title);
+  out += fmt::format("{}set label 2 {} noenhanced at graph 0, graph 1.09 left\nplot ", axesOf(panel),
+                     quotedName(panel.title));
   for (std::size_t c = 0; c < panel.curves.size(); ++c)
-    out += fmt::format("{}$p{}_{} using 1:2 with {} title \"{}\" noenhanced", c == 0 ? "" : ", \\\n  ", index, c,
-                       panel.curves[c].style, panel.curves[c].title);
+    out += fmt::format("{}$p{}_{} using 1:2 with {} title {} noenhanced", c == 0 ? "" : ", \\\n  ", index, c,
+                       panel.curves[c].style, quotedName(panel.curves[c].title));
   if (explainsShades)
     out += fmt::format(
         ", \\\n  NaN with filledcurves y1=0 fs solid 1 noborder fc rgb '{}' title 'contact'"
@@ -241,8 +253,8 @@ std::string plotScript(const LogTable& log, const std::string& title, PlotFormat
       "set key at graph 1.015, graph 1.05 left top Left reverse vertical maxrows 8 samplen 1.6 spacing {} "
       "noautotitle\n"
       "set xrange [{:.6g}:{:.6g}]\nset lmargin at screen 0.065\nset rmargin at screen 0.85\n"
-      "set multiplot\nset label 1 \"{}\" noenhanced at screen 0.065, screen {:.5f} left font ',16'\n",
-      format == PlotFormat::svg ? 0.95 : 1.2, begin, end, title, 1 - 0.36 * kHead / height);
+      "set multiplot\nset label 1 {} noenhanced at screen 0.065, screen {:.5f} left font ',16'\n",
+      format == PlotFormat::svg ? 0.95 : 1.2, begin, end, quotedName(title), 1 - 0.36 * kHead / height);
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const double top = kHead + static_cast<double>(p) * (kPanel + kGap), bottom = top + kPanel;
     if (p + 1 == panels.size()) out += "set format x '%g'\nset xlabel 'time, s' offset 0,0.4\n";
