@@ -41,12 +41,26 @@ std::optional<std::pair<int, int>> splitPair(const std::string& text, char separ
   return std::make_pair(*a, *b);
 }
 
+// From [TOOL=]FILE.
+std::map<std::string, std::string> filesByTool(const std::vector<std::string>& words) {
+  std::map<std::string, std::string> out;
+  for (const std::string& word : words) {
+    const std::size_t equals = word.find('=');
+    const bool named = equals != std::string::npos;
+    out[named ? word.substr(0, equals) : ""] = named ? word.substr(equals + 1) : word;
+  }
+  return out;
+}
+
 void addOverrides(CLI::App& command, RunArguments& a) {
   command
       .add_option("--set", a.sets, "replace one value of the scene, e.g. body.gallbladder.surface=skin (repeatable)")
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
-  command.add_option("--trajectory", a.trajectories, "read a tool's motion from another file (repeatable)")
+  command
+      .add_option("--trajectory", a.trajectories,
+                  "read a tool's motion from another file: a trajectory (CSV), or XML that describes a recording of "
+                  "another program (repeatable)")
       ->type_name("[TOOL=]FILE")
       ->allow_extra_args(false);
 }
@@ -57,6 +71,12 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
   command.add_option("--log-rate", a.logRate, "rows of the log: per dynamics frame or per servo tick")
       ->check(CLI::IsMember({"frame", "tick"}))
       ->capture_default_str();
+  command
+      .add_option("--record", a.records,
+                  "write a tool's motion and force, tick by tick, as a trajectory; read back by --trajectory it gives "
+                  "the same hash (repeatable)")
+      ->type_name("[TOOL=]FILE")
+      ->allow_extra_args(false);
   command
       .add_option("--surface-at", a.surfaces, "write the bodies' surfaces at time T (s) or \"end\" as OBJ (repeatable)")
       ->type_name("T FILE.obj")
@@ -83,13 +103,8 @@ RunOptions runOptions(const RunArguments& a) {
     if (equals == std::string::npos || equals == 0) usageError("--set", set, "PATH=VALUE");
     options.overrides.push_back({set.substr(0, equals), set.substr(equals + 1)});
   }
-  for (const std::string& t : a.trajectories) {
-    const std::size_t equals = t.find('=');
-    if (equals == std::string::npos)
-      options.trajectories[""] = t;
-    else
-      options.trajectories[t.substr(0, equals)] = t.substr(equals + 1);
-  }
+  options.trajectories = filesByTool(a.trajectories);
+  options.records = filesByTool(a.records);
   options.logPath = a.log;
   options.logEveryTick = a.logRate == "tick";
   for (const auto& request : a.surfaces) {
@@ -147,11 +162,14 @@ RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) 
   options.run.scene = scene;
   options.run.logPath = fileOf(scene, a.run.log);
   for (SurfaceRequest& surface : options.run.surfaces) surface.path = fileOf(scene, surface.path);
+  for (auto& [tool, path] : options.run.records) path = fileOf(scene, path);
   options.cachePath = fileOf(scene, a.cache);
   for (const std::string& output : a.outputs) options.outputs.push_back(fileOf(scene, output));
   if (options.outputs.empty()) options.outputs = {fileOf(scene, a.still.empty() ? "{scene}.mp4" : "{scene}.png")};
   options.view.view = a.view == "model" ? ViewKind::model : a.view == "both" ? ViewKind::both : ViewKind::tissue;
-  options.view.showProxy = std::find(a.show.begin(), a.show.end(), "proxy") != a.show.end();
+  const auto shown = [&](const char* what) { return std::find(a.show.begin(), a.show.end(), what) != a.show.end(); };
+  options.view.showProxy = shown("proxy");
+  options.view.showForce = shown("force");
   readPictures(a, options);
   const std::string quality = !a.quality.empty() ? a.quality : options.still ? "best" : "standard";
   options.quality = quality == "draft" ? Quality::draft : quality == "best" ? Quality::best : Quality::standard;
@@ -167,11 +185,14 @@ void checkRender(const RenderArguments& a) {
   for (const std::string& more : {a.run.log, a.cache})
     if (!more.empty()) files.push_back(more);
   for (const auto& surface : a.run.surfaces) files.push_back(surface.at(1));
+  files.insert(files.end(), a.run.records.begin(), a.run.records.end());
   for (const std::string& file : files)
     if (a.scenes.size() > 1 && file.find("{scene}") == std::string::npos)
       usageError("of several scenes", file, "a name with {scene} in it, which becomes each one's name");
-  if (!a.cache.empty() && (!a.run.log.empty() || !a.run.surfaces.empty()))
-    usageError("--cache", a.cache, "no --log and no --surface-at: nothing is simulated");
+  const bool asksForRun = !a.run.log.empty() || !a.run.surfaces.empty() || !a.run.records.empty() ||
+                          std::find(a.show.begin(), a.show.end(), "force") != a.show.end();
+  if (!a.cache.empty() && asksForRun)
+    usageError("--cache", a.cache, "no --log, --surface-at, --record or --show force: nothing is simulated");
   if (!a.resume) return;
   if (a.outputs.empty() || !a.still.empty()) usageError("--resume", "", "-o DIR: folders of PNG files can be resumed");
   for (const std::string& output : a.outputs)
@@ -196,8 +217,10 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
   c->add_option("--view", a.view, "skin; or spheres, links and attachments; or both")
       ->check(CLI::IsMember({"tissue", "model", "both"}))
       ->capture_default_str();
-  c->add_option("--show", a.show, "draw also: proxy (proxy sphere, device and the spring between them)")
-      ->check(CLI::IsMember({"proxy"}))
+  c->add_option("--show", a.show,
+                "draw also (repeatable): proxy (proxy sphere, device and the spring between them); force (on the hand: "
+                "an arrow at the proxy, and a strip chart of the last seconds)")
+      ->check(CLI::IsMember({"proxy", "force"}))
       ->allow_extra_args(false);
   c->add_option("--size", a.size, "picture size in pixels, even numbers from 16 to 8192 (default: the scene's)")
       ->type_name("WxH");
@@ -267,8 +290,8 @@ Verb addCheck(CLI::App& app) {
 
 Verb addInfo(CLI::App& app) {
   const auto path = std::make_shared<std::string>();
-  CLI::App* c = app.add_subcommand("info", "tell what is in a model or a scene");
-  c->add_option("FILE", *path, "model or scene file (XML)")->required();
+  CLI::App* c = app.add_subcommand("info", "tell what is in a model, a scene, a trajectory or a recording");
+  c->add_option("FILE", *path, "model, scene or recording (XML), or trajectory (CSV)")->required();
   return {c, [path] { return runInfo(*path); }};
 }
 
@@ -404,6 +427,16 @@ Verb addCompare(CLI::App& app) {
   return {c, [arguments] { return runCompare(compareOptions(*arguments)); }};
 }
 
+Verb addPlot(CLI::App& app) {
+  const auto options = std::make_shared<PlotOptions>();
+  CLI::App* c = app.add_subcommand(
+      "plot",
+      "draw a log over time: force, penetration, volume, energies, modelled nodes; contact and grab are shaded");
+  c->add_option("LOG", options->log, "log of a run (CSV)")->required();
+  c->add_option("-o,--output", options->output, "picture to write")->type_name("FILE.png|FILE.svg")->required();
+  return {c, [options] { return runPlot(*options); }};
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App app(kIntroduction, "medulla");
   app.footer(kExitCodes);
@@ -412,8 +445,8 @@ int dispatch(int argc, char** argv) {
   bool version = false;
   app.add_flag("--version", version, "version, and those of Mesa, Embree and the compiler");
   std::vector<Verb> verbs;
-  for (const auto add :
-       {addRender, addReplay, addCheck, addInfo, addBuild, addNew, addGolden, addCompare, addChart, addStability})
+  for (const auto add : {addRender, addReplay, addCheck, addInfo, addBuild, addNew, addGolden, addCompare, addPlot,
+                         addChart, addStability})
     verbs.push_back(add(app));
   try {
     app.parse(argc, argv);

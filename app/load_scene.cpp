@@ -5,6 +5,7 @@
 #include "app/files/input_error.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
+#include "app/files/recording_file.h"
 #include "app/files/trajectory_file.h"
 #include "app/files/vertex_file.h"
 #include "app/shape_mesh.h"
@@ -104,18 +105,22 @@ static void requireLook(const Scene& scene, int line, const std::string& look) {
   throw inputError(scene.path, line, fmt::format("unknown look \"{}\": expected {}", look, expected));
 }
 
+static Trajectory loadTrajectory(const Scene& scene, SceneTool& tool) {
+  if (tool.line > 0)
+    requireFile(scene, tool.line, fmt::format("trajectory of tool \"{}\"", tool.name), tool.trajectoryPath);
+  if (!isRecording(tool.trajectoryPath)) return readTrajectory(tool.trajectoryPath);
+  const RecordingMap map = readRecordingMap(tool.trajectoryPath);
+  tool.recordingPath = map.recordingPath;
+  return readRecording(map);
+}
+
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories) {
   LoadedScene loaded;
-  for (const auto& [name, path] : trajectories) {
-    bool known = false;
-    for (SceneTool& tool : scene.tools) {
-      if (tool.name != name) continue;
-      tool.trajectoryPath = path;
-      tool.line = 0;
-      known = true;
-    }
-    if (!known)
-      throw std::runtime_error(fmt::format("--trajectory {}={}: the scene has no tool \"{}\"", name, path, name));
+  for (SceneTool& tool : scene.tools) {
+    const auto other = trajectories.find(tool.name);
+    if (other == trajectories.end()) continue;
+    tool.trajectoryPath = other->second;
+    tool.line = 0;
   }
   for (const SceneBody& body : scene.bodies) requireLook(scene, body.line, body.look);
   loaded.models = loadModels(scene);
@@ -130,11 +135,7 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
     loaded.statics.push_back(item.meshPath.empty() ? shapeMesh(item.shape)
                                                    : readMesh(item.meshPath, metresPerUnit(item.unit)));
   }
-  for (const SceneTool& tool : scene.tools) {
-    if (tool.line > 0)
-      requireFile(scene, tool.line, fmt::format("trajectory of tool \"{}\"", tool.name), tool.trajectoryPath);
-    loaded.trajectories.push_back(readTrajectory(tool.trajectoryPath));
-  }
+  for (SceneTool& tool : scene.tools) loaded.trajectories.push_back(loadTrajectory(scene, tool));
   loaded.scene = std::move(scene);
   return loaded;
 }

@@ -63,6 +63,7 @@ struct SceneStatic {
 struct SceneTool {
   int line = 0;
   std::string name, trajectoryPath;
+  std::string recordingPath;  // where trajectoryPath describes one: found by loadScene()
   ToolSettings settings;
 };
 

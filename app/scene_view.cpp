@@ -7,14 +7,15 @@
 
 namespace medulla {
 
-namespace {
-
 glm::vec3 toGlm(const Eigen::Vector3d& v) {
   return {float(v.x()), float(v.y()), float(v.z())};
 }
+
 glm::quat toGlm(const Eigen::Quaterniond& q) {
   return {float(q.w()), float(q.x()), float(q.y()), float(q.z())};
 }
+
+namespace {
 
 // Colours of the model view, linear RGB: after the paper's figures, told apart by brightness too.
 constexpr glm::vec4 kBallColour{0.80f, 0.30f, 0.22f, 0.55f};

@@ -9,9 +9,13 @@
 // Physics to draw lists: the one place where Eigen becomes GLM.
 namespace medulla {
 
+glm::vec3 toGlm(const Eigen::Vector3d& v);
+glm::quat toGlm(const Eigen::Quaterniond& q);
+
 struct ViewOptions {
   ViewKind view = ViewKind::tissue;
   bool showProxy = false;  // proxy sphere, device and the spring between them
+  bool showForce = false;  // ForceView's arrow and strip chart
 };
 
 class SceneView {

@@ -22,8 +22,8 @@ struct LoadedScene {
   std::vector<Reference> references;                         // one per body; without displacements where none is named
 };
 
-// `trajectories` replaces tools' files, by tool name. Throws std::runtime_error with file and line; a file that is
-// missing is reported at the scene's line that names it.
+// `trajectories` replaces files of the scene's tools, by tool name. Throws std::runtime_error with file and line; a
+// file that is missing is reported at the scene's line that names it.
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories = {});
 
 // What the servo saw and did during one dynamics frame [start, start + duration]: the two frames that were blended

@@ -21,7 +21,7 @@ struct Verb {
 // Options as typed; turned into RunOptions after parsing.
 struct RunArguments {
   std::string scene, log, logRate = "frame";
-  std::vector<std::string> sets, trajectories;
+  std::vector<std::string> sets, trajectories, records;
   std::vector<std::vector<std::string>> surfaces;
 };
 void addSceneOptions(CLI::App& command, RunArguments& a);  // SCENE, --set, --trajectory

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 #include <vector>
 
 namespace medulla {
@@ -19,13 +20,21 @@ struct ToolSample {
 };
 
 struct Trajectory {
-  std::vector<ToolSample> samples;  // strictly increasing time, at least one
+  std::vector<ToolSample> samples;              // strictly increasing time, at least one
+  std::vector<Eigen::Vector3d> measuredForces;  // N, world, on the hand; one per sample, or none
 };
 
 // The device at a time: before the first and after the last sample it stands still. Position by Catmull-Rom with
 // monotone tangents (smooth through sparse key poses and dense recordings alike, no overshoot on any axis), orientation
-// by slerp, grip linearly.
+// by the same cubic on quaternions, grip linearly. Velocities have no steps; at a sample's time it is that sample to
+// the bit.
 ToolSample sampleTrajectory(const Trajectory& trajectory, double time);
+
+// Between samples linearly; none where nothing was measured.
+std::optional<Eigen::Vector3d> measuredForceAt(const Trajectory& trajectory, double time);
+
+// s, from when on the device keeps its last pose and grip.
+double motionEnd(const Trajectory& trajectory);
 
 // A tool of the scene: its proxy (paper 4) and the virtual coupling between proxy and device.
 struct ToolSettings {

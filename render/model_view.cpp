@@ -84,19 +84,41 @@ ModelView::UnitMesh ModelView::makeCylinder(int sides) {
   return makeUnitMesh(p, n, index);
 }
 
+ModelView::UnitMesh ModelView::makeCone(int sides) {
+  std::vector<glm::vec3> p, n;
+  std::vector<unsigned> index;
+  for (int s = 0; s <= sides; ++s) {
+    const float a = kTau * float(s) / float(sides);
+    const glm::vec3 rim{std::cos(a), std::sin(a), 0};
+    for (const glm::vec3& at : {rim, glm::vec3(0, 0, 1)}) {
+      p.push_back(at);
+      n.push_back(rim + glm::vec3(0, 0, 1));
+    }
+    for (const glm::vec3& at : {rim, glm::vec3(0)}) {
+      p.push_back(at);
+      n.emplace_back(0, 0, -1);
+    }
+  }
+  for (unsigned s = 0; s < unsigned(sides); ++s)
+    for (const unsigned k : {0u, 4u, 1u, 3u, 6u, 2u}) index.push_back(4 * s + k);
+  return makeUnitMesh(p, n, index);
+}
+
 ModelView::ModelView() {
   program_ = buildProgram("", kModelVertexShader, kModelFragmentShader);
   backdropProgram_ = buildProgram("", kBackdropVertexShader, kBackdropFragmentShader);
   glGenVertexArrays(1, &emptyArray_);
   for (std::size_t k = 0; k < spheres_.size(); ++k) spheres_[k] = makeSphere(kRings[k]);
   cylinder_ = makeCylinder(12);
+  shaft_ = makeCylinder(32);
+  cone_ = makeCone(32);
 }
 
 ModelView::~ModelView() {
   glDeleteProgram(program_);
   glDeleteProgram(backdropProgram_);
   glDeleteVertexArrays(1, &emptyArray_);
-  for (const UnitMesh& m : {spheres_[0], spheres_[1], spheres_[2], cylinder_}) {
+  for (const UnitMesh& m : {spheres_[0], spheres_[1], spheres_[2], cylinder_, shaft_, cone_}) {
     glDeleteVertexArrays(1, &m.vertexArray);
     for (const unsigned b : {m.vertices, m.indices, m.instances}) glDeleteBuffers(1, &b);
   }
@@ -128,10 +150,19 @@ void ModelView::setCamera(const Viewpoint& v) const {
   glUniform3fv(uniform("back"), 1, glm::value_ptr(v.back));
 }
 
+static glm::vec4 rowOf(int k, glm::vec3 x, glm::vec3 y, glm::vec3 z, glm::vec3 origin) {
+  return {x[k], y[k], z[k], origin[k]};
+}
+
+// Places what reaches from 0 to 1 along z. a and b differ.
+ModelView::Instance ModelView::rodInstance(glm::vec3 a, glm::vec3 b, float radius, glm::vec4 colour) {
+  const glm::vec3 along = b - a, w = glm::normalize(along),
+                  aside = std::abs(w.x) < 0.7f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+  const glm::vec3 x = radius * glm::normalize(glm::cross(aside, w)), y = glm::cross(w, x);
+  return {{rowOf(0, x, y, along, a), rowOf(1, x, y, along, a), rowOf(2, x, y, along, a)}, colour};
+}
+
 void ModelView::draw(const Viewpoint& view, const std::vector<DrawnBall>& balls, const std::vector<Segment>& segments) {
-  const auto instanceOf = [](glm::vec3 origin, glm::vec3 x, glm::vec3 y, glm::vec3 z, glm::vec4 colour) {
-    return Instance{{{x.x, y.x, z.x, origin.x}, {x.y, y.y, z.y, origin.y}, {x.z, y.z, z.z, origin.z}}, colour};
-  };
   std::array<std::vector<Instance>, 3> opaque;
   struct SeenThrough {
     float depth;
@@ -143,22 +174,17 @@ void ModelView::draw(const Viewpoint& view, const std::vector<DrawnBall>& balls,
     const float depth = pictureFromWorld(view, ball.centre).z;
     const float size = 0.5f * ball.radius / (std::max(depth, kNearPlane) * view.tangent);
     const std::size_t level = std::size_t(size > kFinerAbove[0]) + std::size_t(size > kFinerAbove[1]);
-    const float r = ball.radius;
-    const Instance i = instanceOf(ball.centre, {r, 0, 0}, {0, r, 0}, {0, 0, r}, ball.colour);
+    const glm::mat3 r(ball.radius);
+    const auto row = [&](int k) { return rowOf(k, r[0], r[1], r[2], ball.centre); };
+    const Instance i{{row(0), row(1), row(2)}, ball.colour};
     if (ball.colour.a >= 1)
       opaque[level].push_back(i);
     else
       seenThrough.push_back({depth, level, i});
   }
   std::vector<Instance> rods;
-  for (const Segment& s : segments) {
-    const glm::vec3 along = s.b - s.a;
-    const float length = glm::length(along);
-    if (length <= 0) continue;
-    const glm::vec3 w = along / length, aside = std::abs(w.x) < 0.7f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
-    const glm::vec3 u = glm::normalize(glm::cross(aside, w));
-    rods.push_back(instanceOf(s.a, u * s.radius, glm::cross(w, u) * s.radius, along, s.colour));
-  }
+  for (const Segment& s : segments)
+    if (s.a != s.b) rods.push_back(rodInstance(s.a, s.b, s.radius, s.colour));
 
   setCamera(view);
   glEnable(GL_CULL_FACE);
@@ -173,6 +199,28 @@ void ModelView::draw(const Viewpoint& view, const std::vector<DrawnBall>& balls,
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
   for (const SeenThrough& s : seenThrough) drawInstances(spheres_[s.level], {s.instance});
   glDisable(GL_BLEND);
+  glDisable(GL_CULL_FACE);
+}
+
+void ModelView::drawArrows(const Viewpoint& view, const std::vector<Arrow>& arrows) {
+  std::vector<Instance> shafts, heads;
+  for (const Arrow& arrow : arrows) {
+    const glm::vec3 along = arrow.to - arrow.from;
+    const float length = glm::length(along);
+    if (length <= 0) continue;
+    // A short arrow is a small one: its head takes no more than its half.
+    const float head = std::min(8 * arrow.radius, 0.5f * length), radius = head / 8;
+    const glm::vec3 neck = arrow.to - head / length * along;
+    shafts.push_back(rodInstance(arrow.from, neck, radius, arrow.colour));
+    heads.push_back(rodInstance(neck, arrow.to, 3 * radius, arrow.colour));
+  }
+  if (heads.empty()) return;
+  glClear(GL_DEPTH_BUFFER_BIT);
+  setCamera(view);
+  glEnable(GL_CULL_FACE);
+  glFrontFace(GL_CW);
+  drawInstances(shaft_, shafts);
+  drawInstances(cone_, heads);
   glDisable(GL_CULL_FACE);
 }
 

@@ -18,6 +18,7 @@ class ModelView {
 
   void drawBackdrop() const;
   void draw(const Viewpoint& viewpoint, const std::vector<DrawnBall>& balls, const std::vector<Segment>& segments);
+  void drawArrows(const Viewpoint& viewpoint, const std::vector<Arrow>& arrows);  // before all that was drawn so far
 
  private:
   // Rows of the 3x4 matrix that places the unit mesh, and a colour.
@@ -33,12 +34,14 @@ class ModelView {
                                const std::vector<unsigned>& indices);
   static UnitMesh makeSphere(int rings);
   static UnitMesh makeCylinder(int sides);
+  static UnitMesh makeCone(int sides);
+  static Instance rodInstance(glm::vec3 a, glm::vec3 b, float radius, glm::vec4 colour);
   void drawInstances(const UnitMesh& mesh, const std::vector<Instance>& instances) const;
   void setCamera(const Viewpoint& viewpoint) const;
 
   unsigned program_ = 0, backdropProgram_ = 0, emptyArray_ = 0;
-  std::array<UnitMesh, 3> spheres_;  // coarse to fine: the silhouette's error stays below a third of a pixel
-  UnitMesh cylinder_;
+  std::array<UnitMesh, 3> spheres_;   // coarse to fine: the silhouette's error stays below a third of a pixel
+  UnitMesh cylinder_, shaft_, cone_;  // shaft_: a cylinder for arrows, round from near
 };
 
 }  // namespace medulla

@@ -220,9 +220,9 @@ void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
   }
   tissue.draw(mesh, lists, opaque, view, lightView, 1);
   if (haze) background.draw(view, *haze);
-  if (picture.view == ViewKind::tissue) return;
-  model.draw(view, picture.balls, picture.segments);
-  tissue.draw(mesh, lists, seenThrough, view, lightView, kSeenThroughOpacity);
+  if (!picture.balls.empty() || !picture.segments.empty()) model.draw(view, picture.balls, picture.segments);
+  if (picture.view == ViewKind::both) tissue.draw(mesh, lists, seenThrough, view, lightView, kSeenThroughOpacity);
+  model.drawArrows(view, picture.arrows);
 }
 
 void Renderer::Data::readBack(Image& out) const {
@@ -296,6 +296,7 @@ void Renderer::render(const Picture& picture, Image& out, StageTimes* times) {
   d.readBack(d.settings.supersample > 1 ? d.fine : out);
   stage("finish");
   d.finish(round, out);
+  if (picture.chart) drawStripChart(*picture.chart, out);
   if (times) times->stop();
 }
 

@@ -11,6 +11,7 @@
 
 #include "render/image.h"
 #include "render/stage_times.h"
+#include "render/strip_chart.h"
 
 // Draws one picture from plain arrays. Knows looks, light and pixels; knows nothing of bodies and physics.
 namespace medulla {
@@ -72,6 +73,13 @@ struct Segment {
   glm::vec4 colour{1};
 };
 
+// Drawn over everything else: something said about the picture rather than in it.
+struct Arrow {
+  glm::vec3 from{0}, to{0};
+  float radius = 0.001f;  // m, of the shaft; the head is thrice as wide
+  glm::vec4 colour{1};    // linear RGB
+};
+
 // tissue: skins. model: balls, segments and instruments before a light backdrop, never round. both: surfaces that have
 // positions in this picture are seen through over the model, the others stay opaque.
 enum class ViewKind { tissue, model, both };
@@ -86,6 +94,8 @@ struct Picture {
   std::vector<Instrument> instruments;
   std::vector<DrawnBall> balls;
   std::vector<Segment> segments;
+  std::vector<Arrow> arrows;
+  std::optional<StripChart> chart;
 };
 
 struct RendererSettings {

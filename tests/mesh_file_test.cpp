@@ -150,7 +150,7 @@ TEST(MeshFile, UnitsScaleToMetres) {
   EXPECT_EQ(metresPerUnit("cm"), 0.01);
   EXPECT_EQ(metresPerUnit("mm"), 0.001);
   EXPECT_EQ(metresPerUnit("inch"), 0.0254);
-  EXPECT_EQ(refusal([] { metresPerUnit("feet"); }), "unknown unit 'feet', expected m, cm, mm or inch");
+  EXPECT_EQ(refusal([] { metresPerUnit("feet"); }), "unknown unit 'feet', expected m, cm, mm, micron or inch");
   const TriangleMesh mesh = readMesh(written(folder, "a.OBJ", kTetrahedron + kFaces), metresPerUnit("mm"));
   EXPECT_EQ(mesh.vertices[1], Vector3d(0.001, 0, 0));
 }

@@ -85,6 +85,43 @@ TEST(Program, LogsOfTwoRunsAreEqualByteForByte) {
   EXPECT_NE(readFile(folder / "a.csv").find("grasper.device.x"), std::string::npos);
 }
 
+// The device's motion as the run consumed it, and the force that it felt: replayed, neither differs in a bit.
+TEST(Program, ARecordReplaysToTheSameHashAndForce) {
+  const TemporaryFolder folder;
+  const std::vector<std::string> press = {"--set", "clock.duration=2.6"};
+  const std::string file = folder / "record.csv";
+  const ProgramResult first = runProgram(command({"replay", kScene, "--record", file}, press));
+  ASSERT_EQ(first.exitCode, 0) << first.err;
+  EXPECT_EQ(valueOf(first.out, "grasper.force_rms"), "");
+  const ProgramResult again = runProgram(command({"replay", kScene, "--trajectory", file}, press));
+  EXPECT_EQ(valueOf(again.out, "hash"), valueOf(first.out, "hash"));
+  EXPECT_GT(std::stod(valueOf(first.out, "force_max")), 0.1);
+  EXPECT_EQ(valueOf(again.out, "grasper.force_rms"), "0 N");
+  EXPECT_EQ(valueOf(again.out, "grasper.force_lag"), "0 s");
+  EXPECT_EQ(valueOf(again.out, "grasper.force_peak"), valueOf(again.out, "grasper.force_peak_measured"));
+  const ProgramResult stiffer =
+      runProgram(command({"replay", kScene, "--trajectory", file, "--set", "tissue.bile_sac.young=4e4"}, press));
+  EXPECT_GT(std::stod(valueOf(stiffer.out, "grasper.force_peak")),
+            1.5 * std::stod(valueOf(stiffer.out, "grasper.force_peak_measured")));
+  EXPECT_GT(std::stod(valueOf(stiffer.out, "grasper.force_rms")), 0.01);
+}
+
+TEST(Program, ToolsAreRecordedEachIntoAFileOfItsOwn) {
+  const TemporaryFolder folder;
+  const std::string scene = std::string(MEDULLA_SOURCE_DIR) + "/scenes/abdomen.xml";
+  const std::string a = "grasper=" + folder / "a.csv", b = "retractor=" + folder / "b.csv";
+  const std::vector<std::string> brief = {"--set", "clock.duration=0.7"};
+  const ProgramResult first = runProgram(command({"replay", scene, "--record", a, "--record", b}, brief));
+  ASSERT_EQ(first.exitCode, 0) << first.err;
+  const ProgramResult again = runProgram(command({"replay", scene, "--trajectory", b, "--trajectory", a}, brief));
+  EXPECT_EQ(valueOf(again.out, "hash"), valueOf(first.out, "hash"));
+  EXPECT_EQ(valueOf(again.out, "retractor.force_rms"), "0 N");
+  expectRefusal(runProgram(command({"replay", scene, "--record", folder / "c.csv"}, brief)), 1,
+                {"--record", "2 tools"});
+  expectRefusal(runProgram(command({"replay", scene, "--record", "hook=" + folder / "c.csv"}, brief)), 1, {"hook"});
+  EXPECT_EQ(folder.contents().size(), 2u);
+}
+
 TEST(Program, SurfaceHasTheInputMeshsOrder) {
   const TemporaryFolder folder;
   ASSERT_EQ(runProgram(command({"replay", kScene, "--surface-at", "end", folder / "end.obj"})).exitCode, 0);
@@ -177,6 +214,27 @@ TEST(Program, InfoTellsOfModelsAndScenes) {
   expectRefusal(runProgram({"info", folder / "none.xml"}), 1, {"none.xml"});
 }
 
+TEST(Program, InfoTellsOfTrajectoriesAndRecordings) {
+  const std::string scenes = std::string(MEDULLA_SOURCE_DIR) + "/scenes/";
+  const ProgramResult recording = runProgram({"info", scenes + "recorded/hand.xml"}),
+                      trajectory = runProgram({"info", scenes + "gallbladder.csv"});
+  EXPECT_EQ(valueOf(recording.out, "kind"), "trajectory") << recording.err;
+  EXPECT_EQ(valueOf(recording.out, "samples"), "292");
+  EXPECT_EQ(valueOf(recording.out, "gap_max"), "0.034 s");
+  for (const ProgramResult* r : {&recording, &trajectory}) EXPECT_EQ(valueOf(r->out, "grip_closings"), "1") << r->err;
+  EXPECT_EQ(valueOf(trajectory.out, "to"), "12 s");
+  const TemporaryFolder folder;
+  folder.write("bad.csv", "t,x\n");
+  expectRefusal(runProgram({"info", folder / "bad.csv"}), 1, {"bad.csv:1", "t[s]"});
+}
+
+TEST(Program, TheRecordedSceneRuns) {
+  const ProgramResult r = runProgram(
+      {"replay", std::string(MEDULLA_SOURCE_DIR) + "/scenes/recorded/gallbladder.xml", "--set", "clock.duration=6.2"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_GT(std::stod(valueOf(r.out, "force_max")), 0.1);
+}
+
 TEST(Program, RepairsAreToldInOneLine) {
   const TemporaryFolder folder;
   const std::string mesh = readFile(std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj");
@@ -231,6 +289,13 @@ TEST(ProgramRefuses, BadTrajectories) {
   expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "missing.csv"}), 1, {"missing.csv:1", "z[m]"});
   expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "none.csv"}), 1, {"none.csv"});
   expectRefusal(runProgram({"replay", kScene, "--trajectory", "hook=" + folder / "nan.csv"}), 1, {"hook"});
+  folder.write("unit.xml", "<recording file='r.txt' map='sofa'><units length='meter'/></recording>");
+  folder.write("short.xml", "<recording file='r.txt' map='jigsaws' part='slave_left'/>");
+  folder.write("r.txt", "1 2 3\n");
+  expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "unit.xml"}), 1, {"unit.xml:1", "\"m\""});
+  expectRefusal(runProgram({"check", kScene, "--trajectory", folder / "short.xml"}), 1, {"r.txt:1", "76"});
+  expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "short.xml", "--log", folder / "r.txt"}), 1,
+                {"r.txt:1"});
 }
 
 TEST(ProgramRefuses, OutputsThatCannotBeWritten) {
@@ -239,6 +304,7 @@ TEST(ProgramRefuses, OutputsThatCannotBeWritten) {
   expectRefusal(runProgram(command({"render", kScene, "-o", folder / "none/video.mp4"})), 1, {"none"});
   expectRefusal(runProgram(command({"render", kScene, "-o", folder / "file/frames"})), 1, {"file/frames"});
   expectRefusal(runProgram(command({"replay", kScene, "--log", folder / "none/log.csv"})), 1, {"none/log.csv"});
+  expectRefusal(runProgram(command({"replay", kScene, "--record", folder / "none/r.csv"})), 1, {"none/r.csv"});
   const std::string mesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj";
   expectRefusal(runProgram({"build", mesh, "-o", folder / "none/m.xml"}), 1, {"none/m.xml"});
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"file"});
@@ -249,10 +315,15 @@ TEST(ProgramRefuses, OneFileForTwoPurposes) {
   const std::string csv = folder / "x.csv", video = folder / "v.mp4";
   expectRefusal(runProgram(command({"replay", kScene, "--log", csv, "--surface-at", "end", csv})), 1, {"x.csv", "two"});
   expectRefusal(runProgram(command({"render", kScene, "-o", video, "-o", video})), 1, {"v.mp4", "two"});
+  expectRefusal(runProgram(command({"replay", kScene, "--log", csv, "--record", csv})), 1, {"x.csv", "two"});
+  folder.write("r.xml", "<recording file='r.csv'><columns rate='30' position='1 2 3'/></recording>");
+  folder.write("r.csv", "0,0,0.5\n");
+  expectRefusal(runProgram(command({"replay", kScene, "--trajectory", folder / "r.xml", "--record", folder / "r.csv"})),
+                1, {"r.csv", "input"});
   folder.write("scene.xml", readFile(kScene));
   folder.write("m.obj", readFile(std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj"));
   expectRefusal(runProgram({"build", folder / "m.obj", "-o", folder / "m.obj"}), 1, {"m.obj", "input"});
-  EXPECT_EQ(folder.contents().size(), 2u);
+  EXPECT_EQ(folder.contents().size(), 4u);
 }
 
 TEST(ProgramRefuses, NumbersThatAreNone) {

@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "app/files/recording_map.h"
 #include "app/files/scene_rules.h"
 #include "app/files/xml_element.h"
 
@@ -15,9 +16,9 @@ struct Known {
   std::set<std::string> attributes, children;
 };
 
-TEST(SceneSchema, KnowsWhatTheReaderKnows) {
+void expectSameNames(const char* path, const XmlRules& rules) {
   tinyxml2::XMLDocument document;
-  ASSERT_EQ(document.LoadFile(MEDULLA_SOURCE_DIR "/scenes/scene.xsd"), tinyxml2::XML_SUCCESS);
+  ASSERT_EQ(document.LoadFile(path), tinyxml2::XML_SUCCESS);
   std::map<std::string, Known> schema;
   const tinyxml2::XMLElement* e = document.RootElement()->FirstChildElement("xs:element");
   for (; e; e = e->NextSiblingElement("xs:element")) {
@@ -32,8 +33,8 @@ TEST(SceneSchema, KnowsWhatTheReaderKnows) {
     const tinyxml2::XMLElement* c = choice ? choice->FirstChildElement("xs:element") : nullptr;
     for (; c; c = c->NextSiblingElement("xs:element")) known.children.insert(c->Attribute("ref"));
   }
-  EXPECT_EQ(schema.size(), sceneRules().size());
-  for (const XmlRule& rule : sceneRules()) {
+  EXPECT_EQ(schema.size(), rules.size());
+  for (const XmlRule& rule : rules) {
     Known expected;
     for (const std::string& a : rule.required) expected.attributes.insert(a + "!");
     for (const std::string& a : rule.optional) expected.attributes.insert(a);
@@ -41,6 +42,11 @@ TEST(SceneSchema, KnowsWhatTheReaderKnows) {
     EXPECT_EQ(schema[rule.element].attributes, expected.attributes) << rule.element;
     EXPECT_EQ(schema[rule.element].children, expected.children) << rule.element;
   }
+}
+
+TEST(SceneSchema, KnowsWhatTheReaderKnows) {
+  expectSameNames(MEDULLA_SOURCE_DIR "/scenes/scene.xsd", sceneRules());
+  expectSameNames(MEDULLA_SOURCE_DIR "/scenes/recording.xsd", recordingRules());
 }
 
 TEST(NearestName, CountsInsertionsDeletionsReplacementsAndSwaps) {

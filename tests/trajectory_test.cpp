@@ -6,6 +6,7 @@
 
 #include "app/files/trajectory_file.h"
 #include "haptics/tool_input.h"
+#include "tests/temporary_folder.h"
 
 namespace medulla {
 
@@ -38,10 +39,44 @@ TEST(TrajectoryFile, ReadsRowsCommentsAndForeignLineEnds) {
   EXPECT_NEAR(trajectory.samples[1].worldFromTool.w(), 1, 1e-15);
 }
 
-TEST(TrajectoryFile, AcceptsMeasuredForces) {
-  const Trajectory trajectory =
-      parseTrajectory("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,fx[N],fy[N],fz[N]\n1,0,0,0,1,0,0,0,0,1,2,3\n", "file.csv");
-  EXPECT_EQ(trajectory.samples.size(), 1U);
+TEST(TrajectoryFile, ReadsMeasuredForces) {
+  const Trajectory trajectory = parseTrajectory(
+      "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,fx[N],fy[N],fz[N]\n"
+      "1,0,0,0,1,0,0,0,0,1,2,3\n3,0,0,0,1,0,0,0,0,2,2,-3\n",
+      "file.csv");
+  ASSERT_EQ(trajectory.samples.size(), 2U);
+  EXPECT_EQ(measuredForceAt(trajectory, 1), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(measuredForceAt(trajectory, 1.5), Eigen::Vector3d(1.25, 2, 1.5));
+  EXPECT_EQ(measuredForceAt(trajectory, 3), Eigen::Vector3d(2, 2, -3));
+  EXPECT_FALSE(measuredForceAt(trajectory, 0.99));
+  EXPECT_FALSE(measuredForceAt(trajectory, 3.01));
+  EXPECT_FALSE(measuredForceAt(parseTrajectory(header + "0,0,0,0,1,0,0,0,0\n", "file.csv"), 0));
+}
+
+// What is written is read back to the bit, quaternions that are unit up to rounding among it.
+TEST(TrajectoryFile, ReadsBackWhatItWrites) {
+  const TemporaryFolder folder;
+  std::vector<ToolSample> samples(200);
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const double t = double(k) / 1200;
+    samples[k].time = t;
+    samples[k].position = {std::sin(t), 0.1 * t, -std::cos(t) / 3};
+    samples[k].worldFromTool = Eigen::Quaterniond(std::cos(t), std::sin(3 * t), t, 0.3 * t).normalized();
+    samples[k].grip = std::abs(std::sin(t));
+  }
+  TrajectoryFile file(folder / "record.csv");
+  for (const ToolSample& sample : samples) file.write(sample, sample.position / 7);
+  file.commit();
+  const Trajectory read = readTrajectory(folder / "record.csv");
+  ASSERT_EQ(read.samples.size(), samples.size());
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const ToolSample at = sampleTrajectory(read, samples[k].time);
+    EXPECT_EQ(at.time, samples[k].time);
+    EXPECT_EQ(at.position, samples[k].position);
+    EXPECT_EQ(at.worldFromTool.coeffs(), samples[k].worldFromTool.coeffs());
+    EXPECT_EQ(at.grip, samples[k].grip);
+    EXPECT_EQ(read.measuredForces[k], samples[k].position / 7);
+  }
 }
 
 TEST(TrajectoryFile, EveryMistakeIsNamedWithItsLine) {
@@ -61,9 +96,11 @@ TEST(TrajectoryFile, EveryMistakeIsNamedWithItsLine) {
   expectComplaint(header + "0,0,zero,0,1,0,0,0,0\n", "file.csv:2: ", "'zero'");
   expectComplaint(header + "0,0,0.1x,0,1,0,0,0,0\n", "file.csv:2: ", "'0.1x'");
   expectComplaint(header + "0,0,,0,1,0,0,0,0\n", "file.csv:2: ", "column y[m] is ''");
-  expectComplaint(header + "0,0,0,300,1,0,0,0,0\n", "file.csv:2: ", "column z[m] is 300");
+  expectComplaint(header + "0,0,0,300,1,0,0,0,0\n", "file.csv:2: ", "position z is 300 m");
   expectComplaint(header + good + good, "file.csv:3: ", "strictly increasing");
   expectComplaint(header + good + "-1,0,0,0,1,0,0,0,0\n", "file.csv:3: ", "strictly increasing");
+  expectComplaint(header + "1e10,0,0,0,1,0,0,0,0\n", "file.csv:2: ", "time is 10000000000 s");
+  expectComplaint(header + good + "1,0,0,0,1.0011,0,0,0,0\n", "file.csv:3: ", "length 1.0011");
   expectComplaint(header + "0,0,0,0,0.9,0,0,0,0\n", "file.csv:2: ", "length 0.9");
   expectComplaint(header + "0,0,0,0,0,0,0,0,0\n", "file.csv:2: ", "length 0");
   expectComplaint(header + "0,0,0,0,1,0,0,0,1.5\n", "file.csv:2: ", "column grip is 1.5");
@@ -130,14 +167,60 @@ TEST(Trajectory, ADenseRecordingIsReproduced) {
   }
 }
 
-TEST(Trajectory, TurnsEvenlyTheShortWayAndClosesLinearly) {
-  Trajectory trajectory = keys({{0, 0}, {2, 0}});
-  const Eigen::Quaterniond turned(Eigen::AngleAxisd(1, Eigen::Vector3d::UnitZ()));
-  trajectory.samples[1].worldFromTool = Eigen::Quaterniond(-turned.coeffs());
+static Eigen::Quaterniond turned(double angle, const Eigen::Vector3d& axis) {
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis.normalized()));
+}
+
+TEST(Trajectory, TurnsTheShortWayAsItMovesAndClosesLinearly) {
+  Trajectory trajectory = keys({{0, 0}, {2, 1}});
+  trajectory.samples[1].worldFromTool = Eigen::Quaterniond(-turned(1, {0, 0, 1}).coeffs());
   trajectory.samples[1].grip = 1;
-  const ToolSample sample = sampleTrajectory(trajectory, 0.5);
-  EXPECT_NEAR(sample.worldFromTool.angularDistance(Eigen::Quaterniond::Identity()), 0.25, 1e-7);
-  EXPECT_NEAR(sample.grip, 0.25, 1e-15);
+  for (const double t : {0.1, 0.5, 1.3, 1.9}) {
+    const ToolSample sample = sampleTrajectory(trajectory, t);
+    EXPECT_NEAR(sample.worldFromTool.angularDistance(Eigen::Quaterniond::Identity()), sample.position.x(), 1e-7);
+    EXPECT_NEAR(sample.worldFromTool.norm(), 1, 1e-15);
+    EXPECT_NEAR(sample.grip, t / 2, 1e-15);
+  }
+}
+
+// The angle about one axis goes the cubic's way through uneven keys, without overshoot; equal keys rest to the bit.
+TEST(Trajectory, TurnsAboutAnAxisLikeThePositionAlongOne) {
+  Trajectory trajectory = keys({{0, 0}, {0.4, 0.5}, {0.5, 0.9}, {1.5, 0.9}, {2, -0.4}, {3, -0.3}});
+  const Eigen::Vector3d axis = Eigen::Vector3d(1, 2, -2) / 3;
+  for (ToolSample& key : trajectory.samples) key.worldFromTool = turned(key.position.x(), axis);
+  trajectory.samples[3].worldFromTool = trajectory.samples[2].worldFromTool;
+  for (int i = 0; i <= 300; ++i) {
+    const ToolSample sample = sampleTrajectory(trajectory, 0.01 * i);
+    // Per axis of the tool's frame the same limits act on the same secants, scaled.
+    EXPECT_LT((sample.worldFromTool.vec() - turned(sample.position.x(), axis).vec()).norm(), 1e-12) << i;
+  }
+  EXPECT_EQ(sampleTrajectory(trajectory, 1.1).worldFromTool.coeffs(), trajectory.samples[2].worldFromTool.coeffs());
+}
+
+TEST(Trajectory, HasNoStepOfAngularVelocityAtItsKeys) {
+  Trajectory trajectory = keys({{0, 0}, {0.4, 0}, {0.5, 0}, {1.5, 0}, {2, 0}});
+  const double angles[] = {0, 0.7, 1.3, 2.4, 2.9};
+  for (int k = 0; k < 5; ++k) trajectory.samples[k].worldFromTool = turned(angles[k], {1, 0.5 + 0.2 * k, -0.4 * k});
+  const auto velocity = [&](double a, double b) {
+    const Eigen::AngleAxisd turn(sampleTrajectory(trajectory, a).worldFromTool.conjugate() *
+                                 sampleTrajectory(trajectory, b).worldFromTool);
+    return Eigen::Vector3d(turn.angle() / (b - a) * turn.axis());
+  };
+  const double h = 1e-5;
+  for (const double key : {0.4, 0.5, 1.5}) {
+    const Eigen::Vector3d before = velocity(key - h, key), after = velocity(key, key + h);
+    EXPECT_GT(before.norm(), 0.2);
+    EXPECT_LT((after - before).norm(), 1e-2 * before.norm());
+  }
+}
+
+TEST(Trajectory, EndsWhereNothingChangesAnyMore) {
+  EXPECT_EQ(motionEnd(keys({{1, 0}})), 1);
+  EXPECT_EQ(motionEnd(keys({{1, 0}, {2, 0}, {3, 0.1}})), 3);
+  EXPECT_EQ(motionEnd(keys({{1, 0}, {2, 0.1}, {3, 0.1}, {4, 0.1}})), 2);
+  Trajectory trajectory = keys({{1, 0}, {2, 0.1}, {3, 0.1}, {4, 0.1}});
+  trajectory.samples[2].grip = 1;
+  EXPECT_EQ(motionEnd(trajectory), 4);
 }
 
 }  // namespace medulla

@@ -290,7 +290,7 @@ std::vector<std::string> chartMethodNames() {
 static void draw(const std::string& stem, const std::string& text) {
   const std::string script = stem + ".gnuplot", picture = stem + ".svg";
   writeText(script, text);
-  if (const std::optional<std::string> svg = runGnuplot(script)) {
+  if (const std::optional<std::string> svg = runGnuplot(text)) {
     writeText(picture, *svg);
   } else {
     fmt::print(stderr, "no {}: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {} > {}\n",

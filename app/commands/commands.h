@@ -27,7 +27,7 @@ int runNew(const NewOptions& options);
 
 int runCheck(const RunOptions& options);
 
-// What a model or scene file holds, told apart by its root element.
+// What a model, a scene, a recording (told apart by their root element) or a trajectory (.csv) holds.
 int runInfo(const std::string& path);
 
 int runReplay(const RunOptions& options);
@@ -63,6 +63,11 @@ struct CompareOptions {
   double tolerance = 0;  // share of the largest value that a column has in either; 0: the same
 };
 int runCompare(const CompareOptions& options);
+
+struct PlotOptions {
+  std::string log, output;  // output: FILE.png or FILE.svg
+};
+int runPlot(const PlotOptions& options);
 
 struct ChartOptions {
   RunOptions run;                    // scene, overrides and trajectories

@@ -1,9 +1,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "app/commands/commands.h"
 #include "app/files/model_file.h"
+#include "app/files/recording_file.h"
+#include "app/files/trajectory_file.h"
 #include "app/files/xml_element.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/model/build_report.h"
@@ -119,13 +122,47 @@ std::vector<Result> sceneResults(const LoadedScene& loaded) {
   return results;
 }
 
+// Where a motion lies and when its grip closes: what the frame of a recording is fitted by.
+std::vector<Result> trajectoryResults(const Trajectory& trajectory) {
+  const std::vector<ToolSample>& samples = trajectory.samples;
+  Eigen::AlignedBox3d box;
+  double speed = 0, gap = 0, force = 0;
+  int closings = 0;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    box.extend(samples[k].position);
+    if (samples[k].grip > 0.5 && (k == 0 || samples[k - 1].grip <= 0.5)) ++closings;
+    if (k == 0) continue;
+    const double step = samples[k].time - samples[k - 1].time;
+    gap = std::max(gap, step);
+    speed = std::max(speed, (samples[k].position - samples[k - 1].position).norm() / step);
+  }
+  for (const Eigen::Vector3d& f : trajectory.measuredForces) force = std::max(force, f.norm());
+  std::vector<Result> results = {{"kind", "trajectory", ""},
+                                 {"samples", text(samples.size()), ""},
+                                 {"from", text(samples.front().time), "s"},
+                                 {"to", text(samples.back().time), "s"},
+                                 {"gap_max", text(gap), "s"},
+                                 {"lower", text(box.min()), "m"},
+                                 {"upper", text(box.max()), "m"},
+                                 {"speed_max", text(speed), "m/s"},
+                                 {"grip_closings", fmt::format("{}", closings), ""}};
+  if (!trajectory.measuredForces.empty()) results.push_back({"force_measured_max", text(force), "N"});
+  return results;
+}
+
 }  // namespace
 
 int runInfo(const std::string& path) {
-  if (rootElementOf(path) == "model") {
+  const bool table = std::filesystem::path(path).extension() == ".csv";
+  const std::string root = table ? "" : rootElementOf(path);
+  if (table) {
+    printResults(trajectoryResults(readTrajectory(path)));
+  } else if (root == "recording") {
+    printResults(trajectoryResults(readRecording(readRecordingMap(path))));
+  } else if (root == "model") {
     printResults(modelResults(readModel(path)));
   } else {
-    RunOptions options;  // a third root is refused as no scene
+    RunOptions options;  // any other root is refused as no scene
     options.scene = path;
     printResults(sceneResults(loadRun(options)));
   }

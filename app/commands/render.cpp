@@ -10,6 +10,7 @@
 #include "app/files/content_hash.h"
 #include "app/files/input_error.h"
 #include "app/files/output_file.h"
+#include "app/force_view.h"
 #include "app/interrupt.h"
 #include "app/picture_outputs.h"
 #include "app/progress.h"
@@ -63,10 +64,11 @@ class Artist {
         outputs_(options.outputs, outputSettings(loaded, options, wanted, renderer_.description())),
         progress_("render", static_cast<double>(wanted.times.size()), "pictures") {}
 
-  void draw(int number, const PictureState& state) {
+  void draw(int number, const PictureState& state, ForceView* forces) {
     if (!outputs_.has(number)) {
       times_->start("compose");
       view_.compose(state, options_->view, picture_);
+      if (forces != nullptr) forces->compose(state, picture_);
       renderer_.render(picture_, image_, times_);
       times_->start("hand over");
       outputs_.write(number, image_);
@@ -87,8 +89,8 @@ class Artist {
                                                  const Wanted& wanted, const std::string& renderer) {
     const Scene& scene = loaded.scene;
     const std::string drawing =
-        fmt::format("{}x{} {} {} {} {} {}", scene.width, scene.height, scene.fps, static_cast<int>(options.view.view),
-                    options.view.showProxy, static_cast<int>(options.quality), renderer);
+        fmt::format("{}x{} {} {} {} {} {} {}", scene.width, scene.height, scene.fps, static_cast<int>(options.view.view),
+                    options.view.showProxy, options.view.showForce, static_cast<int>(options.quality), renderer);
     const std::uint64_t run = contentHash(drawing, runHash(loaded, true));
     return {scene.width,
             scene.height,
@@ -179,7 +181,7 @@ void renderCache(const LoadedScene& loaded, const RenderOptions& options, const 
     checkInterrupt();
     times.start("read cache");
     cache.read(numbers[k], state);
-    artist.draw(wanted.first + static_cast<int>(k), state);
+    artist.draw(wanted.first + static_cast<int>(k), state, nullptr);
   }
   artist.finish();
   printFiles(options, artist, secondsSince(start));
@@ -189,18 +191,23 @@ void renderCache(const LoadedScene& loaded, const RenderOptions& options, const 
 void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, StageTimes& times) {
   Simulation simulation(loaded);
   Artist artist(loaded, options, wanted, simulation.current(), times);
+  ForceView forceView(loaded);
   PictureTimes pictures(wanted.times, wanted.first);
   const double cpuStart = processCpuSeconds();
   const auto start = std::chrono::steady_clock::now();
   times.start("simulate");
   const auto afterFrame = [&] {
-    pictures.afterFrame(simulation, [&](int number, const PictureState& state) { artist.draw(number, state); });
+    if (options.view.showForce) forceView.afterFrame(simulation);
+    pictures.afterFrame(simulation, [&](int number, const PictureState& state) {
+      artist.draw(number, state, options.view.showForce ? &forceView : nullptr);
+    });
     times.start("simulate");
   };
-  runToEnd(loaded, options.run, simulation, afterFrame, [&] { artist.finish(); });
+  const std::vector<Result> forces = runToEnd(loaded, options.run, simulation, afterFrame, [&] { artist.finish(); });
   const double wall = secondsSince(start);
   printFiles(options, artist, wall);
   printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));
+  printResults(forces);
 }
 
 }  // namespace

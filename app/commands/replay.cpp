@@ -14,10 +14,11 @@ int runReplay(const RunOptions& options) {
   Progress progress("replay", loaded.scene.duration, "s");
   const double cpuStart = processCpuSeconds();
   const auto start = std::chrono::steady_clock::now();
-  runToEnd(loaded, options, simulation, [&] { progress.update(simulation.time()); });
+  const std::vector<Result> forces = runToEnd(loaded, options, simulation, [&] { progress.update(simulation.time()); });
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::vector<Result> results = runResults(simulation, processCpuSeconds() - cpuStart, wall);
   if (options.untilRest) results.insert(results.begin(), {"rest_at", fmt::format("{:.6g}", simulation.time()), "s"});
+  results.insert(results.end(), forces.begin(), forces.end());
   printResults(results);
   return 0;
 }

@@ -11,6 +11,8 @@
 #include "app/files/state_cache.h"
 #include "app/files/surface_file.h"
 #include "app/files/text_file.h"
+#include "app/files/trajectory_file.h"
+#include "app/force_comparison.h"
 #include "app/interrupt.h"
 
 namespace medulla {
@@ -38,15 +40,25 @@ CacheLayout cacheLayout(const LoadedScene& loaded) {
   return layout;
 }
 
-LoadedScene loadRun(const RunOptions& options) {
-  Scene scene = readScene(options.scene, options.overrides);
-  std::map<std::string, std::string> trajectories;
-  for (const auto& [name, path] : options.trajectories) {
+// With every tool named, and known.
+static std::map<std::string, std::string> filesOfTools(const std::string& option, const Scene& scene,
+                                                       const std::map<std::string, std::string>& files) {
+  std::map<std::string, std::string> out;
+  for (const auto& [name, path] : files) {
     if (name.empty() && scene.tools.size() != 1)
       throw std::runtime_error(
-          fmt::format("--trajectory {}: the scene has {} tools, write TOOL=FILE", path, scene.tools.size()));
-    trajectories[name.empty() ? scene.tools[0].name : name] = path;
+          fmt::format("{} {}: the scene has {} tools, write TOOL=FILE", option, path, scene.tools.size()));
+    const std::string tool = name.empty() ? scene.tools[0].name : name;
+    if (std::none_of(scene.tools.begin(), scene.tools.end(), [&](const SceneTool& t) { return t.name == tool; }))
+      throw std::runtime_error(fmt::format("{} {}={}: the scene has no tool \"{}\"", option, name, path, name));
+    out[tool] = path;
   }
+  return out;
+}
+
+LoadedScene loadRun(const RunOptions& options) {
+  Scene scene = readScene(options.scene, options.overrides);
+  const auto trajectories = filesOfTools("--trajectory", scene, options.trajectories);
   return loadScene(std::move(scene), trajectories);
 }
 
@@ -83,7 +95,7 @@ class RestWatch {
   explicit RestWatch(const LoadedScene& loaded) {
     for (const SceneBody& body : loaded.scene.bodies)
       for (const DeadLoad& load : body.deadLoads) busyUntil_ = std::max(busyUntil_, load.to);
-    for (const Trajectory& motion : loaded.trajectories) busyUntil_ = std::max(busyUntil_, motion.samples.back().time);
+    for (const Trajectory& motion : loaded.trajectories) busyUntil_ = std::max(busyUntil_, motionEnd(motion));
   }
   void afterFrame(const Simulation& simulation) {
     const World& world = simulation.world();
@@ -172,6 +184,49 @@ class LogRecorder {
   LogRow row_;
 };
 
+// What the tools consumed and felt, tick by tick: a file per tool that is asked for.
+class MotionRecorder {
+ public:
+  MotionRecorder(const LoadedScene& loaded, const RunOptions& options) : files_(loaded.scene.tools.size()) {
+    const auto records = filesOfTools("--record", loaded.scene, options.records);
+    for (std::size_t k = 0; k < files_.size(); ++k)
+      if (const auto found = records.find(loaded.scene.tools[k].name); found != records.end())
+        files_[k] = std::make_unique<TrajectoryFile>(found->second);
+  }
+  void afterFrame(const Simulation& simulation) {
+    const ServoRecord& record = simulation.record();
+    for (std::size_t tick = record.start > 0 ? 1 : 0; tick < record.inputs.size(); ++tick)
+      for (std::size_t k = 0; k < files_.size(); ++k)
+        if (files_[k]) files_[k]->write(record.inputs[tick][k], record.tools[tick][k].force);
+  }
+  void commit() {
+    for (const auto& file : files_)
+      if (file) file->commit();
+  }
+
+ private:
+  std::vector<std::unique_ptr<TrajectoryFile>> files_;  // one per tool
+};
+
+std::vector<Result> forceResults(const LoadedScene& loaded, const ForceComparison& forces) {
+  std::vector<Result> out;
+  const auto matches = forces.matches();
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    if (!matches[k]) continue;
+    const ForceMatch& match = *matches[k];
+    const auto add = [&](const char* name, double value, const char* unit) {
+      out.push_back({fmt::format("{}.{}", loaded.scene.tools[k].name, name), fmt::format("{:.4g}", value), unit});
+    };
+    add("force_rms", match.rms, "N");
+    add("force_peak", match.peak, "N");
+    add("force_peak_measured", match.peakMeasured, "N");
+    if (!match.lag) continue;
+    add("force_lag", *match.lag, "s");
+    add("force_correlation", match.correlation, "");
+  }
+  return out;
+}
+
 }  // namespace
 
 // Every file that a run reads; some may be empty or missing.
@@ -186,7 +241,7 @@ static std::vector<std::string> inputFiles(const Scene& scene) {
     inputs.push_back(std::filesystem::path(body.referencePath).replace_extension(".time").string());
   }
   for (const SceneStatic& item : scene.statics) inputs.push_back(item.meshPath);
-  for (const SceneTool& tool : scene.tools) inputs.push_back(tool.trajectoryPath);
+  for (const SceneTool& tool : scene.tools) inputs.insert(inputs.end(), {tool.trajectoryPath, tool.recordingPath});
   std::erase(inputs, "");
   return inputs;
 }
@@ -196,6 +251,7 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
   std::vector<std::string> outputs = pictures;
   outputs.push_back(options.logPath);
   outputs.push_back(options.cachePath);
+  for (const auto& [tool, path] : options.records) outputs.push_back(path);
   for (const SurfaceRequest& request : options.surfaces) outputs.push_back(request.path);
   requireDistinctFiles(outputs, inputFiles(loaded.scene));
 }
@@ -227,11 +283,13 @@ void PictureTimes::afterFrame(const Simulation& simulation, const std::function<
   }
 }
 
-void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
-              const std::function<void()>& afterFrame, const std::function<void()>& finish) {
+std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
+                             const std::function<void()>& afterFrame, const std::function<void()>& finish) {
   SurfaceRecorder surfaces(loaded, options);
   LogRecorder log(loaded, options);
   CacheRecorder cache(loaded, options);
+  MotionRecorder motions(loaded, options);
+  ForceComparison forces(loaded);
   RestWatch rest(loaded);
   for (const BodyOverlap& o : simulation.world().startOverlaps())
     fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n",
@@ -243,6 +301,8 @@ void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& 
     if (options.untilRest && !rest.atRest() && simulation.finished()) rest.fail(simulation.time());
     last = simulation.finished() || rest.atRest();
     log.afterFrame(simulation);
+    motions.afterFrame(simulation);
+    forces.afterFrame(simulation);
     surfaces.afterFrame(simulation, last);
     cache.afterFrame(simulation);
     afterFrame();
@@ -250,7 +310,9 @@ void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& 
   if (finish) finish();
   log.commit();
   cache.commit(simulation);
+  motions.commit();
   surfaces.write(simulation);
+  return forceResults(loaded, forces);
 }
 
 std::vector<Result> runResults(const Simulation& simulation, double cpuSeconds, double wallSeconds) {

@@ -24,7 +24,8 @@ struct SurfaceRequest {
 struct RunOptions {
   std::string scene;
   std::vector<SceneOverride> overrides;
-  std::map<std::string, std::string> trajectories;  // tool name (empty: the only tool) -> file
+  std::map<std::string, std::string> trajectories;  // tool name (empty: the only tool) -> file to read
+  std::map<std::string, std::string> records;       // the same -> file for the motion and the force of its ticks
   std::string logPath;
   bool logEveryTick = false;
   std::vector<SurfaceRequest> surfaces;
@@ -74,12 +75,13 @@ CacheLayout cacheLayout(const LoadedScene& loaded);
 LoadedScene loadRun(const RunOptions& options);
 
 // Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` after the last, before
-// log and surfaces appear under their names: what fails there leaves those as they were. Until rest: until every node
-// has been slower than 1e-5 m/s for 0.1 s, so that the turning point of a swing does not count, and neither a load nor
-// a tool's recorded motion is still to come; surfaces asked for at a later time are those at rest. Throws NotAtRest,
-// and Interrupted after a signal.
-void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
-              const std::function<void()>& afterFrame, const std::function<void()>& finish = {});
+// records, log and surfaces appear under their names: what fails there leaves those as they were. Until rest: until
+// every node has been slower than 1e-5 m/s for 0.1 s, so that the turning point of a swing does not count, and neither
+// a load nor a tool's recorded motion is still to come; surfaces asked for at a later time are those at rest. Returns
+// results of their own: how the force of tools whose trajectory has a measured one compares with that. Throws
+// NotAtRest, and Interrupted after a signal.
+std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
+                             const std::function<void()>& afterFrame, const std::function<void()>& finish = {});
 
 // Every file that the run writes besides `pictures` must differ from the others and from what it reads.
 void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options,

@@ -107,8 +107,9 @@ int runStability(const StabilityOptions& options) {
     }
     writeStability((folder / "map.csv").string(), map);
     writeStability((folder / "trials.csv").string(), tortured);
-    writeText(script, stabilityScript(loaded.scene.name, map, tortured, limit));
-    if (const std::optional<std::string> svg = runGnuplot(script)) {
+    const std::string text = stabilityScript(loaded.scene.name, map, tortured, limit);
+    writeText(script, text);
+    if (const std::optional<std::string> svg = runGnuplot(text)) {
       writeText((folder / "stability.svg").string(), *svg);
     } else {
       fmt::print(stderr, "no stability.svg: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {}\n",

@@ -14,23 +14,39 @@ static std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
+// The next line without its comment and the white space around it; `rest` loses it.
+static std::string_view takeLine(std::string_view& rest) {
+  const std::size_t end = rest.find('\n');
+  const std::string_view line = rest.substr(0, end);
+  rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+  return trimmed(line.substr(0, line.find('#')));
+}
+
 bool CsvRows::next() {
   cells_.clear();
   while (cells_.empty() && !rest_.empty()) {
-    const std::size_t end = rest_.find('\n');
-    std::string_view row = rest_.substr(0, end);
-    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+    std::string_view row = takeLine(rest_);
     ++line_;
-    row = trimmed(row.substr(0, row.find('#')));
     while (!row.empty()) {
-      const std::size_t comma = row.find(',');
-      cells_.push_back(trimmed(row.substr(0, comma)));
-      if (comma == std::string_view::npos) break;
-      row.remove_prefix(comma + 1);
-      if (row.empty()) cells_.push_back(row);  // behind a comma at the end
+      const std::size_t end = separator_ == ' ' ? row.find_first_of(" \t") : row.find(separator_);
+      cells_.push_back(trimmed(row.substr(0, end)));
+      if (end == std::string_view::npos) break;
+      row.remove_prefix(end + 1);
+      if (separator_ == ' ')
+        row = trimmed(row);
+      else if (row.empty())
+        cells_.push_back(row);  // behind a separator at the end
     }
   }
   return !cells_.empty();
+}
+
+char CsvRows::separatorOf(std::string_view text) {
+  std::string_view row;
+  while (row.empty() && !text.empty()) row = takeLine(text);
+  for (const char separator : {',', ';'})
+    if (row.find(separator) != std::string_view::npos) return separator;
+  return ' ';
 }
 
 double CsvRows::number(std::size_t cell, std::string_view column) const {

@@ -6,15 +6,20 @@
 
 namespace medulla {
 
-// Walks a CSV text row by row, for formats whose errors must name the line. Cells come without the white space around
-// them; # starts a comment; rows without content are skipped; lines end in LF or CRLF.
+// Walks a table in text row by row, for formats whose errors must name the line. Cells come without the white space
+// around them; # starts a comment; rows without content are skipped; lines end in LF or CRLF.
 class CsvRows {
  public:
-  // `text` must outlive this object; `name` is the path that errors begin with.
-  CsvRows(std::string_view text, std::string name) : rest_(text), name_(std::move(name)) {}
+  // `text` must outlive this object; `name` is the path that errors begin with. A blank as separator stands for any run
+  // of blanks and tabs.
+  CsvRows(std::string_view text, std::string name, char separator = ',')
+      : rest_(text), name_(std::move(name)), separator_(separator) {}
 
   // Moves to the next row with content. False at the end.
   bool next();
+
+  // A table of this text goes by: comma, semicolon or blank, the first of these that its first row holds.
+  static char separatorOf(std::string_view text);
 
   const std::vector<std::string_view>& cells() const { return cells_; }
   int line() const { return line_; }  // 1-based
@@ -29,6 +34,7 @@ class CsvRows {
  private:
   std::string_view rest_;
   std::string name_;
+  char separator_;
   int line_ = 0;
   std::vector<std::string_view> cells_;
 };

@@ -1,6 +1,5 @@
 #include "app/files/gnuplot.h"
 
-#include <fcntl.h>
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -26,6 +25,13 @@ class MemoryFile {
   MemoryFile(const MemoryFile&) = delete;
   MemoryFile& operator=(const MemoryFile&) = delete;
   int descriptor() const { return descriptor_; }
+  void write(const std::string& text) const {
+    for (std::size_t done = 0; done < text.size();) {
+      const ssize_t n = ::pwrite(descriptor_, text.data() + done, text.size() - done, static_cast<off_t>(done));
+      if (n < 0) throw std::runtime_error(std::string("no room in memory: ") + std::strerror(errno));
+      done += static_cast<std::size_t>(n);
+    }
+  }
   std::string text() const {
     std::string out(static_cast<std::size_t>(lseek(descriptor_, 0, SEEK_END)), '\0');
     const ssize_t n = pread(descriptor_, out.data(), out.size(), 0);
@@ -39,13 +45,14 @@ class MemoryFile {
 
 }  // namespace
 
-std::optional<std::string> runGnuplot(const std::string& scriptPath) {
-  const MemoryFile picture("chart"), complaints("gnuplot-errors");
-  std::string program = "gnuplot", script = scriptPath;
-  char* const argv[] = {program.data(), script.data(), nullptr};
+std::optional<std::string> runGnuplot(const std::string& script) {
+  const MemoryFile input("script"), picture("chart"), complaints("gnuplot-errors");
+  input.write(script);
+  std::string program = "gnuplot";
+  char* const argv[] = {program.data(), nullptr};
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, input.descriptor(), STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, picture.descriptor(), STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, complaints.descriptor(), STDERR_FILENO);
   pid_t child = -1;

@@ -7,6 +7,6 @@ namespace medulla {
 
 // What gnuplot writes to standard output for a script; nothing where it is not installed. Throws std::runtime_error
 // with gnuplot's complaint.
-std::optional<std::string> runGnuplot(const std::string& scriptPath);
+std::optional<std::string> runGnuplot(const std::string& script);
 
 }  // namespace medulla

@@ -37,8 +37,9 @@ double metresPerUnit(const std::string& unit) {
   if (unit == "m") return 1;
   if (unit == "cm") return 0.01;
   if (unit == "mm") return 0.001;
+  if (unit == "micron") return 1e-6;
   if (unit == "inch") return 0.0254;
-  throw std::runtime_error("unknown unit '" + unit + "', expected m, cm, mm or inch");
+  throw std::runtime_error("unknown unit '" + unit + "', expected m, cm, mm, micron or inch");
 }
 
 TriangleMesh readMesh(const std::string& path, double metresPerFileUnit) {

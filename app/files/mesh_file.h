@@ -6,7 +6,7 @@
 
 namespace medulla {
 
-// Metres per unit of the file: m, cm, mm or inch. Throws std::runtime_error naming the known units.
+// Metres per unit of a file: m, cm, mm, micron or inch. Throws std::runtime_error naming the known units.
 double metresPerUnit(const std::string& unit);
 
 // Reads a triangle mesh. OBJ and OFF by a reader of our own (vertex order kept, double precision, indices checked,

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "app/files/content_hash.h"
+#include "app/files/placement.h"
 #include "app/files/scene_overrides.h"
 #include "app/files/scene_rules.h"
 #include "app/files/xml_element.h"
@@ -48,31 +49,6 @@ std::string readUniqueName(const XmlElement& element, std::set<std::string>& tak
   std::string name = readName(element);
   if (!taken.insert(name).second) refuse(element, "name", "another <" + element.name + "> has this name");
   return name;
-}
-
-Eigen::Vector3d readVector(const XmlElement& element, const std::string& attribute, const Eigen::Vector3d& fallback) {
-  const std::vector<double> v = readNumbers(element, attribute, 3);
-  return v.empty() ? fallback : Eigen::Vector3d(v[0], v[1], v[2]);
-}
-
-std::string readPath(const XmlElement& element, const std::string& attribute, const std::string& scenePath) {
-  const std::filesystem::path folder = std::filesystem::path(scenePath).parent_path();
-  return (folder / readText(element, attribute)).lexically_normal().string();
-}
-
-Eigen::Isometry3d readPlacement(const XmlElement& element) {
-  Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
-  const std::vector<double> q = readNumbers(element, "orientation", 4);
-  if (!q.empty()) {
-    const Eigen::Quaterniond orientation(q[0], q[1], q[2], q[3]);
-    // Rounded figures are normalised; anything further off is a mistake rather than rounding.
-    if (!(std::abs(orientation.norm() - 1) <= 1e-3)) {
-      refuse(element, "orientation", "expected a unit quaternion w x y z (length within 1e-3 of 1)");
-    }
-    out.linear() = orientation.normalized().toRotationMatrix();
-  }
-  out.translation() = readVector(element, "position", Eigen::Vector3d::Zero());
-  return out;
 }
 
 void readClock(const XmlElement& clock, Scene& scene) {

@@ -9,6 +9,7 @@
 
 #include "app/files/csv_rows.h"
 #include "app/files/input_error.h"
+#include "app/files/number_text.h"
 #include "app/files/text_file.h"
 
 namespace medulla {
@@ -18,7 +19,8 @@ static constexpr std::array<std::string_view, 12> columnNames = {"t[s]", "x[m]",
                                                                  "qy",   "qz",   "grip", "fx[N]", "fy[N]", "fz[N]"};
 static constexpr std::size_t requiredColumns = 9;
 static constexpr std::string_view requiredHeader = "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip";
-enum Column { time, x, y, z, qw, qx, qy, qz, grip };
+static constexpr double timeReach = 1e9;  // s; doubles still tell 1 us apart, and no difference overflows
+enum Column { time, x, y, z, qw, qx, qy, qz, grip, fx, fy, fz };
 
 static void checkHeader(const std::vector<std::string_view>& cells, const std::string& name, int line) {
   for (std::size_t k = 0; k < requiredColumns; ++k)
@@ -34,22 +36,33 @@ static void checkHeader(const std::vector<std::string_view>& cells, const std::s
                      fmt::format("{} columns, expected {}[,fx[N],fy[N],fz[N]]", cells.size(), requiredHeader));
 }
 
-static ToolSample sampleOfRow(const std::vector<double>& row, const std::string& name, int line) {
+void addSample(Trajectory& trajectory, ToolSample sample, const std::string& name, int line) {
+  if (!(std::abs(sample.time) <= timeReach))
+    throw inputError(name, line, fmt::format("time is {} s, expected within {:.0e} s", sample.time, timeReach));
+  for (int k = 0; k < 3; ++k)
+    if (!(std::abs(sample.position[k]) <= toolReach))
+      throw inputError(name, line,
+                       fmt::format("position {} is {} m, expected within {} m of the origin", "xyz"[k],
+                                   sample.position[k], toolReach));
+  const double squaredLength = sample.worldFromTool.squaredNorm();
+  if (!(std::abs(std::sqrt(squaredLength) - 1) <= 1e-3))
+    throw inputError(name, line, fmt::format("quaternion has length {:.6g}, expected 1", std::sqrt(squaredLength)));
+  if (std::abs(squaredLength - 1) > 1e-14) sample.worldFromTool.normalize();
+  if (!trajectory.samples.empty() && !(sample.time > trajectory.samples.back().time))
+    throw inputError(name, line,
+                     fmt::format("time {} s does not follow {} s, expected strictly increasing times", sample.time,
+                                 trajectory.samples.back().time));
+  trajectory.samples.push_back(sample);
+}
+
+static ToolSample sampleOfRow(const std::vector<double>& row, const CsvRows& rows) {
   ToolSample sample;
   sample.time = row[time];
   sample.position = {row[x], row[y], row[z]};
-  for (std::size_t k = x; k <= z; ++k)
-    if (std::abs(row[k]) > toolReach)
-      throw inputError(
-          name, line,
-          fmt::format("column {} is {}, expected metres within {} of the origin", columnNames[k], row[k], toolReach));
-  const Eigen::Quaterniond orientation(row[qw], row[qx], row[qy], row[qz]);
-  if (!(std::abs(orientation.norm() - 1) <= 1e-3))
-    throw inputError(name, line, fmt::format("quaternion qw,qx,qy,qz has length {}, expected 1", orientation.norm()));
-  sample.worldFromTool = orientation.normalized();
+  sample.worldFromTool = Eigen::Quaterniond(row[qw], row[qx], row[qy], row[qz]);
   sample.grip = row[grip];
   if (sample.grip < 0 || sample.grip > 1)
-    throw inputError(name, line, fmt::format("column grip is {}, expected 0 (open) to 1 (closed)", sample.grip));
+    rows.fail(fmt::format("column grip is {}, expected 0 (open) to 1 (closed)", sample.grip));
   return sample;
 }
 
@@ -65,11 +78,8 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name) {
       rows.fail(fmt::format("{} columns in this row, expected {} as in the header", rows.cells().size(), columns));
     row.clear();
     for (std::size_t k = 0; k < columns; ++k) row.push_back(rows.number(k, columnNames[k]));
-    const ToolSample sample = sampleOfRow(row, name, rows.line());
-    if (!trajectory.samples.empty() && sample.time <= trajectory.samples.back().time)
-      rows.fail(fmt::format("time {} does not follow {}, expected strictly increasing t[s]", sample.time,
-                            trajectory.samples.back().time));
-    trajectory.samples.push_back(sample);
+    addSample(trajectory, sampleOfRow(row, rows), name, rows.line());
+    if (columns > requiredColumns) trajectory.measuredForces.emplace_back(row[fx], row[fy], row[fz]);
   }
   if (trajectory.samples.empty()) throw inputError(name, 0, "no rows after the header, expected at least one");
   return trajectory;
@@ -77,6 +87,24 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name) {
 
 Trajectory readTrajectory(const std::string& path) {
   return parseTrajectory(readTextFile(path), path);
+}
+
+TrajectoryFile::TrajectoryFile(const std::string& path) : file_(path) {
+  std::string header;
+  for (const std::string_view column : columnNames) header.append(header.empty() ? "" : ",").append(column);
+  file_.write(header + "\n");
+}
+
+void TrajectoryFile::write(const ToolSample& sample, const Eigen::Vector3d& force) {
+  const Eigen::Vector3d& p = sample.position;
+  const Eigen::Quaterniond& q = sample.worldFromTool;
+  line_.clear();
+  for (const double value :
+       {sample.time, p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z(), sample.grip, force.x(), force.y(), force.z()}) {
+    if (!line_.empty()) line_ += ',';
+    appendNumber(line_, value);
+  }
+  file_.write(line_ + "\n");
 }
 
 }  // namespace medulla

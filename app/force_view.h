@@ -1,0 +1,29 @@
+#pragma once
+
+#include <vector>
+
+#include "app/simulation.h"
+#include "render/renderer.h"
+
+namespace medulla {
+
+// The force on the hand as the viewer of a picture sees it: an arrow at each tool's proxy, and a strip chart of its
+// size over the last five seconds. Both have one range, which only grows: it begins at the force of a device that is
+// one tool radius beyond the surface. An arrow of the whole range is a fifth of the picture high at the camera's
+// target.
+class ForceView {
+ public:
+  explicit ForceView(const LoadedScene& loaded);
+  void afterFrame(const Simulation& simulation);              // every dynamics frame, in order
+  void compose(const PictureState& state, Picture& picture);  // times do not fall
+
+ private:
+  void growRange(double time);
+
+  const LoadedScene* loaded_;
+  std::vector<std::vector<float>> sizes_;  // N, [tool][tick], from time 0
+  std::size_t seen_ = 0;                   // ticks that the range covers
+  double range_ = 0;                       // N
+};
+
+}  // namespace medulla

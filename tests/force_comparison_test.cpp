@@ -1,0 +1,44 @@
+#include "app/force_comparison.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace medulla {
+
+using Forces = std::vector<Eigen::Vector3d>;
+
+static Forces bumps(int count, int late, double factor) {
+  Forces out;
+  for (int k = 0; k < count; ++k) {
+    const double t = 0.01 * (k - late), f = factor * (std::exp(-(t - 4) * (t - 4)) + std::exp(-9 * (t - 7) * (t - 7)));
+    out.emplace_back(f, 0.5 * f, -f);
+  }
+  return out;
+}
+
+TEST(ForceComparison, FindsRmsPeaksAndLag) {
+  const Forces measured = bumps(1000, 0, 1);
+  const ForceMatch same = matchForces(measured, measured, 0.01);
+  EXPECT_EQ(same.rms, 0);
+  EXPECT_EQ(same.lag, 0);
+  EXPECT_NEAR(same.correlation, 1, 1e-12);
+  EXPECT_NEAR(same.peak, 1.5, 1e-3);
+  const ForceMatch late = matchForces(bumps(1000, 17, 2), measured, 0.01),
+                   early = matchForces(measured, bumps(1000, 17, 2), 0.01);
+  EXPECT_NEAR(*late.lag, 0.17, 1e-12);
+  EXPECT_NEAR(*early.lag, -0.17, 1e-12);
+  EXPECT_NEAR(late.correlation, 1, 1e-3);
+  EXPECT_NEAR(late.peak, 2 * late.peakMeasured, 1e-3);
+}
+
+TEST(ForceComparison, AConstantForceHasNoLag) {
+  const Forces constant(100, Eigen::Vector3d(0, 0, 2)), zero(100, Eigen::Vector3d::Zero());
+  const ForceMatch match = matchForces(zero, constant, 0.01);
+  EXPECT_EQ(match.rms, 2);
+  EXPECT_EQ(match.peak, 0);
+  EXPECT_EQ(match.peakMeasured, 2);
+  EXPECT_FALSE(match.lag);
+}
+
+}  // namespace medulla
