@@ -66,7 +66,10 @@ void Simulation::advanceFrame() {
   const FrameReport report = world_.advance(loads_);
   std::swap(previous_, current_);
   world_.readFrame(current_);
-  if (!inputs_.empty()) servo_->commit(previous_, current_);  // without tools nobody feels the surface
+  if (!inputs_.empty()) {  // without tools nobody feels the surface
+    servo_->commit(previous_, current_, servo_->tools());
+    servo_->beginFrame();
+  }
   ++frame_;
   accountImpulses(report);
   accountVolumes();

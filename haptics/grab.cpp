@@ -25,6 +25,7 @@ void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy,
   const bool closes = device.grip > 0.5;
   if (closes == grip.closed) return;
   grip.closed = closes;
+  grip.slipped = false;
   grip.held.clear();
   if (closes && proxy.inContact()) holdPatch(surface, alpha, proxy, device, gripRadius, grip);
 }

@@ -8,17 +8,19 @@
 #include <stdexcept>
 #include <string>
 
+#include "haptics/force_shading.h"
+
 namespace medulla {
 
 using Eigen::Vector3d;
 
 // The proxy stops this far short of a surface, so that rounding never puts it inside; farther than `touching` a contact
 // is over. Both in metres.
-static constexpr double standOff = 1e-7, touching = 1e-6;
+static constexpr double standOff = 5e-8, touching = 1e-6;
 // Below this a proxy has arrived, m.
 static constexpr double arrived = 1e-9;
 // Enough for every groove and corner met in a tick; what is left is done in the next.
-static constexpr int maxSweeps = 10, maxPushes = 10, maxPasses = 4;
+static constexpr int maxSweeps = 10, maxPushes = 10, maxPasses = 4, shadingPasses = 2;
 
 // ---- Nearest point in half-spaces ----------------------------------------------------------------------
 
@@ -104,10 +106,11 @@ static void dropPlane(TouchedPlanes& touched, int k) {
 // grazing incidence, so that the distance to the surface stays standOff.
 static bool moveTo(const Buckets& buckets, double alpha, const Vector3d& target, Proxy& proxy, SurfaceHit& hit) {
   const Vector3d motion = target - proxy.centre;
-  if (!buckets.sweep(proxy.centre, motion, proxy.radius, alpha, hit)) {
+  if (!buckets.sweep(proxy.centre, motion, proxy.radius, alpha, proxy.lastBucket, hit)) {
     proxy.centre = target;
     return false;
   }
+  proxy.lastBucket = hit.bucket;
   const double length = motion.norm(), incidence = std::max(0.02, -hit.normal.dot(motion) / length);
   proxy.centre += std::max(0.0, hit.t - standOff / (incidence * length)) * motion;
   return true;
@@ -160,6 +163,31 @@ static void keepPressingContacts(const Buckets& buckets, double alpha, const Tou
   for (int k = 0; k < proxy.contactCount; ++k) proxy.contacts[k].share /= sum;
 }
 
+// Force shading as a change of the goal. Without it the proxy rests at `free`, pulled along -n by the depth D; it shall
+// rest where the pull is along the shaded normal m of what it touches there, D (m / (m . n) - n) beside `free`. The
+// goal moves by as much, so that what the proxy may not pass stays the mesh itself. m is that of where the proxy is
+// now, with `touched`: on a bulge another than at `free`.
+static Vector3d shadedGoal(const Buckets& buckets, double alpha, const TouchedPlanes& touched, const Vector3d& centre,
+                           const Vector3d& free, const Vector3d& device) {
+  std::array<HalfSpace, 3> shaded;
+  int count = 0;
+  for (int k = 0; k < touched.count; ++k) {
+    if (!(touched.pressure[k] > arrived)) continue;
+    const ProxyContact contact = contactAt(buckets, alpha, touched.triangles[k], centre);
+    HalfSpace& plane = shaded[count++];
+    plane.normal = shadedNormal(buckets.surface(), alpha, contact.triangle, contact.weights, contact.normal);
+    plane.offset = plane.normal.dot(centre);
+  }
+  Vector3d nearest;
+  std::array<double, 3> pressure;
+  if (!nearestInHalfSpaces(device, shaded.data(), count, nearest, pressure)) return device;
+  const Vector3d pull = nearest - device;
+  const double depth = (free - device).norm(), rise = pull.dot(free - device) / depth;
+  constexpr double steepest = 0.5;  // of m . n; beyond, as in a wedge, the mesh's own normals
+  if (!(rise > steepest * pull.norm())) return device;
+  return device + (depth / rise * pull - (free - device));
+}
+
 // Coulomb friction as a change of the goal. Without friction the proxy would slide from `start` to `free`, pressed by
 // the depth |free - device|. It may trail behind `free` by up to mu times that depth. Stick: the goal is pulled back
 // onto the line through the start along the contact normal; slip: by exactly mu_d depth. Solving again towards the new
@@ -183,13 +211,22 @@ void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool
                   Proxy& proxy) {
   const Proxy start = proxy;
   TouchedPlanes touched = slideTo(buckets, alpha, device, proxy);
-  const bool pressed = touched.count > 0 && (proxy.centre - device).norm() > arrived;
-  if (pressed && tool.staticFriction > 0) {
-    bool slipping = start.slipping;
-    const Vector3d goal = frictionGoal(tool, start.centre, proxy.centre, device, slipping);
-    proxy = start;
-    proxy.slipping = slipping;
-    touched = slideTo(buckets, alpha, goal, proxy);
+  const Vector3d free = proxy.centre;
+  if (touched.count > 0 && (free - device).norm() > arrived) {
+    Vector3d goal = device;
+    for (int pass = 0; pass < shadingPasses; ++pass) {
+      const Vector3d next = shadedGoal(buckets, alpha, touched, proxy.centre, free, device);
+      if ((next - goal).norm() <= arrived) break;
+      goal = next;
+      touched = slideTo(buckets, alpha, goal, proxy);
+    }
+    if (tool.staticFriction > 0 && (proxy.centre - goal).norm() > arrived) {
+      bool slipping = start.slipping;
+      const Vector3d held = frictionGoal(tool, start.centre, proxy.centre, goal, slipping);
+      proxy = start;
+      proxy.slipping = slipping;
+      touched = slideTo(buckets, alpha, held, proxy);
+    }
   }
   keepPressingContacts(buckets, alpha, touched, proxy);
   if (!proxy.inContact()) proxy.slipping = true;
@@ -215,8 +252,8 @@ static Vector3d carriedBy(const Buckets& buckets, double alpha, const Proxy& pro
 // The path of the proxy from `start` to `end` as seen from each moving triangle (Ruspini and Khatib 2000, "adjusted
 // segment"): the start is shifted by the triangle's own motion near it. Where a triangle would pass the proxy, the end
 // is moved back to the touched side. Repeated, because moving back from one triangle may meet another.
-static Vector3d notPassedOver(Buckets& buckets, double alphaBefore, double alpha, double radius, const Vector3d& start,
-                              Vector3d end) {
+static Vector3d notPassedOver(const Buckets& buckets, double alphaBefore, double alpha, double radius,
+                              const Vector3d& start, Vector3d end) {
   for (int pass = 0; pass < maxPasses; ++pass) {
     Vector3d corrected = end;
     double largest = 0;
@@ -237,7 +274,7 @@ static Vector3d notPassedOver(Buckets& buckets, double alphaBefore, double alpha
   return end;
 }
 
-static int nearestTriangle(Buckets& buckets, double alpha, const Vector3d& p, double& distance) {
+static int nearestTriangle(const Buckets& buckets, double alpha, const Vector3d& p, double& distance) {
   int nearest = -1;
   for (const int t : buckets.near(p, 0)) {
     const double d = distanceTo(buckets, alpha, t, p);
@@ -259,7 +296,7 @@ static void addClearance(const Buckets& buckets, double alpha, int triangle, dou
 // Moves the proxy out to standOff beyond the tool's radius from every triangle, by the shortest way that the planes
 // found so far allow. Each move is swept with the clearance there is, so that pushing out of one surface never leads
 // through another; where no room is found the proxy keeps the clearance it has.
-static void pushOut(Buckets& buckets, double alpha, double toolRadius, Proxy& proxy) {
+static void pushOut(const Buckets& buckets, double alpha, double toolRadius, Proxy& proxy) {
   TouchedPlanes touched;
   const Vector3d start = proxy.centre;
   for (int k = 0; k <= maxPushes; ++k) {
@@ -275,7 +312,7 @@ static void pushOut(Buckets& buckets, double alpha, double toolRadius, Proxy& pr
   }
 }
 
-void followSurface(Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy) {
+void followSurface(const Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy) {
   const Vector3d start = proxy.centre, carried = start + carriedBy(buckets, alpha, proxy);
   if (!(carried.lpNorm<Eigen::Infinity>() <= toolReach))
     throw std::runtime_error("a touched surface carried the tool beyond " + std::to_string(int(toolReach)) +

@@ -22,6 +22,7 @@ struct Proxy {
   // The tool's radius; less while surfaces leave no room for it: a squeezed proxy shrinks rather than tunnels.
   double radius = 0;
   bool slipping = true;
+  int lastBucket = -1;  // where the last sweep ended: the next is likely to end there, too
   int contactCount = 0;
   std::array<ProxyContact, 3> contacts;
 
@@ -36,10 +37,10 @@ Proxy placeProxy(const Buckets& buckets, const Eigen::Vector3d& device, double t
 
 // The surface moves from alphaBefore to alpha (of the same two frames) and takes the proxy along: carried by what it
 // touches, never passed over, pushed out of what came too near.
-void followSurface(Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy);
+void followSurface(const Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy);
 
-// The device moves while the surface stands at alpha: the proxy goes to the nearest reachable point, held back by
-// Coulomb friction. Afterwards its contacts are those that press.
+// The device moves while the surface stands at alpha: the proxy goes to the nearest reachable point, by the surface's
+// shaded normals, held back by Coulomb friction. Afterwards its contacts are those that press.
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Eigen::Vector3d& device,
                   Proxy& proxy);
 

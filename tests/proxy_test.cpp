@@ -97,7 +97,8 @@ static void run(const Script& r,
       from = to;
       to = r.motion ? frameAt(*r.shape, (n - 1) * tickDuration, r.motion) : to;
       to.time = from.time + frameDuration;
-      servo.commit(from, to);
+      servo.commit(from, to, servo.tools());
+      servo.beginFrame();
     }
     if (within == 0) {
       seen.from = from.bodies[0].nodes;
@@ -138,7 +139,7 @@ static bool isInside(const BlendedSurface& surface, double alpha, const Vector3d
 static Vector3d touchdown(const TouchShape& shape, double radius) {
   Buckets buckets({shape}, radius, frameAt(*shape, 0));
   SurfaceHit hit;
-  EXPECT_TRUE(buckets.sweep({0.012, 0.004, 0.2}, {0, 0, -0.2}, radius, 1, hit));
+  EXPECT_TRUE(buckets.sweep({0.012, 0.004, 0.2}, {0, 0, -0.2}, radius, 1, -1, hit));
   return {0.012, 0.004, 0.2 - 0.2 * hit.t};
 }
 

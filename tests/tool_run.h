@@ -38,7 +38,8 @@ struct ToolRun {
       bodyImpulseLength += impulse.norm();
       last = now;
       now = body.frame();
-      servo.commit(last, now);
+      servo.commit(last, now, servo.tools());
+      servo.beginFrame();
     }
   }
   double mismatch() const { return (handImpulse - bodyImpulse).norm() / bodyImpulseLength; }
