@@ -20,7 +20,7 @@ static constexpr double standOff = 5e-8, touching = 1e-6;
 // Below this a proxy has arrived, m.
 static constexpr double arrived = 1e-9;
 // Enough for every groove and corner met in a tick; what is left is done in the next.
-static constexpr int maxSweeps = 10, maxPushes = 10, maxPasses = 4, shadingPasses = 2;
+static constexpr int maxSweeps = 10, maxPushes = 10, maxPasses = 4;
 
 // ---- Nearest point in half-spaces ----------------------------------------------------------------------
 
@@ -126,22 +126,56 @@ static void dropLeftPlanes(const Buckets& buckets, double alpha, const Proxy& pr
     if (distanceTo(buckets, alpha, touched.triangles[k], proxy.centre) > proxy.radius + touching) dropPlane(touched, k);
 }
 
-// God-object search: sweep towards the target; at a hit, the target becomes the point nearest to the goal that the
-// touched planes allow (Zilles and Salisbury 1995).
-static TouchedPlanes slideTo(const Buckets& buckets, double alpha, const Vector3d& goal, Proxy& proxy) {
-  TouchedPlanes touched;
+// Where the proxy wants to be, given what it touches: at the allowed point that is nearest to the goal (Zilles and
+// Salisbury 1995), or with `along` at the first allowed point on the line from the goal along that unit vector.
+static bool findTarget(const Vector3d& goal, const Vector3d* along, TouchedPlanes& touched, Vector3d& target) {
+  if (along == nullptr)
+    return nearestInHalfSpaces(goal, touched.planes.data(), touched.count, target, touched.pressure);
+  constexpr double steepest = 0.5;  // normal . along; beyond, as at a wall, the line leads too far aside
+  double way = 0;
+  touched.pressure = {};
+  int last = -1;
+  for (int k = 0; k < touched.count; ++k) {
+    const HalfSpace& plane = touched.planes[k];
+    const double cosine = plane.normal.dot(*along), toPlane = (plane.offset - plane.normal.dot(goal)) / cosine;
+    if (cosine < steepest) return false;
+    if (toPlane <= way) continue;
+    way = toPlane;
+    last = k;
+  }
+  if (last >= 0) touched.pressure[last] = way;
+  target = goal + way * *along;
+  return true;
+}
+
+// God-object search: sweep towards the target; what is hit changes the target. Returns false where nothing is allowed.
+static bool slideTo(const Buckets& buckets, double alpha, const Vector3d& goal, const Vector3d* along, Proxy& proxy,
+                    TouchedPlanes& touched) {
+  touched = {};
   Vector3d target = goal;
   for (int k = 0; k < maxSweeps && (target - proxy.centre).norm() >= arrived; ++k) {
     SurfaceHit hit;
     if (moveTo(buckets, alpha, target, proxy, hit))
       addPlane(touched, {hit.normal, hit.normal.dot(proxy.centre)}, hit.triangle);
     dropLeftPlanes(buckets, alpha, proxy, touched);
-    if (nearestInHalfSpaces(goal, touched.planes.data(), touched.count, target, touched.pressure)) continue;
-    // Wedged between walls that leave no point free: it stays, and presses on what opposes the goal.
+    if (!findTarget(goal, along, touched, target)) return false;
+  }
+  return true;
+}
+
+// By the shaded pull where there is one, else or where that leads nowhere by the mesh's own normals.
+static TouchedPlanes slide(const Buckets& buckets, double alpha, const Vector3d& goal, const Vector3d& shadedPull,
+                           Proxy& proxy) {
+  TouchedPlanes touched;
+  const Vector3d start = proxy.centre;
+  if (!shadedPull.isZero(0)) {
+    if (slideTo(buckets, alpha, goal, &shadedPull, proxy, touched)) return touched;
+    proxy.centre = start;
+  }
+  // Wedged between walls that leave no point free, it stays and presses on what opposes the goal.
+  if (!slideTo(buckets, alpha, goal, nullptr, proxy, touched))
     for (int i = 0; i < touched.count; ++i)
       touched.pressure[i] = std::max(0.0, -touched.planes[i].normal.dot(goal - proxy.centre));
-    break;
-  }
   return touched;
 }
 
@@ -163,29 +197,29 @@ static void keepPressingContacts(const Buckets& buckets, double alpha, const Tou
   for (int k = 0; k < proxy.contactCount; ++k) proxy.contacts[k].share /= sum;
 }
 
-// Force shading as a change of the goal. Without it the proxy rests at `free`, pulled along -n by the depth D; it shall
-// rest where the pull is along the shaded normal m of what it touches there, D (m / (m . n) - n) beside `free`. The
-// goal moves by as much, so that what the proxy may not pass stays the mesh itself. m is that of where the proxy is
-// now, with `touched`: on a bulge another than at `free`.
-static Vector3d shadedGoal(const Buckets& buckets, double alpha, const TouchedPlanes& touched, const Vector3d& centre,
-                           const Vector3d& free, const Vector3d& device) {
+// The direction in which the smooth surface pulls the proxy off the device; zero where it is that of the mesh. From the
+// shaded normals at the proxy's contacts, half of the way each tick: where the surface bends in by less than the depth
+// D of the device, each tick would turn it too far, D / R times as much as was missing. Rejected: shading from where
+// the proxy would rest without it, because a device under an edge has two such places, and alternates between them.
+static Vector3d findShadedPull(const Buckets& buckets, double alpha, const ToolSettings& tool, const Vector3d& device,
+                               const Proxy& proxy) {
+  constexpr double flat = 1e-6;  // rad
   std::array<HalfSpace, 3> shaded;
-  int count = 0;
-  for (int k = 0; k < touched.count; ++k) {
-    if (!(touched.pressure[k] > arrived)) continue;
-    const ProxyContact contact = contactAt(buckets, alpha, touched.triangles[k], centre);
-    HalfSpace& plane = shaded[count++];
-    plane.normal = shadedNormal(buckets.surface(), alpha, contact.triangle, contact.weights, contact.normal);
-    plane.offset = plane.normal.dot(centre);
+  bool isFlat = true;
+  for (int k = 0; k < proxy.contactCount; ++k) {
+    const ProxyContact& contact = proxy.contacts[k];
+    const Vector3d normal = shadedNormal(buckets.surface(), alpha, contact.triangle, contact.weights, contact.normal);
+    isFlat = isFlat && (normal - contact.normal).norm() < flat;
+    shaded[k] = {normal, normal.dot(proxy.centre)};
   }
+  // Far beyond what the hand can feel, a small turn would lead the proxy far along the surface.
+  const bool isDeep = tool.stiffness * (proxy.centre - device).norm() > tool.forceMax;
   Vector3d nearest;
   std::array<double, 3> pressure;
-  if (!nearestInHalfSpaces(device, shaded.data(), count, nearest, pressure)) return device;
-  const Vector3d pull = nearest - device;
-  const double depth = (free - device).norm(), rise = pull.dot(free - device) / depth;
-  constexpr double steepest = 0.5;  // of m . n; beyond, as in a wedge, the mesh's own normals
-  if (!(rise > steepest * pull.norm())) return device;
-  return device + (depth / rise * pull - (free - device));
+  if (isFlat || isDeep || !nearestInHalfSpaces(device, shaded.data(), proxy.contactCount, nearest, pressure))
+    return Vector3d::Zero();
+  if ((nearest - device).norm() <= arrived) return proxy.pull;
+  return (proxy.pull + (nearest - device).normalized()).normalized();
 }
 
 // Coulomb friction as a change of the goal. Without friction the proxy would slide from `start` to `free`, pressed by
@@ -210,24 +244,18 @@ static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& start, co
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Vector3d& device,
                   Proxy& proxy) {
   const Proxy start = proxy;
-  TouchedPlanes touched = slideTo(buckets, alpha, device, proxy);
+  const Vector3d shadedPull = findShadedPull(buckets, alpha, tool, device, start);
+  TouchedPlanes touched = slide(buckets, alpha, device, shadedPull, proxy);
   const Vector3d free = proxy.centre;
-  if (touched.count > 0 && (free - device).norm() > arrived) {
-    Vector3d goal = device;
-    for (int pass = 0; pass < shadingPasses; ++pass) {
-      const Vector3d next = shadedGoal(buckets, alpha, touched, proxy.centre, free, device);
-      if ((next - goal).norm() <= arrived) break;
-      goal = next;
-      touched = slideTo(buckets, alpha, goal, proxy);
-    }
-    if (tool.staticFriction > 0 && (proxy.centre - goal).norm() > arrived) {
-      bool slipping = start.slipping;
-      const Vector3d held = frictionGoal(tool, start.centre, proxy.centre, goal, slipping);
-      proxy = start;
-      proxy.slipping = slipping;
-      touched = slideTo(buckets, alpha, held, proxy);
-    }
+  const bool pressed = touched.count > 0 && (free - device).norm() > arrived;
+  if (pressed && tool.staticFriction > 0) {
+    bool slipping = start.slipping;
+    const Vector3d goal = frictionGoal(tool, start.centre, free, device, slipping);
+    proxy = start;
+    proxy.slipping = slipping;
+    touched = slide(buckets, alpha, goal, shadedPull, proxy);
   }
+  proxy.pull = pressed ? Vector3d((free - device).normalized()) : Vector3d::Zero();
   keepPressingContacts(buckets, alpha, touched, proxy);
   if (!proxy.inContact()) proxy.slipping = true;
 }

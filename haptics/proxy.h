@@ -22,6 +22,8 @@ struct Proxy {
   // The tool's radius; less while surfaces leave no room for it: a squeezed proxy shrinks rather than tunnels.
   double radius = 0;
   bool slipping = true;
+  // Unit, from the device to where the proxy was at the last tick without its friction; zero when it touched nothing.
+  Eigen::Vector3d pull = Eigen::Vector3d::Zero();
   int lastBucket = -1;  // where the last sweep ended: the next is likely to end there, too
   int contactCount = 0;
   std::array<ProxyContact, 3> contacts;
