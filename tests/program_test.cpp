@@ -36,8 +36,9 @@ static std::vector<std::string> command(std::vector<std::string> words, const st
 TEST(Program, ReplayPrintsItsResultsAndTheSameHashTwice) {
   const ProgramResult a = runProgram(command({"replay", kScene})), b = runProgram(command({"replay", kScene}));
   ASSERT_EQ(a.exitCode, 0) << a.err;
-  for (const char* name : {"simulated", "cpu", "realtime", "substeps", "ticks", "force_max", "volume_ratio_min",
-                           "volume_ratio_max", "impulse_mismatch", "penetration_max", "static_penetration_max", "hash"})
+  for (const char* name : {"simulated", "cpu", "realtime", "substeps", "ticks", "force_max", "force_clamped",
+                           "grip_slips", "user_energy_max", "volume_ratio_min", "volume_ratio_max", "impulse_mismatch",
+                           "penetration_max", "static_penetration_max", "hash"})
     EXPECT_NE(valueOf(a.out, name), "") << name << " is missing in\n" << a.out;
   EXPECT_EQ(valueOf(a.out, "hash").size(), 16u);
   EXPECT_EQ(valueOf(a.out, "hash"), valueOf(b.out, "hash"));

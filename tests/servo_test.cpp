@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <limits>
 
 #include "tests/tool_run.h"
@@ -119,6 +120,39 @@ TEST(Servo, TwoToolsTouchTwoBodies) {
   }
 }
 
+// A groove of which one wall is one body's and the other another's.
+TEST(Servo, OneToolTouchesTwoBodiesAtOnce) {
+  const double h = 0.03;
+  const auto wall = [&](double side) {
+    return shapeOf({{-h, 0, 0}, {h, 0, 0}, {-h, side * h, h}, {h, side * h, h}}, {{0, 1, 3}, {0, 3, 2}});
+  };
+  const TouchShape left = wall(-1), right = wall(1);
+  DynamicsFrame frame = frameAt(*left, 0);
+  frame.bodies.push_back(frameAt(*right, 0).bodies[0]);
+  const ToolSettings tool = frictionless();
+  Servo servo({{left}, {right}}, {tool}, 1e-3, frame, {deviceAt({0, 0, 0.02})});
+  const double bottom = std::sqrt(2) * tool.radius, depth = 0.002;
+  for (int pass = 0; pass < 2; ++pass) {
+    for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt({0, 0, bottom - depth})});
+    DynamicsFrame next = frame;
+    next.time = 0.02;
+    if (pass == 0) nextFrame(servo, frame, next);
+  }
+  EXPECT_LT((servo.tools()[0].proxy - Vector3d(0, 0, bottom)).norm(), 1e-6);
+  EXPECT_LT((servo.tools()[0].force - tool.stiffness * depth * Vector3d::UnitZ()).norm(), 1e-3);
+  Loads loads;
+  servo.handOver(0.02, loads);
+  Vector3d force[2] = {Vector3d::Zero(), Vector3d::Zero()};
+  for (const ToolSpring& spring : loads.toolSprings) {
+    const TouchShape& touched = spring.body == 0 ? left : right;
+    Vector3d x = Vector3d::Zero();
+    for (int k = 0; k < 3; ++k) x += spring.weights[k] * touched->restNodes[spring.nodes[k]];
+    force[spring.body] += spring.stiffness * (spring.anchor - x);
+  }
+  EXPECT_LT((force[0] - 0.5 * tool.stiffness * depth * Vector3d(0, -1, -1)).norm(), 1e-2);
+  EXPECT_LT((force[1] - 0.5 * tool.stiffness * depth * Vector3d(0, 1, -1)).norm(), 1e-2);
+}
+
 // ---- Against a soft body ---------------------------------------------------------------------------------
 
 static ToolRun pressing(double speed) {
@@ -148,6 +182,33 @@ TEST(Servo, PressingSoftTissueHasNoForceStepsAndOneContact) {
   EXPECT_GT(mostForce, 0.3);
   EXPECT_LE(largest, 1.2 * run.tool.stiffness * speed * run.tickDuration);
   EXPECT_EQ(changes, 2);
+}
+
+// The largest step of the force from tick to tick while a tool presses and strokes soft tissue.
+static double largestStep(int dynamicsRate, bool blend) {
+  ToolRun run = pressing(0.05);
+  run.ticksPerFrame = 1200 / dynamicsRate;
+  run.blend = blend;
+  run.device = [](double t) {
+    return deviceAt({0.012 + 0.02 * ease(t, 0.5, 1), 0.004, 0.0585 - 0.012 * ease(t, 0, 0.5)});
+  };
+  Vector3d last = Vector3d::Zero();
+  double largest = 0;
+  run.run(1.5, [&](double, const ToolState& tool) {
+    largest = std::max(largest, (tool.force - last).norm());
+    last = tool.force;
+  });
+  return largest;
+}
+
+TEST(Servo, BlendingTakesTheDynamicsStepsOutOfTheForce) {
+  for (const int rate : {20, 50, 100}) {
+    const double blended = largestStep(rate, true), stepped = largestStep(rate, false);
+    std::printf("[  reached ] dynamics at %d Hz, force step blended %.3g N, not blended %.3g N\n", rate, blended,
+                stepped);
+    EXPECT_LT(blended, 0.5 * stepped);
+    EXPECT_LT(blended, 0.1);
+  }
 }
 
 TEST(Servo, HandAndTissueGetTheSameImpulseOverAPress) {
