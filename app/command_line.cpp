@@ -51,7 +51,7 @@ std::optional<std::pair<int, int>> splitPair(const std::string& text, char separ
 
 // Options as typed; turned into RunOptions after parsing.
 struct RunArguments {
-  std::string scene, log, logRate = "frame";
+  std::string scene, log, logRate = "frame", embree;
   std::vector<std::string> sets, trajectories;
   std::vector<std::vector<std::string>> surfaces;
 };
@@ -69,6 +69,10 @@ void addSceneOptions(CLI::App& command, RunArguments& a) {
 
 void addRunOptions(CLI::App& command, RunArguments& a) {
   addSceneOptions(command, a);
+  command
+      .add_option("--embree", a.embree,
+                  "how Embree runs: isa=sse2|sse4.2|avx|avx2|avx512, threads=N; the results are the same")
+      ->type_name("KEY=VALUE,...");
   command.add_option("--log", a.log, "write a CSV row per dynamics frame: tools, forces, volume, energies")
       ->type_name("FILE");
   command.add_option("--log-rate", a.logRate, "rows of the log: per dynamics frame or per servo tick")
@@ -81,8 +85,28 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
       ->allow_extra_args(false);
 }
 
+EmbreeSettings embreeSettings(const std::string& text) {
+  EmbreeSettings settings;
+  for (std::size_t start = 0; start < text.size();) {
+    const std::size_t end = std::min(text.find(',', start), text.size());
+    const std::string word = text.substr(start, end - start);
+    const auto threads = word.rfind("threads=", 0) == 0 ? parseNumber<int>(word.substr(8)) : std::nullopt;
+    const std::string isa = word.rfind("isa=", 0) == 0 ? word.substr(4) : "";
+    if (threads && *threads >= 1 && *threads <= 256)
+      settings.threads = *threads;
+    else if (isEmbreeIsa(isa))
+      settings.isa = isa;
+    else
+      usageError("--embree", text,
+                 "isa=sse2, sse4.2, avx, avx2 or avx512 as far as this processor has it, threads=1 to 256");
+    start = end + 1;
+  }
+  return settings;
+}
+
 RunOptions runOptions(const RunArguments& a) {
   RunOptions options;
+  options.embree = embreeSettings(a.embree);
   options.scene = a.scene;
   for (const std::string& set : a.sets) {
     const std::size_t equals = set.find('=');
@@ -169,11 +193,14 @@ Verb addRender(CLI::App& app) {
 Verb addReplay(CLI::App& app) {
   struct Arguments {
     RunArguments run;
-    bool untilRest = false;
+    bool untilRest = false, realtime = false;
   };
   const auto a = std::make_shared<Arguments>();
   CLI::App* c = app.add_subcommand("replay", "run a scene without pictures, as fast as it goes, and print its results");
   addRunOptions(*c, a->run);
+  c->add_flag("--realtime", a->realtime,
+              "run against the clock: the servo in a thread of its own at its rate, the dynamics in another; tells CPU "
+              "times of ticks, and which came late");
   c->add_flag(
       "--until-rest", a->untilRest,
       "end when every surface node is slower than 1e-5 m/s and no load is still growing; exit code 4 where that "
@@ -181,6 +208,7 @@ Verb addReplay(CLI::App& app) {
   return {c, [a] {
             RunOptions options = runOptions(a->run);
             options.untilRest = a->untilRest;
+            options.realtime = a->realtime;
             return runReplay(options);
           }};
 }

@@ -185,6 +185,16 @@ static void renewBoundingSphere(Bucket& bucket) {
   bucket.radius = std::sqrt(radius2);
 }
 
+bool isEmbreeIsa(const std::string& isa) {
+  if (isa == "sse2") return __builtin_cpu_supports("sse2");
+  if (isa == "sse4.2") return __builtin_cpu_supports("sse4.2");
+  if (isa == "avx") return __builtin_cpu_supports("avx");
+  if (isa == "avx2") return __builtin_cpu_supports("avx2");
+  if (isa != "avx512") return false;
+  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&
+         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
+}
+
 static std::string deviceConfig(const EmbreeSettings& embree) {
   std::string config = "set_affinity=0,threads=" + std::to_string(embree.threads);
   if (!embree.isa.empty()) config += ",isa=" + embree.isa;

@@ -10,4 +10,7 @@ struct EmbreeSettings {
   int threads = 1;  // of its builders; more than one takes cores from the servo and gains nothing at a bucket's size
 };
 
+// Whether it is the name of an instruction set that this processor has.
+bool isEmbreeIsa(const std::string& isa);
+
 }  // namespace medulla

@@ -108,7 +108,7 @@ int runRender(const RenderOptions& options) {
   const int first = range.first, last = range.second;  // the lambda below: clang 14 captures no structured bindings
 
   requireDistinctOutputs(loaded, options.run, options.outputs);
-  Simulation simulation(loaded);
+  Simulation simulation(loaded, options.run.embree);
   PictureOutputs outputs(options.outputs, scene.width, scene.height, scene.fps);
   Renderer renderer({.width = scene.width, .height = scene.height, .context = options.context});
   const SceneView view(loaded, simulation.current(), renderer);

@@ -167,7 +167,8 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
 }
 
 void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
-              const std::function<void()>& afterFrame, const std::function<void()>& finish) {
+              const std::function<void()>& afterFrame, const std::function<void()>& finish,
+              const std::function<void()>& advance) {
   SurfaceRecorder surfaces(loaded, options);
   LogRecorder log(loaded, options);
   RestWatch rest(loaded);
@@ -176,7 +177,10 @@ void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& 
                loaded.scene.bodies[o.body0].name, loaded.scene.bodies[o.body1].name, 1e3 * o.depth);
   for (bool last = false; !last;) {
     checkInterrupt();
-    simulation.advanceFrame();
+    if (advance)
+      advance();
+    else
+      simulation.advanceFrame();
     if (options.untilRest) rest.afterFrame(simulation);
     if (options.untilRest && !rest.atRest() && simulation.finished()) rest.fail(simulation.time());
     last = simulation.finished() || rest.atRest();

@@ -25,6 +25,8 @@ struct RunOptions {
   std::string logPath;
   bool logEveryTick = false;
   std::vector<SurfaceRequest> surfaces;
+  EmbreeSettings embree;
+  bool realtime = false;   // replay only: the servo runs against the clock
   bool untilRest = false;  // ends when nothing moves any more; the scene's duration is the longest it may take
 };
 
@@ -51,9 +53,10 @@ LoadedScene loadRun(const RunOptions& options);
 // log and surfaces appear under their names: what fails there leaves those as they were. Until rest: until every node
 // has been slower than 1e-5 m/s for 0.1 s, so that the turning point of a swing does not count, and neither a load nor
 // a tool's recorded motion is still to come; surfaces asked for at a later time are those at rest. Throws NotAtRest,
-// and Interrupted after a signal.
+// and Interrupted after a signal. `advance` makes the next dynamics frame; empty: in logical time.
 void runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
-              const std::function<void()>& afterFrame, const std::function<void()>& finish = {});
+              const std::function<void()>& afterFrame, const std::function<void()>& finish = {},
+              const std::function<void()>& advance = {});
 
 // Every file that the run writes besides `pictures` must differ from the others and from what it reads.
 void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options,
