@@ -88,17 +88,17 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
 EmbreeSettings embreeSettings(const std::string& text) {
   EmbreeSettings settings;
   for (std::size_t start = 0; start < text.size();) {
-    const std::size_t end = std::min(text.find(',', start), text.size());
-    const std::string word = text.substr(start, end - start);
-    const auto threads = word.rfind("threads=", 0) == 0 ? parseNumber<int>(word.substr(8)) : std::nullopt;
-    const std::string isa = word.rfind("isa=", 0) == 0 ? word.substr(4) : "";
-    if (threads && *threads >= 1 && *threads <= 256)
-      settings.threads = *threads;
-    else if (isEmbreeIsa(isa))
-      settings.isa = isa;
+    const std::size_t end = std::min(text.find(',', start), text.size()), equals = text.find('=', start);
+    const std::string key = text.substr(start, std::min(equals, end) - start);
+    const std::string value = equals < end ? text.substr(equals + 1, end - equals - 1) : "";
+    const int threads = key == "threads" ? parseNumber<int>(value).value_or(0) : 0;
+    if (threads >= 1 && threads <= 64)
+      settings.threads = threads;
+    else if (key == "isa" && isEmbreeIsa(value))
+      settings.isa = value;
     else
       usageError("--embree", text,
-                 "isa=sse2, sse4.2, avx, avx2 or avx512 as far as this processor has it, threads=1 to 256");
+                 "isa=sse2, sse4.2, avx, avx2 or avx512, as far as this processor has it, or threads=1 to 64");
     start = end + 1;
   }
   return settings;

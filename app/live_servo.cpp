@@ -68,8 +68,16 @@ static double threadCpuSeconds() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
+// All that a frame can bring: the servo's thread allocates nothing.
+static ServoRecord emptyRecord(const Simulation& simulation) {
+  ServoRecord record = simulation.record();
+  record.from = record.to = {};
+  simulation.servo().makeRoom(record.loads);
+  return record;
+}
+
 // The dynamics begins at once, with the state at rest handed over: from then on it is one frame ahead.
-LiveServo::Data::Data(Simulation& s) : simulation(s), handedOver({s.record(), s.record(), s.record()}) {
+LiveServo::Data::Data(Simulation& s) : simulation(s), handedOver({emptyRecord(s), emptyRecord(s), emptyRecord(s)}) {
   handedOver.writing().start = -s.record().duration;
   handedOver.publish();
 }

@@ -73,7 +73,7 @@ class Simulation {
   void advanceFrame(const ServoRecord& servo);
 
   // For a servo that runs elsewhere.
-  Servo& servo() { return *servo_; }
+  Servo& servo() const { return *servo_; }
   int ticksPerFrame() const { return ticksPerFrame_; }
   double tickDuration() const { return tickDuration_; }
   void sampleInputs(double time, std::vector<ToolSample>& out) const;  // of every tool

@@ -329,6 +329,11 @@ void Servo::handOver(double frameDuration, Loads& out) const {
   }
 }
 
+void Servo::makeRoom(Loads& out) const {
+  out.toolSprings.reserve(data_->tools.size() * contactPatchCapacity);
+  out.heldNodes.reserve(data_->tools.size() * data_->surfaces.reading().surface().from.size());
+}
+
 // ---- Life ------------------------------------------------------------------------------------------------
 
 static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, const ToolSample& start) {
@@ -364,6 +369,7 @@ Servo::Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSet
   assert(tools.size() == start.size() && tickDuration > 0);
   const Buckets& buckets = data_->surfaces.reading();
   data_->lastStep.assign(buckets.surface().from.size(), Vector3d::Zero());
+  data_->contacts.reserve(contactPatchCapacity);
   data_->tools.reserve(tools.size());
   data_->states.reserve(tools.size());
   for (std::size_t k = 0; k < tools.size(); ++k) {

@@ -65,8 +65,9 @@ class Servo {
   const std::vector<ToolState>& tools() const;
 
   // The springs that stand for the tools' contacts and grips during the next dynamics frame of `frameDuration` s.
-  // `out` is cleared and filled; nothing is allocated once it has grown.
+  // `out` is cleared and filled; nothing is allocated after makeRoom().
   void handOver(double frameDuration, Loads& out) const;
+  void makeRoom(Loads& out) const;
 
  private:
   struct Data;

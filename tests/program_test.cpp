@@ -208,6 +208,16 @@ TEST(ProgramRefuses, WrongUsageWithCodeTwo) {
   expectRefusal(runProgram({"render", kScene, "--view", "skin"}), 2, {"skin"});
   expectRefusal(runProgram({"replay", kScene, "--set", "nonsense"}), 2, {"--set"});
   expectRefusal(runProgram({"replay", kScene, "--surface-at", "soon", "/tmp/x.obj"}), 2, {"soon"});
+  for (const char* embree : {"isa=mmx", "threads=0", "threads=two", "avx2", "isa=sse2,,"})
+    expectRefusal(runProgram({"replay", kScene, "--embree", embree}), 2, {"--embree", "avx2"});
+}
+
+TEST(Program, ReplayAgainstTheClockTellsTheServosTimes) {
+  const ProgramResult run = runProgram({"replay", kScene, "--set", "clock.duration=0.3", "--realtime"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  for (const char* name : {"servo_ticks", "servo_cpu_p50", "servo_cpu_p99.9", "servo_cpu_max", "servo_late",
+                           "servo_latest", "surface_stood", "hash"})
+    EXPECT_NE(valueOf(run.out, name), "") << name << " is missing in\n" << run.out;
 }
 
 TEST(ProgramRefuses, BadScenes) {

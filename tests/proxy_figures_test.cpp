@@ -262,7 +262,7 @@ TEST(ProxyFigures, PressingSomethingRigid) {
 // 1984 triangles, 50 dynamics frames to 1000 ticks.
 TEST(ProxyFigures, PressingSomethingSoft) {
   const double speed = 0.1;
-  ToolRun run{SpringBody(ellipsoid(32, 32, 50, 0.3)), {}, {}, 20, tickDuration};
+  ToolRun run{SpringBody(ellipsoid(32, 32, 50, 0.3)), {}, {}, 20, tickDuration, {}};
   run.tool.damping = run.tool.staticFriction = run.tool.dynamicFriction = 0;
   const Vector3d touch = touchdown(run.body.shape, run.tool.radius);
   run.device = [=](double t) {
