@@ -126,56 +126,23 @@ static void dropLeftPlanes(const Buckets& buckets, double alpha, const Proxy& pr
     if (distanceTo(buckets, alpha, touched.triangles[k], proxy.centre) > proxy.radius + touching) dropPlane(touched, k);
 }
 
-// Where the proxy wants to be, given what it touches: at the allowed point that is nearest to the goal (Zilles and
-// Salisbury 1995), or with `along` at the first allowed point on the line from the goal along that unit vector.
-static bool findTarget(const Vector3d& goal, const Vector3d* along, TouchedPlanes& touched, Vector3d& target) {
-  if (along == nullptr)
-    return nearestInHalfSpaces(goal, touched.planes.data(), touched.count, target, touched.pressure);
-  constexpr double steepest = 0.5;  // normal . along; beyond, as at a wall, the line leads too far aside
-  double way = 0;
-  touched.pressure = {};
-  int last = -1;
-  for (int k = 0; k < touched.count; ++k) {
-    const HalfSpace& plane = touched.planes[k];
-    const double cosine = plane.normal.dot(*along), toPlane = (plane.offset - plane.normal.dot(goal)) / cosine;
-    if (cosine < steepest) return false;
-    if (toPlane <= way) continue;
-    way = toPlane;
-    last = k;
-  }
-  if (last >= 0) touched.pressure[last] = way;
-  target = goal + way * *along;
-  return true;
-}
-
-// God-object search: sweep towards the target; what is hit changes the target. Returns false where nothing is allowed.
-static bool slideTo(const Buckets& buckets, double alpha, const Vector3d& goal, const Vector3d* along, Proxy& proxy,
-                    TouchedPlanes& touched) {
-  touched = {};
+// God-object search: sweep towards the target; at a hit, the target becomes the point nearest to the goal that the
+// touched planes allow (Zilles and Salisbury 1995).
+static TouchedPlanes slideTo(const Buckets& buckets, double alpha, const Vector3d& goal, Proxy& proxy) {
+  TouchedPlanes touched;
   Vector3d target = goal;
   for (int k = 0; k < maxSweeps && (target - proxy.centre).norm() >= arrived; ++k) {
     SurfaceHit hit;
     if (moveTo(buckets, alpha, target, proxy, hit))
       addPlane(touched, {hit.normal, hit.normal.dot(proxy.centre)}, hit.triangle);
-    dropLeftPlanes(buckets, alpha, proxy, touched);
-    if (!findTarget(goal, along, touched, target)) return false;
-  }
-  return true;
-}
-
-// By the shaded pull where there is one, else or where that leads nowhere by the mesh's own normals.
-static TouchedPlanes slide(const Buckets& buckets, double alpha, const Vector3d& goal, const Vector3d& shadedPull,
-                           Proxy& proxy) {
-  TouchedPlanes touched;
-  const Vector3d start = proxy.centre;
-  if (!shadedPull.isZero(0)) {
-    if (slideTo(buckets, alpha, goal, &shadedPull, proxy, touched)) return touched;
-    proxy.centre = start;
-  }
-  // Wedged between walls that leave no point free, it stays and presses on what opposes the goal.
-  if (!slideTo(buckets, alpha, goal, nullptr, proxy, touched))
+    // Not at the end: a proxy that is still rolling over an edge has not lost contact.
+    if (k + 1 < maxSweeps) dropLeftPlanes(buckets, alpha, proxy, touched);
+    if (nearestInHalfSpaces(goal, touched.planes.data(), touched.count, target, touched.pressure)) continue;
+    // Wedged between walls that leave no point free: it stays, and presses on what opposes the goal.
     for (int i = 0; i < touched.count; ++i)
       touched.pressure[i] = std::max(0.0, -touched.planes[i].normal.dot(goal - proxy.centre));
+    break;
+  }
   return touched;
 }
 
@@ -197,29 +164,38 @@ static void keepPressingContacts(const Buckets& buckets, double alpha, const Tou
   for (int k = 0; k < proxy.contactCount; ++k) proxy.contacts[k].share /= sum;
 }
 
-// The direction in which the smooth surface pulls the proxy off the device; zero where it is that of the mesh. From the
-// shaded normals at the proxy's contacts, half of the way each tick: where the surface bends in by less than the depth
-// D of the device, each tick would turn it too far, D / R times as much as was missing. Rejected: shading from where
-// the proxy would rest without it, because a device under an edge has two such places, and alternates between them.
-static Vector3d findShadedPull(const Buckets& buckets, double alpha, const ToolSettings& tool, const Vector3d& device,
-                               const Proxy& proxy) {
+// Where the smooth surface would hold the proxy by what it touches: the first pass of Ruspini, Kolarov and Khatib 1997.
+// Their second pass moves the proxy there. Rejected: a device under a convex edge has two places nearest to it, between
+// which the proxy then alternated, and a proxy that slides in the dent that it makes lets soft tissue flutter.
+// Going from one such place to the other still makes the pull jump. What is felt is therefore the mean of the pull now
+// and of the last tick's, lengthened by what device and surface have moved along it since: no jump is felt at once, and
+// plain pressing is not delayed.
+static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& touched, const Vector3d& device,
+                  Proxy& proxy) {
   constexpr double flat = 1e-6;  // rad
   std::array<HalfSpace, 3> shaded;
+  int count = 0;
   bool isFlat = true;
-  for (int k = 0; k < proxy.contactCount; ++k) {
-    const ProxyContact& contact = proxy.contacts[k];
+  for (int k = 0; k < touched.count; ++k) {
+    if (!(touched.pressure[k] > arrived)) continue;
+    const ProxyContact contact = contactAt(buckets, alpha, touched.triangles[k], proxy.centre);
     const Vector3d normal = shadedNormal(buckets.surface(), alpha, contact.triangle, contact.weights, contact.normal);
     isFlat = isFlat && (normal - contact.normal).norm() < flat;
-    shaded[k] = {normal, normal.dot(proxy.centre)};
+    shaded[count++] = {normal, normal.dot(proxy.centre)};
   }
-  // Far beyond what the hand can feel, a small turn would lead the proxy far along the surface.
-  const bool isDeep = tool.stiffness * (proxy.centre - device).norm() > tool.forceMax;
+  const Vector3d pull = proxy.centre - device, before = proxy.felt;
   Vector3d nearest;
   std::array<double, 3> pressure;
-  if (isFlat || isDeep || !nearestInHalfSpaces(device, shaded.data(), proxy.contactCount, nearest, pressure))
-    return Vector3d::Zero();
-  if ((nearest - device).norm() <= arrived) return proxy.pull;
-  return (proxy.pull + (nearest - device).normalized()).normalized();
+  proxy.felt = Vector3d::Zero();
+  if (count > 0 && !isFlat && nearestInHalfSpaces(device, shaded.data(), count, nearest, pressure)) {
+    proxy.felt = nearest - device;
+    if (const double length = before.norm(); length > 0) {
+      const double moved = before.dot(proxy.surfaceMotion - (device - proxy.device)) / length;
+      proxy.felt = 0.5 * (proxy.felt + std::max(0.0, length + moved) / length * before);
+    }
+  }
+  proxy.device = device;
+  proxy.shading = proxy.felt.isZero(0) ? Vector3d::Zero() : Vector3d(proxy.felt - pull);
 }
 
 // Coulomb friction as a change of the goal. Without friction the proxy would slide from `start` to `free`, pressed by
@@ -243,19 +219,15 @@ static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& start, co
 
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Vector3d& device,
                   Proxy& proxy) {
-  const Proxy start = proxy;
-  const Vector3d shadedPull = findShadedPull(buckets, alpha, tool, device, start);
-  TouchedPlanes touched = slide(buckets, alpha, device, shadedPull, proxy);
-  const Vector3d free = proxy.centre;
-  const bool pressed = touched.count > 0 && (free - device).norm() > arrived;
+  const Vector3d start = proxy.centre;
+  TouchedPlanes touched = slideTo(buckets, alpha, device, proxy);
+  shade(buckets, alpha, touched, device, proxy);
+  const bool pressed = touched.count > 0 && (proxy.centre - device).norm() > arrived;
   if (pressed && tool.staticFriction > 0) {
-    bool slipping = start.slipping;
-    const Vector3d goal = frictionGoal(tool, start.centre, free, device, slipping);
-    proxy = start;
-    proxy.slipping = slipping;
-    touched = slide(buckets, alpha, goal, shadedPull, proxy);
+    const Vector3d goal = frictionGoal(tool, start, proxy.centre, device, proxy.slipping);
+    proxy.centre = start;
+    touched = slideTo(buckets, alpha, goal, proxy);
   }
-  proxy.pull = pressed ? Vector3d((free - device).normalized()) : Vector3d::Zero();
   keepPressingContacts(buckets, alpha, touched, proxy);
   if (!proxy.inContact()) proxy.slipping = true;
 }
@@ -347,6 +319,7 @@ void followSurface(const Buckets& buckets, double alphaBefore, double alpha, dou
                              " m: the state of its body is not finite any more in effect; use more substeps");
   proxy.centre = notPassedOver(buckets, alphaBefore, alpha, proxy.radius, start, carried);
   pushOut(buckets, alpha, toolRadius, proxy);
+  proxy.surfaceMotion = proxy.centre - start;
   for (int k = 0; k < proxy.contactCount; ++k) {
     ProxyContact& contact = proxy.contacts[k];
     contact.point = weighted(buckets.surface().triangle(contact.triangle, alpha), contact.weights);

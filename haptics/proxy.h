@@ -22,8 +22,10 @@ struct Proxy {
   // The tool's radius; less while surfaces leave no room for it: a squeezed proxy shrinks rather than tunnels.
   double radius = 0;
   bool slipping = true;
-  // Unit, from the device to where the proxy was at the last tick without its friction; zero when it touched nothing.
-  Eigen::Vector3d pull = Eigen::Vector3d::Zero();
+  // m; as if by the smooth surface that the mesh stands for (force_shading.h), the proxy is felt at centre + shading.
+  Eigen::Vector3d shading = Eigen::Vector3d::Zero();
+  Eigen::Vector3d felt = Eigen::Vector3d::Zero();  // m, from the device to there, without friction; zero: not shaded
+  Eigen::Vector3d device = Eigen::Vector3d::Zero(), surfaceMotion = Eigen::Vector3d::Zero();  // m, of the last tick
   int lastBucket = -1;  // where the last sweep ended: the next is likely to end there, too
   int contactCount = 0;
   std::array<ProxyContact, 3> contacts;
@@ -41,8 +43,8 @@ Proxy placeProxy(const Buckets& buckets, const Eigen::Vector3d& device, double t
 // touches, never passed over, pushed out of what came too near.
 void followSurface(const Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy);
 
-// The device moves while the surface stands at alpha: the proxy goes to the nearest reachable point, by the surface's
-// shaded normals, held back by Coulomb friction. Afterwards its contacts are those that press.
+// The device moves while the surface stands at alpha: the proxy goes to the nearest reachable point, held back by
+// Coulomb friction. Afterwards its contacts are those that press.
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Eigen::Vector3d& device,
                   Proxy& proxy);
 

@@ -8,7 +8,6 @@
 
 #include "haptics/buckets.h"
 #include "haptics/contact_patch.h"
-#include "haptics/force_shading.h"
 #include "haptics/grab.h"
 #include "haptics/proxy.h"
 #include "haptics/triple_buffer.h"
@@ -29,6 +28,7 @@ struct Tool {
   Vector3d coupledSum = Vector3d::Zero();  // over the frame's ticks
   ContactPatch patch;                      // of the frame's ticks
   ProxyContact lastContact;                // while isLeaving: in contact, or not yet clear of it
+  Vector3d lastFelt = Vector3d::Zero();    // unit; along which it was felt
   double largestPush = 0;                  // N, of the coupling's spring during this contact
   double clampScale = 1;                   // of the force, at the last tick
   int ticks = 0;                           // in this frame
@@ -106,10 +106,11 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   if (!tool.isLeaving) return Vector3d::Zero();
   const Proxy& proxy = tool.proxy;
   const ProxyContact& last = tool.lastContact;
-  const Vector3d pull = proxy.centre - tool.device.position;
+  const Vector3d pull = proxy.centre + proxy.shading - tool.device.position;
   const bool isPressed = proxy.inContact() && pull.squaredNorm() > 0;
-  const Vector3d normal = isPressed ? Vector3d(pull.normalized()) : last.normal;
-  const double depth = isPressed ? pull.norm() : normal.dot(last.point - tool.device.position) + tool.settings.radius;
+  const Vector3d normal = isPressed ? Vector3d(pull.normalized()) : tool.lastFelt;
+  const double depth =
+      isPressed ? pull.norm() : normal.dot(last.point + tool.settings.radius * last.normal - tool.device.position);
   const double spring = tool.settings.stiffness * depth;
   tool.largestPush = std::max(tool.largestPush, spring);
   const Vector3d step = isPressed ? meanContactStep(surface, alpha, proxy) : contactStep(surface, alpha, last);
@@ -130,8 +131,8 @@ static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Too
 static void followLeaving(const BlendedSurface& surface, double alpha, Tool& tool) {
   if (tool.proxy.inContact()) {
     if (!tool.isLeaving) tool.largestPush = 0;
-    ProxyContact& last = tool.lastContact = tool.proxy.mainContact();
-    last.normal = shadedNormal(surface, alpha, last.triangle, last.weights, last.normal);
+    tool.lastContact = tool.proxy.mainContact();
+    tool.lastFelt = tool.proxy.felt.isZero(0) ? tool.lastContact.normal : tool.proxy.felt.normalized();
     tool.isLeaving = true;
   } else if (tool.isLeaving) {
     const Triangle triangle = surface.triangle(tool.lastContact.triangle, alpha);
