@@ -66,6 +66,10 @@ void addOverrides(CLI::App& command, RunArguments& a) {
 }
 
 void addRunOptions(CLI::App& command, RunArguments& a) {
+  command
+      .add_option("--embree", a.embree,
+                  "how Embree runs: isa=sse2|sse4.2|avx|avx2|avx512, threads=N; the results are the same")
+      ->type_name("KEY=VALUE,...");
   command.add_option("--log", a.log, "write a CSV row per dynamics frame: tools, forces, volume, energies")
       ->type_name("FILE");
   command.add_option("--log-rate", a.logRate, "rows of the log: per dynamics frame or per servo tick")
@@ -84,6 +88,25 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
       ->allow_extra_args(false);
 }
 
+EmbreeSettings embreeSettings(const std::string& text) {
+  EmbreeSettings settings;
+  for (std::size_t start = 0; start < text.size();) {
+    const std::size_t end = std::min(text.find(',', start), text.size()), equals = text.find('=', start);
+    const std::string key = text.substr(start, std::min(equals, end) - start);
+    const std::string value = equals < end ? text.substr(equals + 1, end - equals - 1) : "";
+    const int threads = key == "threads" ? parseNumber<int>(value).value_or(0) : 0;
+    if (threads >= 1 && threads <= 64)
+      settings.threads = threads;
+    else if (key == "isa" && isEmbreeIsa(value))
+      settings.isa = value;
+    else
+      usageError("--embree", text,
+                 "isa=sse2, sse4.2, avx, avx2 or avx512, as far as this processor has it, or threads=1 to 64");
+    start = end + 1;
+  }
+  return settings;
+}
+
 }  // namespace
 
 void usageError(const std::string& option, const std::string& value, const std::string& expected) {
@@ -97,6 +120,7 @@ void addSceneOptions(CLI::App& command, RunArguments& a) {
 
 RunOptions runOptions(const RunArguments& a) {
   RunOptions options;
+  options.embree = embreeSettings(a.embree);
   options.scene = a.scene;
   for (const std::string& set : a.sets) {
     const std::size_t equals = set.find('=');
@@ -262,13 +286,16 @@ Verb addReplay(CLI::App& app) {
   struct Arguments {
     RunArguments run;
     std::string cache;
-    bool untilRest = false;
+    bool untilRest = false, realtime = false;
   };
   const auto a = std::make_shared<Arguments>();
   CLI::App* c = app.add_subcommand("replay", "run a scene without pictures, as fast as it goes, and print its results");
   addSceneOptions(*c, a->run);
   addRunOptions(*c, a->run);
   c->add_option("--cache", a->cache, "write what every picture shows, for medulla render --cache")->type_name("FILE");
+  c->add_flag("--realtime", a->realtime,
+              "run against the clock: the servo in a thread of its own at its rate, the dynamics in another; tells CPU "
+              "times of ticks, and which came late");
   c->add_flag(
       "--until-rest", a->untilRest,
       "end when every surface node is slower than 1e-5 m/s and no load is still growing; exit code 4 where that "
@@ -277,6 +304,9 @@ Verb addReplay(CLI::App& app) {
             RunOptions options = runOptions(a->run);
             options.untilRest = a->untilRest;
             options.cachePath = a->cache;
+            options.realtime = a->realtime;
+            if (a->realtime && !a->cache.empty())
+              usageError("--cache", a->cache, "no --realtime: what pictures show is not recorded against the clock");
             return runReplay(options);
           }};
 }

@@ -32,7 +32,7 @@ static World makeWorld(const LoadedScene& loaded) {
   return World(settings, std::move(bodies), statics);
 }
 
-Simulation::Simulation(const LoadedScene& loaded)
+Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
     : loaded_(&loaded),
       ticksPerFrame_(static_cast<int>(std::lround(loaded.scene.servoRate / loaded.scene.dynamicsRate))),
       frameCount_(static_cast<int>(std::ceil(loaded.scene.duration * loaded.scene.dynamicsRate - 1e-9))),
@@ -47,7 +47,7 @@ Simulation::Simulation(const LoadedScene& loaded)
   for (const auto& model : loaded.models) bodies.push_back({model});
   std::vector<ToolSettings> tools;
   for (const SceneTool& tool : loaded.scene.tools) tools.push_back(tool.settings);
-  servo_ = std::make_unique<Servo>(bodies, tools, tickDuration_, current_, inputs_);
+  servo_ = std::make_unique<Servo>(bodies, tools, tickDuration_, current_, inputs_, embree);
 
   record_.duration = frameDuration_;
   record_.from = record_.to = current_;
@@ -62,14 +62,13 @@ void Simulation::sampleInputs(double time, std::vector<ToolSample>& out) const {
 
 void Simulation::advanceFrame() {
   runTicks();
-  servo_->handOver(frameDuration_, loads_);
-  const FrameReport report = world_.advance(loads_);
-  std::swap(previous_, current_);
-  world_.readFrame(current_);
-  if (!inputs_.empty()) servo_->commit(previous_, current_);  // without tools nobody feels the surface
-  ++frame_;
-  accountImpulses(report);
-  accountVolumes();
+  advanceDynamics();
+  servo_->beginFrame();
+}
+
+void Simulation::advanceFrame(const ServoRecord& servo) {
+  record_ = servo;
+  advanceDynamics();
 }
 
 void Simulation::runTicks() {
@@ -83,11 +82,34 @@ void Simulation::runTicks() {
     if (!inputs_.empty()) servo_->tick(static_cast<double>(tick) / ticksPerFrame_, inputs_);
     record_.inputs[tick] = inputs_;
     record_.tools[tick] = servo_->tools();
-    for (const ToolState& tool : servo_->tools()) totals_.forceMax = std::max(totals_.forceMax, tool.force.norm());
   }
+  servo_->handOver(frameDuration_, record_.loads);
+}
+
+void Simulation::advanceDynamics() {
+  const FrameReport report = world_.advance(record_.loads);
+  std::swap(previous_, current_);
+  world_.readFrame(current_);
+  // Without tools nobody feels the surface.
+  if (!loaded_->trajectories.empty()) servo_->commit(previous_, current_, record_.tools[ticksPerFrame_]);
+  ++frame_;
   totals_.ticks += ticksPerFrame_;
   totals_.substeps += world_.substepsPerFrame();
   totals_.simulated += frameDuration_;
+  accountTicks();
+  accountImpulses(report);
+  accountVolumes();
+}
+
+void Simulation::accountTicks() {
+  for (int tick = 1; tick <= ticksPerFrame_; ++tick)
+    for (std::size_t k = 0; k < record_.tools[tick].size(); ++k) {
+      const ToolState& tool = record_.tools[tick][k];
+      totals_.forceMax = std::max(totals_.forceMax, tool.force.norm());
+      totals_.clampedTicks += tool.clamped;
+      totals_.gripSlips += tool.slipped && !record_.tools[tick - 1][k].slipped;
+      totals_.userEnergyMax = std::max(totals_.userEnergyMax, tool.energy);
+    }
 }
 
 // The force on the hand is minus what the tool gives to the bodies.

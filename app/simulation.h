@@ -27,12 +27,14 @@ struct LoadedScene {
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories = {});
 
 // What the servo saw and did during one dynamics frame [start, start + duration]: the two frames that were blended
-// meanwhile, and inputs and tools at its ticks (index 0 is the state at `start`).
+// meanwhile (not recorded live), inputs and tools at its ticks (index 0 is the state at `start`), and what the dynamics
+// was handed at its end.
 struct ServoRecord {
   double start = 0, duration = 0;
   DynamicsFrame from, to;
   std::vector<std::vector<ToolSample>> inputs;
   std::vector<std::vector<ToolState>> tools;
+  Loads loads;
 };
 
 // The state that a picture shows.
@@ -52,6 +54,8 @@ struct RunTotals {
   long substeps = 0, ticks = 0;
   double forceMax = 0;                            // N, of any tool
   double volumeRatioMin = 1, volumeRatioMax = 1;  // of any body
+  long clampedTicks = 0, gripSlips = 0;           // of all tools
+  double userEnergyMax = 0;                       // J, the most that any tool had handed to the user
   double toolImpulse = 0, impulseDifference = 0;  // N s, sums over frames and tools of lengths
   double impulseMismatch() const { return toolImpulse > 0 ? 100 * impulseDifference / toolImpulse : 0; }  // %
 };
@@ -60,10 +64,19 @@ struct RunTotals {
 // under the springs that the servo hands over (paper 5). No clock, no thread: the same scene gives the same hash.
 class Simulation {
  public:
-  explicit Simulation(const LoadedScene& loaded);
+  explicit Simulation(const LoadedScene& loaded, const EmbreeSettings& embree = {});
 
   bool finished() const { return frame_ >= frameCount_; }
-  void advanceFrame();  // throws std::runtime_error when the state stops being finite
+  // Both throw std::runtime_error when the state stops being finite. The second is the dynamics' half alone, after what
+  // a servo that runs elsewhere has recorded.
+  void advanceFrame();
+  void advanceFrame(const ServoRecord& servo);
+
+  // For a servo that runs elsewhere.
+  Servo& servo() const { return *servo_; }
+  int ticksPerFrame() const { return ticksPerFrame_; }
+  double tickDuration() const { return tickDuration_; }
+  void sampleInputs(double time, std::vector<ToolSample>& out) const;  // of every tool
 
   int frame() const { return frame_; }  // dynamics frames done
   int frameCount() const { return frameCount_; }
@@ -76,8 +89,9 @@ class Simulation {
   const World& world() const { return world_; }
 
  private:
-  void sampleInputs(double time, std::vector<ToolSample>& out) const;
   void runTicks();
+  void advanceDynamics();
+  void accountTicks();
   void accountImpulses(const FrameReport& report);
   void accountVolumes();
 
@@ -89,7 +103,6 @@ class Simulation {
   std::vector<ToolSample> inputs_;
   std::unique_ptr<Servo> servo_;
   ServoRecord record_;
-  Loads loads_;
   RunTotals totals_;
   double lastMismatch_ = 0;
 };

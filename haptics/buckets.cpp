@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
 #include "haptics/tool_input.h"
@@ -23,12 +24,13 @@ struct Bucket {
   RTCScene scene = nullptr;
   RTCGeometry geometry = nullptr;
   const BlendedSurface* surface = nullptr;
-  double inflation = 0;  // m
+  int index = 0;
+  double largestRadius = 0, inflation = 0;  // m
   std::vector<int> triangles;
   std::vector<int> nodes;              // of the triangles, each once
   Vector3d centre = Vector3d::Zero();  // of the bounding sphere around both frames, not inflated
   double radius = 0;
-  bool stale = false;  // the scene bounds frames older than the surface's
+  bool fitted = true;  // the scene bounds the surface's frames, not older ones
 };
 }  // namespace
 
@@ -36,7 +38,7 @@ struct Buckets::Data {
   RTCDevice device = nullptr;
   BlendedSurface surface;
   std::vector<Bucket> buckets;
-  std::vector<int> near;
+  std::vector<int> near;  // result of the last near(): reserved for all triangles
 
   Data() = default;
   Data(const Data&) = delete;
@@ -50,13 +52,21 @@ struct Buckets::Data {
   }
 };
 
+// Around both frames.
+template <typename Nodes>
+static void bound(const BlendedSurface& surface, const Nodes& nodes, Vector3d& lower, Vector3d& upper) {
+  lower = Vector3d::Constant(std::numeric_limits<double>::infinity());
+  upper = -lower;
+  for (const int n : nodes) {
+    lower = lower.cwiseMin(surface.from[n]).cwiseMin(surface.to[n]);
+    upper = upper.cwiseMax(surface.from[n]).cwiseMax(surface.to[n]);
+  }
+}
+
 static void triangleBounds(const RTCBoundsFunctionArguments* args) {
   const Bucket& bucket = *static_cast<const Bucket*>(args->geometryUserPtr);
-  Vector3d lower = Vector3d::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
-  for (const int n : bucket.surface->triangles[bucket.triangles[args->primID]]) {
-    lower = lower.cwiseMin(bucket.surface->from[n]).cwiseMin(bucket.surface->to[n]);
-    upper = upper.cwiseMax(bucket.surface->from[n]).cwiseMax(bucket.surface->to[n]);
-  }
+  Vector3d lower, upper;
+  bound(*bucket.surface, bucket.surface->triangles[bucket.triangles[args->primID]], lower, upper);
   RTCBounds& out = *args->bounds_o;
   out.lower_x = float(lower.x() - bucket.inflation);
   out.lower_y = float(lower.y() - bucket.inflation);
@@ -82,20 +92,25 @@ static float rayLength(double t) {
 
 // Keeps the lexicographic minimum of (t, triangle). The narrow phase is allowed slightly more than the best so far, so
 // that equal hits are compared rather than dropped in the order of their visit.
-static void sweepTriangle(const RTCIntersectFunctionNArguments* args) {
-  const Bucket& bucket = *static_cast<const Bucket*>(args->geometryUserPtr);
-  auto& context = *reinterpret_cast<SweepContext*>(args->context);
-  const int triangle = bucket.triangles[args->primID];
+static bool sweepTriangle(const Bucket& bucket, int triangle, SweepContext& context) {
   SurfaceHit& best = context.best;
   SweepHit hit;
   if (!sweepSphere(context.centre, context.motion, context.radius, bucket.surface->triangle(triangle, context.alpha),
                    best.t * (1 + 1e-9) + 1e-12, hit))
-    return;
-  if (hit.t > 1 || hit.t > best.t || (hit.t == best.t && best.triangle >= 0 && triangle > best.triangle)) return;
+    return false;
+  if (hit.t > 1 || hit.t > best.t || (hit.t == best.t && best.triangle >= 0 && triangle > best.triangle)) return false;
   static_cast<SweepHit&>(best) = hit;
   best.triangle = triangle;
+  best.bucket = bucket.index;
+  return true;
+}
+
+static void sweepCandidate(const RTCIntersectFunctionNArguments* args) {
+  const Bucket& bucket = *static_cast<const Bucket*>(args->geometryUserPtr);
+  auto& context = *reinterpret_cast<SweepContext*>(args->context);
+  if (!sweepTriangle(bucket, bucket.triangles[args->primID], context)) return;
   auto& rayHit = *reinterpret_cast<RTCRayHit*>(args->rayhit);
-  rayHit.ray.tfar = rayLength(hit.t);
+  rayHit.ray.tfar = rayLength(context.best.t);
   rayHit.hit.geomID = args->geomID;
   rayHit.hit.primID = args->primID;
 }
@@ -110,7 +125,7 @@ static void openBucket(RTCDevice device, Bucket& bucket) {
   rtcSetGeometryUserPrimitiveCount(bucket.geometry, unsigned(bucket.triangles.size()));
   rtcSetGeometryUserData(bucket.geometry, &bucket);
   rtcSetGeometryBoundsFunction(bucket.geometry, triangleBounds, nullptr);
-  rtcSetGeometryIntersectFunction(bucket.geometry, sweepTriangle);
+  rtcSetGeometryIntersectFunction(bucket.geometry, sweepCandidate);
   rtcCommitGeometry(bucket.geometry);
   rtcAttachGeometry(bucket.scene, bucket.geometry);
   rtcCommitScene(bucket.scene);
@@ -136,6 +151,18 @@ static void appendBody(const SoftBodyModel& model, BlendedSurface& surface, std:
   }
 }
 
+static void listTrianglesOfNodes(BlendedSurface& surface) {
+  std::vector<int>& first = surface.firstTriangleOfNode;
+  first.assign(surface.bodyOfNode.size() + 1, 0);
+  for (const auto& triangle : surface.triangles)
+    for (const int n : triangle) ++first[n + 1];
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  surface.trianglesOfNode.resize(first.back());
+  std::vector<int> next = first;
+  for (std::size_t t = 0; t < surface.triangles.size(); ++t)
+    for (const int n : surface.triangles[t]) surface.trianglesOfNode[next[n]++] = int(t);
+}
+
 static void copyNodes(const DynamicsFrame& frame, std::vector<Vector3d>& nodes) {
   std::size_t n = 0;
   for (const BodyFrame& body : frame.bodies)
@@ -148,11 +175,8 @@ static void copyNodes(const DynamicsFrame& frame, std::vector<Vector3d>& nodes) 
 
 static void renewBoundingSphere(Bucket& bucket) {
   const BlendedSurface& surface = *bucket.surface;
-  Vector3d lower = Vector3d::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
-  for (const int n : bucket.nodes) {
-    lower = lower.cwiseMin(surface.from[n]).cwiseMin(surface.to[n]);
-    upper = upper.cwiseMax(surface.from[n]).cwiseMax(surface.to[n]);
-  }
+  Vector3d lower, upper;
+  bound(surface, bucket.nodes, lower, upper);
   bucket.centre = 0.5 * (lower + upper);
   double radius2 = 0;
   for (const int n : bucket.nodes)
@@ -161,22 +185,42 @@ static void renewBoundingSphere(Bucket& bucket) {
   bucket.radius = std::sqrt(radius2);
 }
 
+bool isEmbreeIsa(const std::string& isa) {
+  if (isa == "sse2") return __builtin_cpu_supports("sse2");
+  if (isa == "sse4.2") return __builtin_cpu_supports("sse4.2");
+  if (isa == "avx") return __builtin_cpu_supports("avx");
+  if (isa == "avx2") return __builtin_cpu_supports("avx2");
+  if (isa != "avx512") return false;
+  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&
+         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
+}
+
+static std::string deviceConfig(const EmbreeSettings& embree) {
+  std::string config = "set_affinity=0,threads=" + std::to_string(embree.threads);
+  if (!embree.isa.empty()) config += ",isa=" + embree.isa;
+  return config;
+}
+
 Buckets::Buckets(const std::vector<std::shared_ptr<const SoftBodyModel>>& bodies, double largestRadius,
-                 const DynamicsFrame& rest)
+                 const DynamicsFrame& rest, const EmbreeSettings& embree)
     : data_(std::make_unique<Data>()) {
-  // One thread: queries and refits are too small to share, and the servo's core is its own.
-  data_->device = rtcNewDevice("threads=1,set_affinity=0");
+  data_->device = rtcNewDevice(deviceConfig(embree).c_str());
   if (!data_->device) throw std::runtime_error("Embree cannot start: expected a CPU with SSE2 and memory for a device");
-  for (const auto& model : bodies) appendBody(*model, data_->surface, data_->buckets);
-  data_->surface.from.resize(data_->surface.bodyOfNode.size());
-  data_->surface.to.resize(data_->surface.bodyOfNode.size());
-  data_->near.reserve(data_->surface.triangles.size());
-  copyNodes(rest, data_->surface.from);
-  copyNodes(rest, data_->surface.to);
-  data_->surface.stepBefore.assign(data_->surface.from.size(), Vector3d::Zero());
-  data_->surface.step = data_->surface.stepBefore;
-  for (Bucket& bucket : data_->buckets) {
-    bucket.surface = &data_->surface;
+  BlendedSurface& surface = data_->surface;
+  for (const auto& model : bodies) appendBody(*model, surface, data_->buckets);
+  listTrianglesOfNodes(surface);
+  data_->near.reserve(surface.triangles.size());
+  surface.from.resize(surface.bodyOfNode.size());
+  surface.to.resize(surface.bodyOfNode.size());
+  copyNodes(rest, surface.from);
+  copyNodes(rest, surface.to);
+  surface.stepBefore.assign(surface.from.size(), Vector3d::Zero());
+  surface.step = surface.stepBefore;
+  for (std::size_t k = 0; k < data_->buckets.size(); ++k) {
+    Bucket& bucket = data_->buckets[k];
+    bucket.surface = &surface;
+    bucket.index = int(k);
+    bucket.largestRadius = largestRadius;
     bucket.inflation = largestRadius * boundsFactor + boundsMargin;
     openBucket(data_->device, bucket);
     renewBoundingSphere(bucket);
@@ -192,16 +236,19 @@ const BlendedSurface& Buckets::surface() const {
   return data_->surface;
 }
 
-void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to) {
+// ---- Dynamics side ---------------------------------------------------------------------------------------
+
+void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<Vector3d>& stepBefore) {
   BlendedSurface& surface = data_->surface;
+  assert(stepBefore.size() == surface.step.size());
   copyNodes(from, surface.from);
   copyNodes(to, surface.to);
   surface.duration = to.time - from.time;
-  surface.stepBefore.swap(surface.step);
+  surface.stepBefore = stepBefore;
   for (std::size_t n = 0; n < surface.step.size(); ++n) surface.step[n] = surface.to[n] - surface.from[n];
   for (Bucket& bucket : data_->buckets) {
     renewBoundingSphere(bucket);
-    bucket.stale = true;
+    bucket.fitted = false;
   }
 }
 
@@ -210,20 +257,16 @@ static bool isNear(const Bucket& bucket, const Vector3d& centre, double distance
   return (centre - bucket.centre).squaredNorm() <= reach * reach;
 }
 
-// Refits where a query gets as far as the bucket's triangles: in a large scene a tool is near a few of hundreds.
-static RTCScene currentScene(Bucket& bucket) {
-  if (bucket.stale) {
+void Buckets::refitNear(const Vector3d& centre, double distance) {
+  for (Bucket& bucket : data_->buckets) {
+    if (bucket.fitted || !isNear(bucket, centre, distance)) continue;
     rtcCommitGeometry(bucket.geometry);
     rtcCommitScene(bucket.scene);
-    bucket.stale = false;
+    bucket.fitted = true;
   }
-  return bucket.scene;
 }
 
-void Buckets::refitNear(const Vector3d& centre, double distance) {
-  for (Bucket& bucket : data_->buckets)
-    if (isNear(bucket, centre, distance)) currentScene(bucket);
-}
+// ---- Servo side ------------------------------------------------------------------------------------------
 
 static bool isQueryable(const Vector3d& p) {
   return p.allFinite() && p.lpNorm<Eigen::Infinity>() <= 2 * toolReach;
@@ -234,27 +277,37 @@ static double distanceToSegment2(const Vector3d& p, const Vector3d& start, const
   return (start + along * motion - p).squaredNorm();
 }
 
-bool Buckets::sweep(const Vector3d& centre, const Vector3d& motion, double radius, double alpha,
+static void sweepBucket(const Bucket& bucket, SweepContext& context) {
+  if (!bucket.fitted) {
+    for (const int triangle : bucket.triangles) sweepTriangle(bucket, triangle, context);
+    return;
+  }
+  RTCRayHit ray{};
+  ray.ray.org_x = float(context.centre.x());
+  ray.ray.org_y = float(context.centre.y());
+  ray.ray.org_z = float(context.centre.z());
+  ray.ray.dir_x = float(context.motion.x());
+  ray.ray.dir_y = float(context.motion.y());
+  ray.ray.dir_z = float(context.motion.z());
+  ray.ray.tfar = rayLength(context.best.t);
+  ray.ray.mask = ~0U;
+  ray.hit.geomID = ray.hit.primID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(bucket.scene, &context.embree, &ray);
+}
+
+bool Buckets::sweep(const Vector3d& centre, const Vector3d& motion, double radius, double alpha, int firstBucket,
                     SurfaceHit& hit) const {
   assert(isQueryable(centre) && isQueryable(centre + motion) && radius >= 0 && alpha >= 0 && alpha <= 1);
   const double motion2 = motion.squaredNorm();
   if (motion2 < 1e-24) return false;  // far below every margin, and a ray needs a direction in float
   SweepContext context{{}, centre, motion, radius, alpha, {}};
   rtcInitIntersectContext(&context.embree);
-  for (Bucket& bucket : data_->buckets) {
+  if (firstBucket >= 0) sweepBucket(data_->buckets[firstBucket], context);
+  for (const Bucket& bucket : data_->buckets) {
     const double reach = bucket.radius + bucket.inflation;
-    if (distanceToSegment2(bucket.centre, centre, motion, motion2) > reach * reach) continue;
-    RTCRayHit ray{};
-    ray.ray.org_x = float(centre.x());
-    ray.ray.org_y = float(centre.y());
-    ray.ray.org_z = float(centre.z());
-    ray.ray.dir_x = float(motion.x());
-    ray.ray.dir_y = float(motion.y());
-    ray.ray.dir_z = float(motion.z());
-    ray.ray.tfar = rayLength(context.best.t);
-    ray.ray.mask = ~0U;
-    ray.hit.geomID = ray.hit.primID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(currentScene(bucket), &context.embree, &ray);
+    if (bucket.index != firstBucket && distanceToSegment2(bucket.centre, centre, context.best.t * motion,
+                                                          context.best.t * context.best.t * motion2) <= reach * reach)
+      sweepBucket(bucket, context);
   }
   if (context.best.triangle < 0) return false;
   hit = context.best;
@@ -264,35 +317,51 @@ bool Buckets::sweep(const Vector3d& centre, const Vector3d& motion, double radiu
 namespace {
 struct NearQuery {
   const Bucket* bucket;
+  Vector3d centre;
+  double distance;
   std::vector<int>* found;
 };
 }  // namespace
 
-static bool collectTriangle(RTCPointQueryFunctionArguments* args) {
+// In double, so that what is near does not depend on Embree's bounds either.
+static void addIfNear(const NearQuery& query, int triangle) {
+  const BlendedSurface& surface = *query.bucket->surface;
+  Vector3d lower, upper;
+  bound(surface, surface.triangles[triangle], lower, upper);
+  const double reach = query.bucket->largestRadius + query.distance;
+  const Vector3d nearest = query.centre.cwiseMax(lower).cwiseMin(upper);
+  if ((query.centre - nearest).squaredNorm() <= reach * reach) query.found->push_back(triangle);
+}
+
+static bool addCandidate(RTCPointQueryFunctionArguments* args) {
   const auto& query = *static_cast<const NearQuery*>(args->userPtr);
-  query.found->push_back(query.bucket->triangles[args->primID]);
+  addIfNear(query, query.bucket->triangles[args->primID]);
   return false;  // the query's radius stays as it is
 }
 
-const std::vector<int>& Buckets::near(const Vector3d& centre, double distance) {
+const std::vector<int>& Buckets::near(const Vector3d& centre, double distance) const {
   assert(isQueryable(centre) && std::isfinite(distance) && distance >= 0);
   std::vector<int>& found = data_->near;
   found.clear();
-  for (Bucket& bucket : data_->buckets) {
+  for (const Bucket& bucket : data_->buckets) {
     if (!isNear(bucket, centre, distance)) continue;
+    NearQuery query{&bucket, centre, distance, &found};
+    if (!bucket.fitted) {
+      for (const int triangle : bucket.triangles) addIfNear(query, triangle);
+      continue;
+    }
     RTCPointQuery point{float(centre.x()), float(centre.y()), float(centre.z()), 0,
                         float(distance * boundsFactor + boundsMargin)};
     RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
-    NearQuery query{&bucket, &found};
-    rtcPointQuery(currentScene(bucket), &point, &context, collectTriangle, &query);
+    rtcPointQuery(bucket.scene, &point, &context, addCandidate, &query);
   }
   std::sort(found.begin(), found.end());
   return found;
 }
 
 std::string embreeVersion() {
-  const RTCDevice device = rtcNewDevice("threads=1,set_affinity=0");
+  const RTCDevice device = rtcNewDevice(deviceConfig({}).c_str());
   if (!device) return "does not start";
   const auto number = [&](RTCDeviceProperty property) {
     return std::to_string(rtcGetDeviceProperty(device, property));

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "haptics/embree_settings.h"
 #include "haptics/swept_triangle.h"
 #include "physics/dynamics/frame.h"
 #include "physics/model/soft_body_model.h"
@@ -15,7 +16,9 @@ namespace medulla {
 struct BlendedSurface {
   std::vector<std::array<int, 3>> triangles;  // node numbers
   std::vector<int> bodyOfNode;
-  std::vector<int> firstNode;             // of each body
+  std::vector<int> firstNode;  // of each body
+  // The triangles of node n: trianglesOfNode[firstTriangleOfNode[n]] up to those of n + 1.
+  std::vector<int> firstTriangleOfNode, trianglesOfNode;
   std::vector<Eigen::Vector3d> from, to;  // m, world, per node
   // m, what each node moved in the frame before `from`, and from `from` to `to`
   std::vector<Eigen::Vector3d> stepBefore, step;
@@ -31,38 +34,43 @@ struct BlendedSurface {
 };
 
 struct SurfaceHit : SweepHit {
-  int triangle = -1;
+  int triangle = -1, bucket = -1;
 };
 
 // Finds the triangles near a proxy (paper 4). Every filling sphere owns a bucket of triangles; a flat test of the
 // buckets' bounding spheres (the paper's second, larger radius, renewed at each commit) selects buckets, inside which
 // Embree finds candidates. Embree only narrows down, on bounds padded for its float arithmetic; what counts is decided
-// by swept_triangle in double, so that results do not depend on instruction set, visit order or bucket count.
+// in double, so that results do not depend on instruction set, visit order or bucket count.
+//
+// One is a snapshot: the dynamics' thread commits, the servo's asks, and a TripleBuffer keeps the two apart. Asking
+// neither allocates nor locks.
 class Buckets {
  public:
   // `largestRadius`: of any sphere that will be swept, m. Throws std::runtime_error when Embree cannot start.
   Buckets(const std::vector<std::shared_ptr<const SoftBodyModel>>& bodies, double largestRadius,
-          const DynamicsFrame& rest);
+          const DynamicsFrame& rest, const EmbreeSettings& embree = {});
   ~Buckets();
   Buckets(Buckets&&) noexcept;
   Buckets& operator=(Buckets&&) noexcept;
 
   const BlendedSurface& surface() const;
 
-  // The two frames to blend from now on. Bounding spheres are renewed around both; a bucket's triangles are refitted by
-  // refitNear(), or else by the first query that reaches them.
-  void commit(const DynamicsFrame& from, const DynamicsFrame& to);
-  // Those of the buckets within largestRadius + `distance` (m) of `centre`: so that queries need not.
+  // The two frames to blend from now on, and what each node moved in the frame before (m). Bounding spheres are renewed
+  // around both frames; Embree's bounds only by refitNear().
+  void commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<Eigen::Vector3d>& stepBefore);
+  // Renews Embree's bounds in the buckets within largestRadius + `distance` (m) of `centre`. Buckets that are left out
+  // are searched triangle by triangle, with the same result.
   void refitNear(const Eigen::Vector3d& centre, double distance);
 
   // First touch of a sphere that moves from `centre` to `centre + motion` while the surface stands at alpha; of equal
-  // times the lowest triangle. Finite input within toolReach is asserted: Embree would abort the process on NaN.
-  bool sweep(const Eigen::Vector3d& centre, const Eigen::Vector3d& motion, double radius, double alpha,
+  // times the lowest triangle. `firstBucket`, the one touched last, is tried first: what it is changes the time that
+  // this takes alone. Finite input within toolReach is asserted: Embree would abort the process on NaN.
+  bool sweep(const Eigen::Vector3d& centre, const Eigen::Vector3d& motion, double radius, double alpha, int firstBucket,
              SurfaceHit& hit) const;
 
-  // Triangles that may come within largestRadius + `distance` of `centre` at any alpha, sorted; a superset. Valid until
-  // the next call.
-  const std::vector<int>& near(const Eigen::Vector3d& centre, double distance);
+  // Triangles whose box around both frames, grown by largestRadius, comes within `distance` of `centre`, sorted: a
+  // superset of those that come so near at any alpha. Valid until the next call.
+  const std::vector<int>& near(const Eigen::Vector3d& centre, double distance) const;
 
  private:
   struct Data;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "haptics/force_shading.h"
+
 namespace medulla {
 
 void clearPatch(ContactPatch& patch) {
@@ -39,7 +41,7 @@ void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& pro
     const Eigen::Vector3d outward = proxy.centre - contact.point;
     const double distance = outward.norm();
     if (!(distance > 0)) continue;  // the point passed the proxy's centre: no direction to push it
-    contact.normal = outward / distance;
+    contact.normal = shadedNormal(surface, alpha, entry.triangle, contact.weights, outward / distance);
     out.push_back(contact);
   }
 }

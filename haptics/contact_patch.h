@@ -27,8 +27,8 @@ void clearPatch(ContactPatch& patch);
 // Adds the proxy's contacts of one tick, each by its share of `push` (N, >= 0).
 void addContacts(const Proxy& proxy, double push, ContactPatch& patch);
 
-// The patch as contacts of the surface at alpha, shares summing to 1, normals from the point to the proxy's centre.
-// `out` is cleared and filled.
+// The patch as contacts of the surface at alpha, shares summing to 1, with the shaded normals along which the hand
+// feels them. `out` is cleared and filled.
 void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ContactPatch& patch,
                    std::vector<ProxyContact>& out);
 

@@ -11,12 +11,13 @@ static void holdPatch(const BlendedSurface& surface, double alpha, const Proxy& 
   const std::array<int, 3>& touched = surface.triangles[contact.triangle];
   const int body = surface.bodyOfNode[touched[0]];
   const Eigen::Quaterniond toolFromWorld = device.worldFromTool.conjugate();
+  const Eigen::Vector3d felt = proxy.centre + proxy.shading;
   for (int n = surface.firstNode[body]; n < int(surface.from.size()) && surface.bodyOfNode[n] == body; ++n) {
     const Eigen::Vector3d x = surface.node(n, alpha);
     const bool isTouched = std::find(touched.begin(), touched.end(), n) != touched.end();
     if (!isTouched && (x - contact.point).norm() > gripRadius) continue;
     assert(grip.held.size() < grip.held.capacity());
-    grip.held.push_back({n, toolFromWorld * (x - proxy.centre)});
+    grip.held.push_back({n, toolFromWorld * (x - felt)});
   }
 }
 
@@ -25,6 +26,7 @@ void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy,
   const bool closes = device.grip > 0.5;
   if (closes == grip.closed) return;
   grip.closed = closes;
+  grip.slipped = false;
   grip.held.clear();
   if (closes && proxy.inContact()) holdPatch(surface, alpha, proxy, device, gripRadius, grip);
 }

@@ -14,15 +14,22 @@ struct HeldOffset {
 
 struct Grip {
   bool closed = false;
-  std::vector<HeldOffset> held;  // empty while open, and when the grip closed on nothing
+  bool slipped = false;          // closed, but what it held has torn away
+  std::vector<HeldOffset> held;  // empty while open, and when the grip closed on nothing or slipped
 };
 
 // Opens or closes by the sample's grip (closed above 0.5). Closing in contact holds every node of the touched body
 // within gripRadius of the contact point, and at least the three of the touched triangle. A node's offset is measured
-// from the proxy, not from the device: the springs then start with exactly the force that the contact had.
-// `grip.held` must have room for every node of the surface: nothing is allocated here.
+// from where the proxy is felt, not from the device: the springs then start with exactly the force that the contact
+// had. `grip.held` must have room for every node of the surface: nothing is allocated here.
 void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
                 double gripRadius, Grip& grip);
+
+// The tissue tears away: the grip holds nothing until it opens and closes again.
+inline void letSlip(Grip& grip) {
+  grip.held.clear();
+  grip.slipped = true;
+}
 
 // Where the tool wants a held node, m, world.
 inline Eigen::Vector3d heldTarget(const ToolSample& device, const HeldOffset& held) {

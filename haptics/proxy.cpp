@@ -8,13 +8,15 @@
 #include <stdexcept>
 #include <string>
 
+#include "haptics/force_shading.h"
+
 namespace medulla {
 
 using Eigen::Vector3d;
 
 // The proxy stops this far short of a surface, so that rounding never puts it inside; farther than `touching` a contact
 // is over. Both in metres.
-static constexpr double standOff = 1e-7, touching = 1e-6;
+static constexpr double standOff = 5e-8, touching = 1e-6;
 // Below this a proxy has arrived, m.
 static constexpr double arrived = 1e-9;
 // Enough for every groove and corner met in a tick; what is left is done in the next.
@@ -104,10 +106,11 @@ static void dropPlane(TouchedPlanes& touched, int k) {
 // grazing incidence, so that the distance to the surface stays standOff.
 static bool moveTo(const Buckets& buckets, double alpha, const Vector3d& target, Proxy& proxy, SurfaceHit& hit) {
   const Vector3d motion = target - proxy.centre;
-  if (!buckets.sweep(proxy.centre, motion, proxy.radius, alpha, hit)) {
+  if (!buckets.sweep(proxy.centre, motion, proxy.radius, alpha, proxy.lastBucket, hit)) {
     proxy.centre = target;
     return false;
   }
+  proxy.lastBucket = hit.bucket;
   const double length = motion.norm(), incidence = std::max(0.02, -hit.normal.dot(motion) / length);
   proxy.centre += std::max(0.0, hit.t - standOff / (incidence * length)) * motion;
   return true;
@@ -132,7 +135,8 @@ static TouchedPlanes slideTo(const Buckets& buckets, double alpha, const Vector3
     SurfaceHit hit;
     if (moveTo(buckets, alpha, target, proxy, hit))
       addPlane(touched, {hit.normal, hit.normal.dot(proxy.centre)}, hit.triangle);
-    dropLeftPlanes(buckets, alpha, proxy, touched);
+    // Not at the end: a proxy that is still rolling over an edge has not lost contact.
+    if (k + 1 < maxSweeps) dropLeftPlanes(buckets, alpha, proxy, touched);
     if (nearestInHalfSpaces(goal, touched.planes.data(), touched.count, target, touched.pressure)) continue;
     // Wedged between walls that leave no point free: it stays, and presses on what opposes the goal.
     for (int i = 0; i < touched.count; ++i)
@@ -160,6 +164,40 @@ static void keepPressingContacts(const Buckets& buckets, double alpha, const Tou
   for (int k = 0; k < proxy.contactCount; ++k) proxy.contacts[k].share /= sum;
 }
 
+// Where the smooth surface would hold the proxy by what it touches: the first pass of Ruspini, Kolarov and Khatib 1997.
+// Their second pass moves the proxy there. Rejected: a device under a convex edge has two places nearest to it, between
+// which the proxy then alternated, and a proxy that slides in the dent that it makes lets soft tissue flutter.
+// Going from one such place to the other still makes the pull jump. What is felt is therefore the mean of the pull now
+// and of the last tick's, lengthened by what device and surface have moved along it since: no jump is felt at once, and
+// plain pressing is not delayed.
+static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& touched, const Vector3d& device,
+                  Proxy& proxy) {
+  constexpr double flat = 1e-6;  // rad
+  std::array<HalfSpace, 3> shaded;
+  int count = 0;
+  bool isFlat = true;
+  for (int k = 0; k < touched.count; ++k) {
+    if (!(touched.pressure[k] > arrived)) continue;
+    const ProxyContact contact = contactAt(buckets, alpha, touched.triangles[k], proxy.centre);
+    const Vector3d normal = shadedNormal(buckets.surface(), alpha, contact.triangle, contact.weights, contact.normal);
+    isFlat = isFlat && (normal - contact.normal).norm() < flat;
+    shaded[count++] = {normal, normal.dot(proxy.centre)};
+  }
+  const Vector3d pull = proxy.centre - device, before = proxy.felt;
+  Vector3d nearest;
+  std::array<double, 3> pressure;
+  proxy.felt = Vector3d::Zero();
+  if (count > 0 && !isFlat && nearestInHalfSpaces(device, shaded.data(), count, nearest, pressure)) {
+    proxy.felt = nearest - device;
+    if (const double length = before.norm(); length > 0) {
+      const double moved = before.dot(proxy.surfaceMotion - (device - proxy.device)) / length;
+      proxy.felt = 0.5 * (proxy.felt + std::max(0.0, length + moved) / length * before);
+    }
+  }
+  proxy.device = device;
+  proxy.shading = proxy.felt.isZero(0) ? Vector3d::Zero() : Vector3d(proxy.felt - pull);
+}
+
 // Coulomb friction as a change of the goal. Without friction the proxy would slide from `start` to `free`, pressed by
 // the depth |free - device|. It may trail behind `free` by up to mu times that depth. Stick: the goal is pulled back
 // onto the line through the start along the contact normal; slip: by exactly mu_d depth. Solving again towards the new
@@ -181,14 +219,13 @@ static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& start, co
 
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Vector3d& device,
                   Proxy& proxy) {
-  const Proxy start = proxy;
+  const Vector3d start = proxy.centre;
   TouchedPlanes touched = slideTo(buckets, alpha, device, proxy);
+  shade(buckets, alpha, touched, device, proxy);
   const bool pressed = touched.count > 0 && (proxy.centre - device).norm() > arrived;
   if (pressed && tool.staticFriction > 0) {
-    bool slipping = start.slipping;
-    const Vector3d goal = frictionGoal(tool, start.centre, proxy.centre, device, slipping);
-    proxy = start;
-    proxy.slipping = slipping;
+    const Vector3d goal = frictionGoal(tool, start, proxy.centre, device, proxy.slipping);
+    proxy.centre = start;
     touched = slideTo(buckets, alpha, goal, proxy);
   }
   keepPressingContacts(buckets, alpha, touched, proxy);
@@ -215,8 +252,8 @@ static Vector3d carriedBy(const Buckets& buckets, double alpha, const Proxy& pro
 // The path of the proxy from `start` to `end` as seen from each moving triangle (Ruspini and Khatib 2000, "adjusted
 // segment"): the start is shifted by the triangle's own motion near it. Where a triangle would pass the proxy, the end
 // is moved back to the touched side. Repeated, because moving back from one triangle may meet another.
-static Vector3d notPassedOver(Buckets& buckets, double alphaBefore, double alpha, double radius, const Vector3d& start,
-                              Vector3d end) {
+static Vector3d notPassedOver(const Buckets& buckets, double alphaBefore, double alpha, double radius,
+                              const Vector3d& start, Vector3d end) {
   for (int pass = 0; pass < maxPasses; ++pass) {
     Vector3d corrected = end;
     double largest = 0;
@@ -237,7 +274,7 @@ static Vector3d notPassedOver(Buckets& buckets, double alphaBefore, double alpha
   return end;
 }
 
-static int nearestTriangle(Buckets& buckets, double alpha, const Vector3d& p, double& distance) {
+static int nearestTriangle(const Buckets& buckets, double alpha, const Vector3d& p, double& distance) {
   int nearest = -1;
   for (const int t : buckets.near(p, 0)) {
     const double d = distanceTo(buckets, alpha, t, p);
@@ -259,7 +296,7 @@ static void addClearance(const Buckets& buckets, double alpha, int triangle, dou
 // Moves the proxy out to standOff beyond the tool's radius from every triangle, by the shortest way that the planes
 // found so far allow. Each move is swept with the clearance there is, so that pushing out of one surface never leads
 // through another; where no room is found the proxy keeps the clearance it has.
-static void pushOut(Buckets& buckets, double alpha, double toolRadius, Proxy& proxy) {
+static void pushOut(const Buckets& buckets, double alpha, double toolRadius, Proxy& proxy) {
   TouchedPlanes touched;
   const Vector3d start = proxy.centre;
   for (int k = 0; k <= maxPushes; ++k) {
@@ -275,13 +312,14 @@ static void pushOut(Buckets& buckets, double alpha, double toolRadius, Proxy& pr
   }
 }
 
-void followSurface(Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy) {
+void followSurface(const Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy) {
   const Vector3d start = proxy.centre, carried = start + carriedBy(buckets, alpha, proxy);
   if (!(carried.lpNorm<Eigen::Infinity>() <= toolReach))
     throw std::runtime_error("a touched surface carried the tool beyond " + std::to_string(int(toolReach)) +
                              " m: the state of its body is not finite any more in effect; use more substeps");
   proxy.centre = notPassedOver(buckets, alphaBefore, alpha, proxy.radius, start, carried);
   pushOut(buckets, alpha, toolRadius, proxy);
+  proxy.surfaceMotion = proxy.centre - start;
   for (int k = 0; k < proxy.contactCount; ++k) {
     ProxyContact& contact = proxy.contacts[k];
     contact.point = weighted(buckets.surface().triangle(contact.triangle, alpha), contact.weights);

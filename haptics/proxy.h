@@ -22,6 +22,11 @@ struct Proxy {
   // The tool's radius; less while surfaces leave no room for it: a squeezed proxy shrinks rather than tunnels.
   double radius = 0;
   bool slipping = true;
+  // m; as if by the smooth surface that the mesh stands for (force_shading.h), the proxy is felt at centre + shading.
+  Eigen::Vector3d shading = Eigen::Vector3d::Zero();
+  Eigen::Vector3d felt = Eigen::Vector3d::Zero();  // m, from the device to there, without friction; zero: not shaded
+  Eigen::Vector3d device = Eigen::Vector3d::Zero(), surfaceMotion = Eigen::Vector3d::Zero();  // m, of the last tick
+  int lastBucket = -1;  // where the last sweep ended: the next is likely to end there, too
   int contactCount = 0;
   std::array<ProxyContact, 3> contacts;
 
@@ -36,7 +41,7 @@ Proxy placeProxy(const Buckets& buckets, const Eigen::Vector3d& device, double t
 
 // The surface moves from alphaBefore to alpha (of the same two frames) and takes the proxy along: carried by what it
 // touches, never passed over, pushed out of what came too near.
-void followSurface(Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy);
+void followSurface(const Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy);
 
 // The device moves while the surface stands at alpha: the proxy goes to the nearest reachable point, held back by
 // Coulomb friction. Afterwards its contacts are those that press.

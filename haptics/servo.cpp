@@ -10,6 +10,7 @@
 #include "haptics/contact_patch.h"
 #include "haptics/grab.h"
 #include "haptics/proxy.h"
+#include "haptics/triple_buffer.h"
 
 namespace medulla {
 
@@ -27,6 +28,7 @@ struct Tool {
   Vector3d coupledSum = Vector3d::Zero();  // over the frame's ticks
   ContactPatch patch;                      // of the frame's ticks
   ProxyContact lastContact;                // while isLeaving: in contact, or not yet clear of it
+  Vector3d lastFelt = Vector3d::Zero();    // unit; along which it was felt
   double largestPush = 0;                  // N, of the coupling's spring during this contact
   double clampScale = 1;                   // of the force, at the last tick
   int ticks = 0;                           // in this frame
@@ -35,9 +37,10 @@ struct Tool {
 }  // namespace
 
 struct Servo::Data {
-  Buckets buckets;
+  TripleBuffer<Buckets> surfaces;
+  std::vector<Vector3d> lastStep;  // dynamics' side: of the nodes, in the frame committed last
   double tickDuration;
-  double alpha = 1;  // of the last tick
+  double alpha = 0;  // of the last tick
   std::vector<Tool> tools;
   std::vector<ToolState> states;
   std::vector<ProxyContact> contacts;  // scratch of handOver
@@ -58,11 +61,12 @@ static void checkSettings(const ToolSettings& s, std::size_t tool) {
   const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
   const bool valid = positive(s.radius) && positive(s.stiffness) && s.damping >= 0 && std::isfinite(s.damping) &&
                      s.dynamicFriction >= 0 && s.staticFriction >= s.dynamicFriction &&
-                     std::isfinite(s.staticFriction) && positive(s.forceMax) && positive(s.gripRadius);
+                     std::isfinite(s.staticFriction) && positive(s.forceMax) && positive(s.gripRadius) &&
+                     positive(s.gripForceMax);
   if (!valid)
     throw std::runtime_error("tool " + std::to_string(tool) +
-                             ": expected radius, stiffness, forceMax and gripRadius > 0, damping >= 0 and "
-                             "staticFriction >= dynamicFriction >= 0, all finite");
+                             ": expected radius, stiffness, forceMax, gripRadius and gripForceMax > 0, damping >= 0 "
+                             "and staticFriction >= dynamicFriction >= 0, all finite");
 }
 
 // ---- One tick --------------------------------------------------------------------------------------------
@@ -102,10 +106,11 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   if (!tool.isLeaving) return Vector3d::Zero();
   const Proxy& proxy = tool.proxy;
   const ProxyContact& last = tool.lastContact;
-  const Vector3d pull = proxy.centre - tool.device.position;
+  const Vector3d pull = proxy.centre + proxy.shading - tool.device.position;
   const bool isPressed = proxy.inContact() && pull.squaredNorm() > 0;
-  const Vector3d normal = isPressed ? Vector3d(pull.normalized()) : last.normal;
-  const double depth = isPressed ? pull.norm() : normal.dot(last.point - tool.device.position) + tool.settings.radius;
+  const Vector3d normal = isPressed ? Vector3d(pull.normalized()) : tool.lastFelt;
+  const double depth =
+      isPressed ? pull.norm() : normal.dot(last.point + tool.settings.radius * last.normal - tool.device.position);
   const double spring = tool.settings.stiffness * depth;
   tool.largestPush = std::max(tool.largestPush, spring);
   const Vector3d step = isPressed ? meanContactStep(surface, alpha, proxy) : contactStep(surface, alpha, last);
@@ -127,6 +132,7 @@ static void followLeaving(const BlendedSurface& surface, double alpha, Tool& too
   if (tool.proxy.inContact()) {
     if (!tool.isLeaving) tool.largestPush = 0;
     tool.lastContact = tool.proxy.mainContact();
+    tool.lastFelt = tool.proxy.felt.isZero(0) ? tool.lastContact.normal : tool.proxy.felt.normalized();
     tool.isLeaving = true;
   } else if (tool.isLeaving) {
     const Triangle triangle = surface.triangle(tool.lastContact.triangle, alpha);
@@ -144,6 +150,7 @@ static void record(const Vector3d& force, Tool& tool, ToolState& state) {
   state.device = tool.device.position;
   state.proxy = tool.proxy.centre;
   state.holding = !tool.grip.held.empty();
+  state.slipped = tool.grip.slipped;
   state.inContact = tool.proxy.inContact() || (!state.holding && size > 0);
   tool.coupled = state.clamped && !state.holding
                      ? Vector3d(tool.proxy.centre + tool.clampScale * (tool.device.position - tool.proxy.centre))
@@ -152,32 +159,42 @@ static void record(const Vector3d& force, Tool& tool, ToolState& state) {
   ++tool.ticks;
 }
 
-static void tickTool(Buckets& buckets, double alphaBefore, double alpha, double tickDuration, const ToolSample& input,
-                     Tool& tool, ToolState& state) {
+// Whether the grip holds on, its force recorded.
+static bool tickGrip(const BlendedSurface& surface, double alpha, const Vector3d& deviceVelocity, Tool& tool,
+                     ToolState& state) {
+  if (tool.grip.held.empty()) return false;
+  const Vector3d force = heldForce(surface, alpha, tool, deviceVelocity);
+  if (std::min(force.norm(), tool.settings.forceMax) > tool.settings.gripForceMax) {
+    letSlip(tool.grip);
+    return false;
+  }
+  record(force, tool, state);
+  return true;
+}
+
+static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, double tickDuration,
+                     const ToolSample& input, Tool& tool, ToolState& state) {
   const BlendedSurface& surface = buckets.surface();
-  const Vector3d deviceVelocity = (input.position - tool.device.position) / tickDuration;
+  const Vector3d way = input.position - tool.device.position, deviceVelocity = way / tickDuration;
+  state.energy += state.force.dot(way);  // the device holds a tick's force until the next (Hannaford and Ryu 2002)
   tool.device = input;
   followSurface(buckets, alphaBefore, alpha, tool.settings.radius, tool.proxy);
   updateGrip(surface, alpha, tool.proxy, tool.device, tool.settings.gripRadius, tool.grip);
-  if (!tool.grip.held.empty()) {
-    record(heldForce(surface, alpha, tool, deviceVelocity), tool, state);
-  } else {
-    followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
-    followLeaving(surface, alpha, tool);
-    record(contactForce(surface, alpha, deviceVelocity, tool), tool, state);
-    addContacts(tool.proxy, (tool.proxy.centre - tool.device.position).norm(), tool.patch);
-  }
+  if (tickGrip(surface, alpha, deviceVelocity, tool, state)) return;
+  followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
+  followLeaving(surface, alpha, tool);
+  record(contactForce(surface, alpha, deviceVelocity, tool), tool, state);
+  addContacts(tool.proxy, (tool.proxy.centre - tool.device.position).norm(), tool.patch);
 }
 
 void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
   assert(inputs.size() == data_->tools.size() && alpha > 0 && alpha <= 1 && alpha >= data_->alpha);
   for (std::size_t k = 0; k < inputs.size(); ++k) checkSample(inputs[k], k);
   for (std::size_t k = 0; k < inputs.size(); ++k)
-    tickTool(data_->buckets, data_->alpha, alpha, data_->tickDuration, inputs[k], data_->tools[k], data_->states[k]);
+    tickTool(data_->surfaces.reading(), data_->alpha, alpha, data_->tickDuration, inputs[k], data_->tools[k],
+             data_->states[k]);
   data_->alpha = alpha;
 }
-
-// ---- Dynamics side ---------------------------------------------------------------------------------------
 
 static void startFrame(Tool& tool) {
   tool.deviceAtFrameStart = tool.device;
@@ -187,16 +204,25 @@ static void startFrame(Tool& tool) {
   clearPatch(tool.patch);
 }
 
-void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to) {
-  constexpr double kTravel = 0.02;  // m that a tool moves in a frame at 1 m/s and 50 Hz
-  data_->buckets.commit(from, to);
+bool Servo::beginFrame() {
+  if (!data_->surfaces.take()) return false;
   data_->alpha = 0;
-  for (Tool& tool : data_->tools) {
-    startFrame(tool);
-    const Vector3d& centre = tool.proxy.centre;
-    data_->buckets.refitNear(centre, (tool.device.position - centre).norm() + kTravel);
-  }
+  for (Tool& tool : data_->tools) startFrame(tool);
+  return true;
 }
+
+// ---- Dynamics' side --------------------------------------------------------------------------------------
+
+void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<ToolState>& tools) {
+  constexpr double kTravel = 0.02;  // m that a tool moves in a frame at 1 m/s and 50 Hz
+  Buckets& buckets = data_->surfaces.writing();
+  buckets.commit(from, to, data_->lastStep);
+  data_->lastStep = buckets.surface().step;
+  for (const ToolState& tool : tools) buckets.refitNear(tool.proxy, (tool.device - tool.proxy).norm() + kTravel);
+  data_->surfaces.publish();
+}
+
+// ---- Handing over ----------------------------------------------------------------------------------------
 
 namespace {
 // A straight path over the frame that ended with the last tick.
@@ -222,7 +248,9 @@ static void handOverContact(const BlendedSurface& surface, double alpha, const T
                             const ProxyContact& contact, double share, Loads& out) {
   const ToolSettings& settings = tool.settings;
   const Proxy& proxy = tool.proxy;
-  const double stretch = contact.normal.dot(path.end - contact.point) - proxy.radius;  // < 0: pushes
+  // Of the coupling along the normal, and what the point has come off the proxy; < 0: pushes.
+  const double stretch =
+      contact.normal.dot(path.end - proxy.centre) + (proxy.centre - contact.point).norm() - proxy.radius;
   Vector3d drag = tangential(path.end - proxy.centre, contact.normal), velocity = path.velocity;
   const double limit = (proxy.slipping ? settings.dynamicFriction : settings.staticFriction) * std::max(0.0, -stretch);
   if (drag.norm() > limit) drag *= limit / drag.norm();
@@ -291,7 +319,7 @@ void Servo::handOver(double frameDuration, Loads& out) const {
   assert(frameDuration > 0);
   out.toolSprings.clear();
   out.heldNodes.clear();
-  const BlendedSurface& surface = data_->buckets.surface();
+  const BlendedSurface& surface = data_->surfaces.reading().surface();
   for (std::size_t k = 0; k < data_->tools.size(); ++k) {
     const Tool& tool = data_->tools[k];
     const Path path = coupledPath(tool, frameDuration, data_->tickDuration);
@@ -300,6 +328,11 @@ void Servo::handOver(double frameDuration, Loads& out) const {
     else
       handOverContacts(surface, data_->alpha, tool, int(k), path, data_->contacts, out);
   }
+}
+
+void Servo::makeRoom(Loads& out) const {
+  out.toolSprings.reserve(data_->tools.size() * contactPatchCapacity);
+  out.heldNodes.reserve(data_->tools.size() * data_->surfaces.reading().surface().from.size());
 }
 
 // ---- Life ------------------------------------------------------------------------------------------------
@@ -316,8 +349,9 @@ static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, const
   return tool;
 }
 
-static Buckets makeBuckets(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools,
-                           const DynamicsFrame& rest) {
+static TripleBuffer<Buckets> makeSurfaces(const std::vector<TouchableBody>& bodies,
+                                          const std::vector<ToolSettings>& tools, const DynamicsFrame& rest,
+                                          const EmbreeSettings& embree) {
   std::vector<std::shared_ptr<const SoftBodyModel>> models;
   models.reserve(bodies.size());
   for (const TouchableBody& body : bodies) models.push_back(body.model);
@@ -326,18 +360,22 @@ static Buckets makeBuckets(const std::vector<TouchableBody>& bodies, const std::
     checkSettings(tools[k], k);
     largestRadius = std::max(largestRadius, tools[k].radius);
   }
-  return {models, largestRadius, rest};
+  const auto make = [&] { return Buckets(models, largestRadius, rest, embree); };
+  return TripleBuffer<Buckets>({make(), make(), make()});
 }
 
 Servo::Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools, double tickDuration,
-             const DynamicsFrame& rest, const std::vector<ToolSample>& start)
-    : data_(new Data{makeBuckets(bodies, tools, rest), tickDuration, 0, {}, {}, {}}) {
+             const DynamicsFrame& rest, const std::vector<ToolSample>& start, const EmbreeSettings& embree)
+    : data_(new Data{makeSurfaces(bodies, tools, rest, embree), {}, tickDuration, 0, {}, {}, {}}) {
   assert(tools.size() == start.size() && tickDuration > 0);
+  const Buckets& buckets = data_->surfaces.reading();
+  data_->lastStep.assign(buckets.surface().from.size(), Vector3d::Zero());
+  data_->contacts.reserve(contactPatchCapacity);
   data_->tools.reserve(tools.size());
   data_->states.reserve(tools.size());
   for (std::size_t k = 0; k < tools.size(); ++k) {
     checkSample(start[k], k);
-    data_->tools.push_back(makeTool(data_->buckets, tools[k], start[k]));
+    data_->tools.push_back(makeTool(buckets, tools[k], start[k]));
     ToolState state;
     state.device = start[k].position;
     state.proxy = data_->tools.back().proxy.centre;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "haptics/embree_settings.h"
 #include "haptics/tool_input.h"
 #include "physics/dynamics/frame.h"
 #include "physics/dynamics/loads.h"
@@ -13,7 +14,9 @@
 // servo rate. The servo reads two dynamics frames and never changes them; the dynamics reads what the servo hands over
 // at the end of a dynamics frame.
 //
-// One dynamics frame of a run:  tick x N (alpha = 1/N .. 1), handOver, World::advance, commit(last frame, new frame).
+// One dynamics frame of a run:  beginFrame, tick x N (alpha = 1/N .. 1), handOver | World::advance, commit.
+// What stands before the bar is the servo's side, what stands behind it the dynamics' side. In logical time both run in
+// turns; live each runs in a thread of its own, and commit() passes surfaces on through a TripleBuffer.
 namespace medulla {
 
 // A surface that a tool can touch: a soft body's triangles grouped by filling sphere.
@@ -30,6 +33,8 @@ struct ToolState {
   bool inContact = false;
   bool holding = false;
   bool clamped = false;  // forceMax was reached
+  bool slipped = false;  // what the closed grip held has torn away
+  double energy = 0;     // J, handed to the user since the start: the force of each tick over the way to the next
 };
 
 class Servo {
@@ -38,26 +43,31 @@ class Servo {
   // tool that starts inside of a body gets a proxy at the nearest point outside. Throws std::runtime_error when Embree
   // cannot start, or naming the tool whose settings or start are out of range.
   Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools, double tickDuration,
-        const DynamicsFrame& rest, const std::vector<ToolSample>& start);
+        const DynamicsFrame& rest, const std::vector<ToolSample>& start, const EmbreeSettings& embree = {});
   ~Servo();
   Servo(Servo&&) noexcept;
   Servo& operator=(Servo&&) noexcept;
 
-  // Dynamics side, after each dynamics frame: the two frames to blend from now on. The triangle buckets near the
-  // tools are refitted around both. Keeps references' contents by copy. `from` is the `to` of the last commit, and
-  // alpha had reached 1.
-  void commit(const DynamicsFrame& from, const DynamicsFrame& to);
+  // Dynamics' side, after each dynamics frame: the two frames to blend next, `from` being the `to` of the last commit.
+  // `tools` is about where the tools are: Embree's bounds are renewed near them. Contents are copied.
+  void commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<ToolState>& tools);
 
-  // One servo tick at the blend alpha (0..1], not falling between commits, for one sample per tool. Never allocates
-  // and never locks, unless a tool jumps to buckets that the last commit left alone: Embree then refits them here.
-  // Throws std::runtime_error naming the tool whose device is not finite or beyond toolReach.
+  // The rest is the servo's side; none of it allocates or locks.
+
+  // Begins to blend what was committed last, once alpha has reached 1. False when nothing new has come: the surface
+  // then stays where it is, and further ticks are at alpha 1.
+  bool beginFrame();
+
+  // One servo tick at the blend alpha (0..1], not falling within a frame, for one sample per tool. Throws
+  // std::runtime_error naming the tool whose device is not finite or beyond toolReach.
   void tick(double alpha, const std::vector<ToolSample>& inputs);
 
   const std::vector<ToolState>& tools() const;
 
   // The springs that stand for the tools' contacts and grips during the next dynamics frame of `frameDuration` s.
-  // `out` is cleared and filled; nothing is allocated once it has grown.
+  // `out` is cleared and filled; nothing is allocated after makeRoom().
   void handOver(double frameDuration, Loads& out) const;
+  void makeRoom(Loads& out) const;
 
  private:
   struct Data;

@@ -45,6 +45,7 @@ struct ToolSettings {
   double dynamicFriction = 0.2;  // Coulomb, >= 0
   double forceMax = 8;           // N, > 0; the coupling is clamped there and says so
   double gripRadius = 0.006;     // m, patch held when the grip closes in contact
+  double gripForceMax = 6;       // N, > 0; beyond, what the grip holds slips out; from forceMax on it never does
 };
 
 }  // namespace medulla

@@ -132,4 +132,35 @@ TEST(Grab, PullBeyondForceMaxIsClampedForHandAndTissue) {
   EXPECT_LT((run.body.advance(run.loads, 0.02, 200) / 0.02 + force).norm(), 0.02 * force.norm());
 }
 
+TEST(Grab, BeyondItsForceTheTissueSlipsOutAndCanBeGrabbedAgain) {
+  ToolRun run = grabbing();
+  run.tool.gripForceMax = 0.4;
+  run.device = [](double t) {
+    const bool closed = (t > 0.5 && t < 1.7) || t > 2.6;
+    const double pull = ease(t, 0.6, 1) - ease(t, 1.8, 0.6);
+    return deviceAt(approach(t) + 0.05 * pull * Vector3d::UnitZ(), closed ? 1 : 0);
+  };
+  bool held = false, slipped = false, again = false;
+  double most = 0, afterwards = 0;
+  run.run(2.8, [&](double t, const ToolState& tool) {
+    if (tool.holding) most = std::max(most, tool.force.norm());
+    held = held || (t < 1 && tool.holding);
+    slipped = slipped || tool.slipped;
+    EXPECT_FALSE(tool.slipped && tool.holding);
+    if (t > 1.65 && t < 1.7) {
+      EXPECT_TRUE(tool.slipped);
+      afterwards = tool.force.norm();
+    }
+    if (t > 1.71 && t < 2.6) {
+      EXPECT_FALSE(tool.slipped);
+    }
+    again = tool.holding;
+  });
+  EXPECT_TRUE(held);
+  EXPECT_TRUE(slipped);
+  EXPECT_TRUE(again);
+  EXPECT_LE(most, 0.4);
+  EXPECT_EQ(afterwards, 0);
+}
+
 }  // namespace medulla

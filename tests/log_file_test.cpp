@@ -19,6 +19,8 @@ LogRow someRow() {
   row.tools[0].proxy = {1. / 3, 0, 0};
   row.tools[0].force = {0, 0, 12345678.9};
   row.tools[0].holding = true;
+  row.tools[0].slipped = true;
+  row.tools[0].energy = -0.25;
   row.bodies = {{0.99, 235}, {1, 0}};
   row.energies = {1e-3, 2e-3, 5};
   row.impulseMismatch = 0.015;
@@ -33,10 +35,12 @@ TEST(LogFile, ColumnsAreNamedAndNumbersReadBackAsTheSameBits) {
   EXPECT_EQ(
       readTextFile(folder / "log.csv"),
       "t,grasper.device.x,grasper.device.y,grasper.device.z,grasper.proxy.x,grasper.proxy.y,grasper.proxy.z,"
-      "grasper.force.x,grasper.force.y,grasper.force.z,grasper.contact,grasper.held,"
+      "grasper.force.x,grasper.force.y,grasper.force.z,grasper.contact,grasper.held,grasper.clamped,grasper.slipped,"
+      "grasper.energy,"
       "liver.volume_ratio,liver.dynamic_nodes,bile.volume_ratio,bile.dynamic_nodes,"
       "energy.kinetic,energy.elastic,impulse_mismatch\n"
-      "0.30000000000000004,1,-0.5,1e-07,0.3333333333333333,0,0,0,0,12345678.9,0,1,0.99,235,1,0,0.001,0.002,0.015\n");
+      "0.30000000000000004,1,-0.5,1e-07,0.3333333333333333,0,0,0,0,12345678.9,0,1,0,1,-0.25,0.99,235,1,0,0.001,0.002,0."
+      "015\n");
 }
 
 TEST(LogFile, OfARunThatFailedNothingRemains) {

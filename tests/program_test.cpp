@@ -36,8 +36,9 @@ static std::vector<std::string> command(std::vector<std::string> words, const st
 TEST(Program, ReplayPrintsItsResultsAndTheSameHashTwice) {
   const ProgramResult a = runProgram(command({"replay", kScene})), b = runProgram(command({"replay", kScene}));
   ASSERT_EQ(a.exitCode, 0) << a.err;
-  for (const char* name : {"simulated", "cpu", "realtime", "substeps", "ticks", "force_max", "volume_ratio_min",
-                           "volume_ratio_max", "impulse_mismatch", "penetration_max", "static_penetration_max", "hash"})
+  for (const char* name : {"simulated", "cpu", "realtime", "substeps", "ticks", "force_max", "force_clamped",
+                           "grip_slips", "user_energy_max", "volume_ratio_min", "volume_ratio_max", "impulse_mismatch",
+                           "penetration_max", "static_penetration_max", "hash"})
     EXPECT_NE(valueOf(a.out, name), "") << name << " is missing in\n" << a.out;
   EXPECT_EQ(valueOf(a.out, "hash").size(), 16u);
   EXPECT_EQ(valueOf(a.out, "hash"), valueOf(b.out, "hash"));
@@ -265,6 +266,16 @@ TEST(ProgramRefuses, WrongUsageWithCodeTwo) {
   expectRefusal(runProgram({"render", kScene, "--view", "skin"}), 2, {"skin"});
   expectRefusal(runProgram({"replay", kScene, "--set", "nonsense"}), 2, {"--set"});
   expectRefusal(runProgram({"replay", kScene, "--surface-at", "soon", "/tmp/x.obj"}), 2, {"soon"});
+  for (const char* embree : {"isa=mmx", "threads=0", "threads=two", "avx2", "isa=sse2,,"})
+    expectRefusal(runProgram({"replay", kScene, "--embree", embree}), 2, {"--embree", "avx2"});
+}
+
+TEST(Program, ReplayAgainstTheClockTellsTheServosTimes) {
+  const ProgramResult run = runProgram({"replay", kScene, "--set", "clock.duration=0.3", "--realtime"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  for (const char* name : {"servo_ticks", "servo_cpu_p50", "servo_cpu_p99.9", "servo_cpu_max", "servo_late",
+                           "servo_latest", "surface_stood", "hash"})
+    EXPECT_NE(valueOf(run.out, name), "") << name << " is missing in\n" << run.out;
 }
 
 TEST(ProgramRefuses, BadScenes) {

@@ -2,21 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 
-#include "haptics/servo.h"
-#include "haptics/swept_triangle.h"
-#include "tests/touch_shapes.h"
+#include "tests/proxy_run.h"
 
 namespace medulla {
 
 using Eigen::Vector3d;
-
-static double distance(const Triangle& triangle, const Vector3d& p) {
-  return (closestPoint(triangle, p).point - p).norm();
-}
 
 // ---- Half-spaces ---------------------------------------------------------------------------------------
 
@@ -61,87 +53,6 @@ TEST(HalfSpaces, OppositeWallsWithoutRoomAreReported) {
 
 // ---- Whole ticks -----------------------------------------------------------------------------------------
 
-namespace {
-struct Script {
-  TouchShape shape;
-  std::function<Vector3d(double)> device;
-  Motion motion;  // empty: the surface rests
-  ToolSettings tool;
-  double duration = 1;
-  int ticksPerFrame = 20;
-
-  Script() { tool.damping = tool.staticFriction = tool.dynamicFriction = 0; }
-};
-}  // namespace
-
-static constexpr double tickDuration = 1e-3;
-
-static ToolSample at(const Vector3d& position) {
-  ToolSample sample;
-  sample.position = position;
-  return sample;
-}
-
-// Runs scripted time; `each` sees every tick with the surface as the servo blends it: one frame late (paper 5).
-static void run(const Script& r,
-                const std::function<void(double time, const ToolState&, const BlendedSurface&, double alpha)>& each) {
-  const double frameDuration = r.ticksPerFrame * tickDuration;
-  DynamicsFrame from = frameAt(*r.shape, 0, r.motion), to = from;
-  Servo servo({{r.shape}}, {r.tool}, tickDuration, from, {at(r.device(0))});
-  BlendedSurface seen;
-  seen.triangles = r.shape->triangles;
-  const int ticks = int(std::lround(r.duration / tickDuration));
-  for (int n = 1; n <= ticks; ++n) {
-    const int within = (n - 1) % r.ticksPerFrame;
-    if (within == 0 && n > 1) {
-      from = to;
-      to = r.motion ? frameAt(*r.shape, (n - 1) * tickDuration, r.motion) : to;
-      to.time = from.time + frameDuration;
-      servo.commit(from, to);
-    }
-    if (within == 0) {
-      seen.from = from.bodies[0].nodes;
-      seen.to = to.bodies[0].nodes;
-    }
-    const double alpha = (within + 1.0) / r.ticksPerFrame;
-    servo.tick(alpha, {at(r.device(n * tickDuration))});
-    each(n * tickDuration, servo.tools()[0], seen, alpha);
-  }
-}
-
-static double clearance(const BlendedSurface& surface, double alpha, const Vector3d& p, double within) {
-  double nearest = within;
-  for (int t = 0; t < int(surface.triangles.size()); ++t) {
-    const Triangle triangle = surface.triangle(t, alpha);
-    const Vector3d middle = (triangle.a + triangle.b + triangle.c) / 3;
-    const double size2 = std::max({(triangle.a - middle).squaredNorm(), (triangle.b - middle).squaredNorm(),
-                                   (triangle.c - middle).squaredNorm()});
-    if ((p - middle).norm() > std::sqrt(size2) + nearest) continue;
-    nearest = std::min(nearest, distance(triangle, p));
-  }
-  return nearest;
-}
-
-static bool isInside(const BlendedSurface& surface, double alpha, const Vector3d& p) {
-  double winding = 0;
-  for (int t = 0; t < int(surface.triangles.size()); ++t) {
-    const Triangle triangle = surface.triangle(t, alpha);
-    const Vector3d a = triangle.a - p, b = triangle.b - p, c = triangle.c - p;
-    winding += std::atan2(a.dot(b.cross(c)), a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() +
-                                                 b.dot(c) * a.norm() + c.dot(a) * b.norm()) /
-               (2 * M_PI);
-  }
-  return winding > 0.5;
-}
-
-// Where the sphere of the tool touches the ellipsoid from above.
-static Vector3d touchdown(const TouchShape& shape, double radius) {
-  Buckets buckets({shape}, radius, frameAt(*shape, 0));
-  SurfaceHit hit;
-  EXPECT_TRUE(buckets.sweep({0.012, 0.004, 0.2}, {0, 0, -0.2}, radius, 1, hit));
-  return {0.012, 0.004, 0.2 - 0.2 * hit.t};
-}
-
 static Vector3d wanderingDevice(double t) {
   const Vector3d smooth(0.09 * std::sin(2.1 * t + 1), 0.06 * std::sin(3.3 * t), 0.05 * std::sin(4.7 * t + 2));
   // A jump now and then: a lost tracker, a trajectory cut together.
@@ -159,7 +70,7 @@ static Vector3d wobble(const Vector3d& x, double t) {
 
 TEST(Proxy, IsNeverInsideARandomlyDeformingSurface) {
   for (const double radius : {0.003, 0.0003}) {
-    Script r;
+    ProxyRun r;
     r.shape = ellipsoid(18, 14, 7);
     r.device = wanderingDevice;
     r.motion = wobble;
@@ -168,7 +79,7 @@ TEST(Proxy, IsNeverInsideARandomlyDeformingSurface) {
     r.tool.dynamicFriction = 0.2;
     r.duration = 100;  // 100 000 ticks for each radius
     int n = 0, contacts = 0, tight = 0;
-    run(r, [&](double, const ToolState& tool, const BlendedSurface& surface, double alpha) {
+    r.run([&](double, const ToolState& tool, const BlendedSurface& surface, double alpha) {
       contacts += tool.inContact;
       const double clear = clearance(surface, alpha, tool.proxy, radius);
       tight += clear < radius - 1e-9;
@@ -182,198 +93,15 @@ TEST(Proxy, IsNeverInsideARandomlyDeformingSurface) {
   }
 }
 
-// Ticks in which the surface stands well above the still device but does not hold the proxy off it.
-static int lostTicks(double amplitude, double frequency, double radius) {
-  Script r;
-  r.shape = ellipsoid(32, 32, 50);
-  r.tool.radius = radius;
-  Vector3d device = touchdown(r.shape, radius) + Vector3d(0, 0, 0.002);
-  const double restHeight = r.shape->restNodes[0].z();
-  r.device = [=](double) { return device; };
-  r.motion = [=](const Vector3d& x, double t) {
-    return Vector3d(x.x(), x.y(), x.z() + amplitude * std::sin(2 * M_PI * frequency * t));
-  };
-  r.duration = 1.5;
-  int lost = 0, touched = 0;
-  run(r, [&](double t, const ToolState& tool, const BlendedSurface& surface, double alpha) {
-    if (surface.node(0, alpha).z() - restHeight < 0.0025) return;
-    ++touched;
-    lost += !tool.inContact || (tool.proxy - tool.device).norm() < 1e-6;
-    // The force is that of the surface without the blend's delay; at 10 Hz a frame is an eighth of the motion.
-    if (frequency < 5 && r.motion(r.shape->restNodes[0], t).z() - restHeight > 0.0035) lost += tool.force.norm() < 1e-6;
-  });
-  EXPECT_GT(touched, 400);
-  return lost;
-}
-
-TEST(Proxy, AStillDeviceFeelsASurfaceThatMovesThroughIt) {
-  for (const double frequency : {2.0, 10.0})
-    for (const double radius : {0.003, 1e-4, 1e-5})
-      EXPECT_EQ(lostTicks(0.01, frequency, radius), 0) << frequency << " Hz, radius " << radius;
-}
-
-TEST(Proxy, AThinPlateMovingPastADeviceBehindItKeepsTheProxyInFront) {
-  Script r;
-  r.shape = plate(20, 0.03, 0.001, 7);
-  r.tool.radius = 0.0005;
-  r.device = [](double t) { return Vector3d(0.0013, 0.007 - 0.017 * std::min(1.0, t / 0.1), 0.0007); };
-  r.motion = [](const Vector3d& x, double t) {
-    return Vector3d(x + 0.005 * std::sin(2 * M_PI * 3 * std::max(0.0, t - 0.2)) * Vector3d::UnitY());
-  };
-  r.duration = 1.2;
-  int lost = 0;
-  run(r, [&](double t, const ToolState& tool, const BlendedSurface& surface, double alpha) {
-    EXPECT_GT(tool.proxy.y(), surface.node(0, alpha).y());
-    if (t > 0.16) lost += (tool.proxy - tool.device).norm() < 1e-6;
-  });
-  EXPECT_EQ(lost, 0);
-}
-
-TEST(Proxy, ATapAtAnySpeedIsFelt) {
-  for (const double speed : {1.0, 5.0, 100.0})
-    for (const double radius : {0.003, 1e-4}) {
-      Script r;
-      r.shape = ellipsoid(32, 32, 50);
-      r.tool.radius = radius;
-      const Vector3d touch = touchdown(r.shape, radius);
-      r.device = [=](double t) {
-        return Vector3d(touch + Vector3d(0, 0, 0.01 - std::clamp(speed * (t - 0.05), 0.0, 0.03)));
-      };
-      r.duration = 0.3;
-      int lost = 0;
-      run(r, [&](double t, const ToolState& tool, const BlendedSurface&, double) {
-        if (t > 0.051 + 0.0101 / speed) lost += tool.force.norm() < 1e-6;
-      });
-      EXPECT_EQ(lost, 0) << speed << " m/s, radius " << radius;
-    }
-}
-
-TEST(Proxy, RestsInACornerWithoutJitter) {
-  const double h = 0.02;
-  std::vector<Vector3d> nodes;
-  nodes.reserve(8);
-  for (int i = 0; i < 8; ++i) nodes.emplace_back(i & 1 ? h : -h, i & 2 ? h : -h, i & 4 ? h : -h);
-  // Wound to the inside: the tool is in a box.
-  Script r;
-  r.shape = shapeOf(nodes, {{0, 1, 2},
-                            {1, 3, 2},
-                            {4, 6, 5},
-                            {5, 6, 7},
-                            {0, 4, 1},
-                            {1, 4, 5},
-                            {2, 3, 6},
-                            {3, 7, 6},
-                            {0, 2, 4},
-                            {2, 6, 4},
-                            {1, 5, 3},
-                            {3, 5, 7}});
-  r.device = [](double t) {
-    return Vector3d(std::clamp((t - 0.05) / 0.2, 0.0, 1.0) * Vector3d(-0.030, -0.028, -0.026));
-  };
-  r.duration = 0.6;
-  const Vector3d corner = Vector3d::Constant(-h + r.tool.radius);
-  Vector3d last;
-  run(r, [&](double t, const ToolState& tool, const BlendedSurface&, double) {
-    if (t > 0.3) {
-      EXPECT_LT((tool.proxy - corner).norm(), 1e-6);
-    }
-    if (t > 0.31) {
-      EXPECT_LT((tool.proxy - last).norm(), 1e-9);
-    }
-    last = tool.proxy;
-  });
-}
-
-TEST(Proxy, FollowsTheBottomOfAGroove) {
-  for (const double degrees : {90.0, 40.0, 20.0, 10.0}) {
-    const double half = degrees * M_PI / 360, height = 0.05, length = 0.04, s = height * std::tan(half);
-    Script r;
-    r.shape = shapeOf({{-length, 0, 0},
-                       {length, 0, 0},
-                       {-length, s, height},
-                       {length, s, height},
-                       {-length, -s, height},
-                       {length, -s, height}},
-                      {{0, 1, 3}, {0, 3, 2}, {0, 4, 5}, {0, 5, 1}});
-    const double bottom = r.tool.radius / std::sin(half);
-    r.device = [=](double t) {
-      return Vector3d(0.003 + 0.01 * std::clamp((t - 0.3) / 0.2, 0.0, 1.0), 0.002,
-                      bottom + 0.003 - 0.010 * std::clamp((t - 0.05) / 0.15, 0.0, 1.0));
-    };
-    r.duration = 0.7;
-    Vector3d last;
-    run(r, [&](double t, const ToolState& tool, const BlendedSurface&, double) {
-      if (t > 0.55) {
-        EXPECT_LT((tool.proxy - Vector3d(tool.device.x(), 0, bottom)).norm(), degrees < 15 ? 2e-6 : 1e-6) << degrees;
-        EXPECT_LT((tool.proxy - last).norm(), 1e-9) << degrees;
-      }
-      last = tool.proxy;
-    });
-  }
-}
-
-TEST(Proxy, CoulombFrictionOnAPlane) {
-  Script r;
-  r.shape = plate(20, 0.03, 0.001, 7);
-  r.tool.staticFriction = 0.5;
-  r.tool.dynamicFriction = 0.3;
-  r.device = [](double t) {
-    const double slide = 0.05 * std::max(0.0, t - 0.1);
-    return Vector3d(-0.012 + 0.8 * slide, 0.0005 + 0.003 + 0.002 - 0.004 * std::min(1.0, t / 0.05),
-                    -0.010 + 0.6 * slide);
-  };
-  r.duration = 0.45;
-  double largestStuck = 0, least = 1, most = 0;
-  bool slipped = false;
-  run(r, [&](double t, const ToolState& tool, const BlendedSurface&, double) {
-    if (t < 0.06) return;
-    const double ratio = std::hypot(tool.force.x(), tool.force.z()) / tool.force.y();
-    if (!slipped && ratio < largestStuck - 0.05) slipped = true;
-    if (!slipped) largestStuck = std::max(largestStuck, ratio);
-    if (slipped && t > 0.2) {
-      least = std::min(least, ratio);
-      most = std::max(most, ratio);
-    }
-  });
-  EXPECT_TRUE(slipped);
-  // The stick ends at the first tick beyond 0.5: one tick's motion over the depth of 2 mm is 0.025.
-  EXPECT_LE(largestStuck, 0.5 + 1e-3);
-  EXPECT_GE(largestStuck, 0.5 - 0.025 - 1e-3);
-  EXPECT_NEAR(least, 0.3, 1e-3);
-  EXPECT_NEAR(most, 0.3, 1e-3);
-}
-
-TEST(Proxy, PressingForceHasNoStepsBeyondTheDevicesOwn) {
-  Script r;
-  r.shape = plate(10, 0.03, 0.01, 5);
-  const double speed = 0.1;
-  r.device = [=](double t) {
-    return Vector3d(0.0013, 0.013 - speed * std::min(t, 0.13) + speed * std::max(0.0, t - 0.4), 0.0007);
-  };
-  r.duration = 0.6;
-  Vector3d last = Vector3d::Zero();
-  double largest = 0, work = 0;
-  Vector3d lastDevice = r.device(0);
-  run(r, [&](double, const ToolState& tool, const BlendedSurface&, double) {
-    largest = std::max(largest, (tool.force - last).norm());
-    work += last.dot(tool.device - lastDevice);
-    last = tool.force;
-    lastDevice = tool.device;
-  });
-  EXPECT_LE(largest, 1.2 * r.tool.stiffness * speed * tickDuration);
-  // Sampled springs give out a little: at most k v T per metre travelled (Colgate and Schenkel 1997).
-  EXPECT_LE(work, r.tool.stiffness * speed * tickDuration * 0.008 * (1 + 1e-3));
-}
-
 TEST(Proxy, SurvivesJumpsOfAMetre) {
-  Script r;
+  ProxyRun r;
   r.shape = ellipsoid(18, 14, 7);
   // From a press to far behind the body, then to the free space above it.
   r.device = [](double t) {
     return t < 0.1 ? Vector3d(0, 0, 0.045) : t < 0.2 ? Vector3d(0.001, 0.0005, -1) : Vector3d(0.9, 0, 0.3);
   };
   r.duration = 0.4;
-  run(r, [&](double t, const ToolState& tool, const BlendedSurface& surface, double alpha) {
+  r.run([&](double t, const ToolState& tool, const BlendedSurface& surface, double alpha) {
     ASSERT_GE(clearance(surface, alpha, tool.proxy, r.tool.radius), r.tool.radius - 1e-9);
     ASSERT_LE(tool.force.norm(), r.tool.forceMax * (1 + 1e-12));
     if (t > 0.101 && t < 0.199) {
@@ -388,12 +116,12 @@ TEST(Proxy, SurvivesJumpsOfAMetre) {
 TEST(Proxy, ThatStartsInsideIsPutOutside) {
   TestRandom random;
   for (int n = 0; n < 50; ++n) {
-    Script r;
+    ProxyRun r;
     r.shape = ellipsoid(18, 14, 7);
     Vector3d start = random.vector(1).cwiseProduct(Vector3d(0.08, 0.04, 0.03));
     r.device = [=](double) { return start; };
     r.duration = 0.05;
-    run(r, [&](double t, const ToolState& tool, const BlendedSurface& surface, double alpha) {
+    r.run([&](double t, const ToolState& tool, const BlendedSurface& surface, double alpha) {
       ASSERT_FALSE(isInside(surface, alpha, tool.proxy));
       if (t > 0.01) {
         ASSERT_GE(clearance(surface, alpha, tool.proxy, r.tool.radius), r.tool.radius - 1e-9);
@@ -404,7 +132,7 @@ TEST(Proxy, ThatStartsInsideIsPutOutside) {
 
 // Two walls close on a still tool until less than its diameter is left between them, and open again.
 TEST(Proxy, SqueezedBetweenWallsShrinksAndDoesNotTunnel) {
-  Script r;
+  ProxyRun r;
   const double w = 0.03;
   std::vector<Vector3d> nodes;
   for (const double y : {0.01, -0.01})
@@ -416,10 +144,75 @@ TEST(Proxy, SqueezedBetweenWallsShrinksAndDoesNotTunnel) {
     return Vector3d(x.x(), (x.y() > 0 ? 1 : -1) * (0.0055 + 0.0045 * std::cos(10 * t)), x.z());
   };
   r.duration = 1.5;
-  run(r, [&](double, const ToolState& tool, const BlendedSurface& surface, double alpha) {
+  r.run([&](double, const ToolState& tool, const BlendedSurface& surface, double alpha) {
     ASSERT_LT(tool.proxy.y(), surface.node(0, alpha).y());
     ASSERT_GT(tool.proxy.y(), surface.node(4, alpha).y());
   });
+}
+
+// A fan of needles and points without area in the middle of a plate, which is slid over along its shared edges.
+TEST(Proxy, SlidesOverDegenerateTrianglesAndAlongSharedEdges) {
+  const TouchShape whole = plate(8, 0.02, 0.004, 3);
+  auto shape = std::make_shared<SoftBodyModel>(*whole);
+  const std::vector<std::array<int, 3>> triangles = shape->triangles;
+  for (const auto& [a, b, c] : triangles) {
+    shape->triangles.push_back({a, a, b});
+    shape->triangles.push_back({c, c, c});
+    shape->triangles.push_back({a, b, a});
+  }
+  fillBuckets(*shape, 3);
+  ProxyRun r;
+  r.shape = shape;
+  r.device = [](double t) {
+    const double down = 0.005 * std::min(1.0, t / 0.05), slide = 0.03 * std::clamp((t - 0.1) / 0.3, 0.0, 1.0);
+    return Vector3d(0, 0.006 - down, -0.015 + slide);  // x = 0 is a row of edges
+  };
+  r.duration = 0.5;
+  r.run([&](double t, const ToolState& tool, const BlendedSurface&, double) {
+    if (t < 0.06) return;
+    ASSERT_NEAR(tool.proxy.y(), 0.005, 2e-7) << t;
+    ASSERT_NEAR(tool.proxy.x(), 0, 1e-9) << t;
+    ASSERT_NEAR(tool.force.normalized().y(), 1, 1e-6) << t;
+  });
+}
+
+TEST(Proxy, SweptExactlyDownOntoASharedEdgeStopsThere) {
+  for (const double x : {0.0, 0.005, 0.0025}) {  // edge across, node, diagonal
+    ProxyRun r;
+    r.shape = plate(8, 0.02, 0.004, 3);
+    r.tool.radius = 1e-5;
+    r.device = [=](double t) { return Vector3d(x, 0.01 - 0.02 * t, x); };
+    r.duration = 0.9;
+    r.run([&](double t, const ToolState& tool, const BlendedSurface&, double) {
+      if (t > 0.41) {
+        ASSERT_GT(tool.proxy.y(), 0.002) << t;
+      }
+    });
+  }
+}
+
+// Frames at 20 ms, swapped while the tool slides over a surface that moves: no step in the force.
+TEST(Proxy, ASwapOfFramesInMidSlideIsNotFelt) {
+  ProxyRun r;
+  r.shape = ellipsoid(32, 32, 50, 0);
+  r.motion = [](const Vector3d& x, double t) {
+    return Vector3d(x + 0.002 * std::sin(2 * M_PI * 3 * t) * Vector3d::UnitZ());
+  };
+  r.device = [](double t) {
+    return Vector3d(0.03 * std::sin(2 * t), 0.01 * std::sin(3 * t), 0.06 - 0.012 * std::min(1.0, t / 0.2));
+  };
+  r.duration = 2;
+  Vector3d last = Vector3d::Zero();
+  double atSwap = 0, elsewhere = 0;
+  int n = 0;
+  r.run([&](double t, const ToolState& tool, const BlendedSurface&, double) {
+    double& largest = n++ % 20 == 0 ? atSwap : elsewhere;
+    if (t > 0.3) largest = std::max(largest, (tool.force - last).norm());
+    last = tool.force;
+  });
+  EXPECT_GT(last.norm(), 0.5);
+  EXPECT_LT(atSwap, 1.5 * elsewhere);
+  EXPECT_LT(elsewhere, 3 * r.tool.stiffness * 0.06 * tickDuration);
 }
 
 }  // namespace medulla

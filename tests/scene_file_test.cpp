@@ -123,6 +123,7 @@ TEST_F(SceneFile, EveryValueOfScenerysToolsAndPictureArrives) {
   EXPECT_EQ(t.dynamicFriction, 0.1);
   EXPECT_EQ(t.forceMax, 5);
   EXPECT_EQ(t.gripRadius, 0.007);
+  EXPECT_EQ(t.gripForceMax, 4);
   // The camera's own pose opens the run; a key takes from it what it leaves out.
   ASSERT_EQ(s.camera.size(), 3u);
   EXPECT_EQ(s.camera[0].time, 0);

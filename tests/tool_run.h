@@ -19,6 +19,7 @@ struct ToolRun {
   Eigen::Vector3d handImpulse = Eigen::Vector3d::Zero();  // N s, of the force on the hand, turned round
   Eigen::Vector3d bodyImpulse = Eigen::Vector3d::Zero();  // N s, that the dynamics took
   double bodyImpulseLength = 0;                           // N s, sum over frames of its size
+  bool blend = true;                                      // false: every tick at the newest frame
 
   void run(double duration, const std::function<void(double time, const ToolState&)>& each = {}) {
     const double frameDuration = ticksPerFrame * tickDuration;
@@ -28,7 +29,7 @@ struct ToolRun {
     for (int frame = 0; frame < frames; ++frame) {
       for (int k = 1; k <= ticksPerFrame; ++k) {
         const double time = (frame * ticksPerFrame + k) * tickDuration;
-        servo.tick(double(k) / ticksPerFrame, {device(time)});
+        servo.tick(blend ? double(k) / ticksPerFrame : 1, {device(time)});
         handImpulse -= tickDuration * servo.tools()[0].force;
         if (each) each(time, servo.tools()[0]);
       }
@@ -38,7 +39,8 @@ struct ToolRun {
       bodyImpulseLength += impulse.norm();
       last = now;
       now = body.frame();
-      servo.commit(last, now);
+      servo.commit(last, now, servo.tools());
+      servo.beginFrame();
     }
   }
   double mismatch() const { return (handImpulse - bodyImpulse).norm() / bodyImpulseLength; }

@@ -88,9 +88,9 @@ class Artist {
   static PictureOutputs::Settings outputSettings(const LoadedScene& loaded, const RenderOptions& options,
                                                  const Wanted& wanted, const std::string& renderer) {
     const Scene& scene = loaded.scene;
-    const std::string drawing =
-        fmt::format("{}x{} {} {} {} {} {} {}", scene.width, scene.height, scene.fps, static_cast<int>(options.view.view),
-                    options.view.showProxy, options.view.showForce, static_cast<int>(options.quality), renderer);
+    const std::string drawing = fmt::format("{}x{} {} {} {} {} {} {}", scene.width, scene.height, scene.fps,
+                                            static_cast<int>(options.view.view), options.view.showProxy,
+                                            options.view.showForce, static_cast<int>(options.quality), renderer);
     const std::uint64_t run = contentHash(drawing, runHash(loaded, true));
     return {scene.width,
             scene.height,
@@ -189,7 +189,7 @@ void renderCache(const LoadedScene& loaded, const RenderOptions& options, const 
 }
 
 void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, StageTimes& times) {
-  Simulation simulation(loaded);
+  Simulation simulation(loaded, options.run.embree);
   Artist artist(loaded, options, wanted, simulation.current(), times);
   ForceView forceView(loaded);
   PictureTimes pictures(wanted.times, wanted.first);

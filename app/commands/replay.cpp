@@ -3,22 +3,51 @@
 #include <chrono>
 
 #include "app/commands/commands.h"
+#include "app/live_servo.h"
 #include "app/progress.h"
 
 namespace medulla {
 
+static std::vector<Result> liveResults(const LiveReport& live) {
+  const auto micros = [](double seconds) { return fmt::format("{:.1f}", 1e6 * seconds); };
+  return {{"servo_ticks", fmt::format("{}", live.ticks), ""},
+          {"servo_cpu_p50", micros(live.cpuMedian), "us"},
+          {"servo_cpu_p99.9", micros(live.cpu999), "us"},
+          {"servo_cpu_max", micros(live.cpuMax), "us"},
+          {"servo_late", fmt::format("{}", live.lateTicks), "ticks"},
+          {"servo_latest", fmt::format("{:.3g}", 1e3 * live.latest), "ms"},
+          {"surface_stood", fmt::format("{}", live.standingTicks), "ticks"}};
+}
+
 int runReplay(const RunOptions& options) {
   const LoadedScene loaded = loadRun(options);
   requireDistinctOutputs(loaded, options);
-  Simulation simulation(loaded);
+  Simulation simulation(loaded, options.embree);
   Progress progress("replay", loaded.scene.duration, "s");
   const double cpuStart = processCpuSeconds();
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<Result> forces = runToEnd(loaded, options, simulation, [&] { progress.update(simulation.time()); });
+  std::optional<LiveServo> live;
+  std::function<void()> advance;
+  if (options.realtime) {
+    live.emplace(simulation);
+    advance = [&] { live->advanceFrame(); };
+  }
+  const std::vector<Result> forces = runToEnd(
+      loaded, options, simulation, [&] { progress.update(simulation.time()); }, {}, advance);
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::vector<Result> results = runResults(simulation, processCpuSeconds() - cpuStart, wall);
   if (options.untilRest) results.insert(results.begin(), {"rest_at", fmt::format("{:.6g}", simulation.time()), "s"});
   results.insert(results.end(), forces.begin(), forces.end());
+  if (live) {
+    const LiveReport report = live->report();
+    const std::vector<Result> more = liveResults(report);
+    results.insert(results.end(), more.begin(), more.end());
+    if (report.lateTicks > 0 || report.standingTicks > 0)
+      fmt::print(stderr,
+                 "medulla: {} of {} ticks woke more than a tick late, up to {:.3g} ms; in {} the surface stood still "
+                 "because the dynamics was late\n",
+                 report.lateTicks, report.ticks, 1e3 * report.latest, report.standingTicks);
+  }
   printResults(results);
   return 0;
 }

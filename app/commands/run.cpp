@@ -284,7 +284,8 @@ void PictureTimes::afterFrame(const Simulation& simulation, const std::function<
 }
 
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
-                             const std::function<void()>& afterFrame, const std::function<void()>& finish) {
+                             const std::function<void()>& afterFrame, const std::function<void()>& finish,
+                             const std::function<void()>& advance) {
   SurfaceRecorder surfaces(loaded, options);
   LogRecorder log(loaded, options);
   CacheRecorder cache(loaded, options);
@@ -296,7 +297,10 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
                loaded.scene.bodies[o.body0].name, loaded.scene.bodies[o.body1].name, 1e3 * o.depth);
   for (bool last = false; !last;) {
     checkInterrupt();
-    simulation.advanceFrame();
+    if (advance)
+      advance();
+    else
+      simulation.advanceFrame();
     if (options.untilRest) rest.afterFrame(simulation);
     if (options.untilRest && !rest.atRest() && simulation.finished()) rest.fail(simulation.time());
     last = simulation.finished() || rest.atRest();
@@ -324,6 +328,9 @@ std::vector<Result> runResults(const Simulation& simulation, double cpuSeconds, 
           {"substeps", fmt::format("{}", totals.substeps), ""},
           {"ticks", fmt::format("{}", totals.ticks), ""},
           {"force_max", fmt::format("{:.5g}", totals.forceMax), "N"},
+          {"force_clamped", fmt::format("{}", totals.clampedTicks), "ticks"},
+          {"grip_slips", fmt::format("{}", totals.gripSlips), ""},
+          {"user_energy_max", fmt::format("{:.4g}", totals.userEnergyMax), "J"},
           {"volume_ratio_min", fmt::format("{:.5g}", totals.volumeRatioMin), ""},
           {"volume_ratio_max", fmt::format("{:.5g}", totals.volumeRatioMax), ""},
           {"impulse_mismatch", fmt::format("{:.4g}", totals.impulseMismatch()), "%"},

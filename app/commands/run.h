@@ -29,7 +29,9 @@ struct RunOptions {
   std::string logPath;
   bool logEveryTick = false;
   std::vector<SurfaceRequest> surfaces;
-  std::string cachePath;   // what every picture shows, for `render --cache`; empty: none
+  std::string cachePath;  // what every picture shows, for `render --cache`; empty: none
+  EmbreeSettings embree;
+  bool realtime = false;   // replay only: the servo runs against the clock
   bool untilRest = false;  // ends when nothing moves any more; the scene's duration is the longest it may take
 };
 
@@ -79,9 +81,10 @@ LoadedScene loadRun(const RunOptions& options);
 // every node has been slower than 1e-5 m/s for 0.1 s, so that the turning point of a swing does not count, and neither
 // a load nor a tool's recorded motion is still to come; surfaces asked for at a later time are those at rest. Returns
 // results of their own: how the force of tools whose trajectory has a measured one compares with that. Throws
-// NotAtRest, and Interrupted after a signal.
+// NotAtRest, and Interrupted after a signal. `advance` makes the next dynamics frame; empty: in logical time.
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
-                             const std::function<void()>& afterFrame, const std::function<void()>& finish = {});
+                             const std::function<void()>& afterFrame, const std::function<void()>& finish = {},
+                             const std::function<void()>& advance = {});
 
 // Every file that the run writes besides `pictures` must differ from the others and from what it reads.
 void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options,

@@ -29,7 +29,7 @@ LogFile::LogFile(const std::string& path, const std::vector<std::string>& tools,
     for (const char* quantity : {"device", "proxy", "force"}) {
       header += fmt::format(",{0}.{1}.x,{0}.{1}.y,{0}.{1}.z", tool, quantity);
     }
-    header += fmt::format(",{0}.contact,{0}.held", tool);
+    header += fmt::format(",{0}.contact,{0}.held,{0}.clamped,{0}.slipped,{0}.energy", tool);
   }
   for (const std::string& body : bodies) header += fmt::format(",{0}.volume_ratio,{0}.dynamic_nodes", body);
   file_.write(header + ",energy.kinetic,energy.elastic,impulse_mismatch\n");
@@ -45,6 +45,9 @@ void LogFile::write(const LogRow& row) {
     appendCells(line_, tool.force);
     appendCell(line_, tool.inContact ? 1 : 0);
     appendCell(line_, tool.holding ? 1 : 0);
+    appendCell(line_, tool.clamped ? 1 : 0);
+    appendCell(line_, tool.slipped ? 1 : 0);
+    appendCell(line_, tool.energy);
   }
   for (const LogBody& body : row.bodies) {
     appendCell(line_, body.volumeRatio);

@@ -25,9 +25,9 @@ struct LogRow {
 };
 
 // CSV, a row per dynamics frame or per tick. Columns, in SI units: t, then per tool NAME.device.x, .y, .z,
-// NAME.proxy.*, NAME.force.* (on the hand), NAME.contact, NAME.held (0 or 1), per body NAME.volume_ratio,
-// NAME.dynamic_nodes, then energy.kinetic, energy.elastic, impulse_mismatch. Numbers are the shortest that read back as
-// the same bits. Errors are those of OutputFile.
+// NAME.proxy.*, NAME.force.* (on the hand), NAME.contact, NAME.held, NAME.clamped, NAME.slipped (0 or 1), NAME.energy
+// (J, handed to the user so far), per body NAME.volume_ratio, NAME.dynamic_nodes, then energy.kinetic, energy.elastic,
+// impulse_mismatch. Numbers are the shortest that read back as the same bits. Errors are those of OutputFile.
 class LogFile {
  public:
   LogFile(const std::string& path, const std::vector<std::string>& tools, const std::vector<std::string>& bodies);

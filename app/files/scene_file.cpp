@@ -321,6 +321,7 @@ void readTools(const XmlElement& root, Scene& scene) {
     s.damping = readNumber(*e, "damping", s.damping, notNegative);
     s.forceMax = readNumber(*e, "force_max", s.forceMax, positive);
     s.gripRadius = readNumber(*e, "grip_radius", s.gripRadius, positive);
+    s.gripForceMax = readNumber(*e, "grip_force_max", s.gripForceMax, positive);
     const std::vector<double> friction = readNumbers(*e, "friction", 2, notNegative);
     if (!friction.empty()) {
       if (friction[0] < friction[1]) refuse(*e, "friction", "expected static >= dynamic friction");

@@ -48,7 +48,8 @@ static void strokes(benchmark::State& state, const TouchShape& shape) {
       const int k = tick / 24;
       // There and back, so that consecutive frames always join.
       const auto index = [](int n) { return n % 126 < 64 ? n % 126 : 126 - n % 126; };
-      servo.commit(frames[index(k - 1)], frames[index(k)]);
+      servo.commit(frames[index(k - 1)], frames[index(k)], servo.tools());
+      servo.beginFrame();
       state.ResumeTiming();
     }
     input[0] = device(tick + 1);
@@ -78,7 +79,7 @@ static void BucketsCommit(benchmark::State& state) {
   const TouchShape shape = ellipsoid(int(state.range(0)), int(state.range(1)), int(state.range(2)));
   const DynamicsFrame frame = frameAt(*shape, 0);
   Servo servo({{shape}}, {ToolSettings()}, 1.0 / 1200, frame, {ToolSample()});
-  for ([[maybe_unused]] auto _ : state) servo.commit(frame, frame);
+  for ([[maybe_unused]] auto _ : state) servo.commit(frame, frame, servo.tools());
 }
 BENCHMARK(BucketsCommit)->Args({18, 14, 7})->Args({32, 32, 50})->Unit(benchmark::kMicrosecond);
 

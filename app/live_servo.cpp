@@ -1,0 +1,158 @@
+#include "app/live_servo.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <thread>
+
+#include "haptics/triple_buffer.h"
+
+namespace medulla {
+
+using Clock = std::chrono::steady_clock;
+
+namespace {
+
+// Times of ticks in bins of 0.1 us, the last for all beyond 1 ms: a fixed size, because the servo allocates nothing.
+struct TickTimes {
+  static constexpr int bins = 10001;
+  static constexpr double width = 1e-7;  // s
+  std::array<std::atomic<int>, bins> count{};
+  std::atomic<double> longest{0};
+
+  void add(double seconds) {
+    const int bin = std::clamp(static_cast<int>(seconds / width), 0, bins - 1);
+    count[bin].fetch_add(1, std::memory_order_relaxed);
+    if (seconds > longest) longest = seconds;
+  }
+  // The upper end of the bin in which that share of the times is reached.
+  double quantile(double share) const {
+    long total = 0, sum = 0;
+    for (const std::atomic<int>& c : count) total += c;
+    for (int bin = 0; bin + 1 < bins; ++bin) {
+      sum += count[bin];
+      if (static_cast<double>(sum) >= share * static_cast<double>(total)) return width * (bin + 1);
+    }
+    return longest;
+  }
+};
+
+}  // namespace
+
+struct LiveServo::Data {
+  Simulation& simulation;
+  TripleBuffer<ServoRecord> handedOver;  // to the dynamics
+  TickTimes cpu;
+  std::atomic<long> ticks{0}, lateTicks{0}, standingTicks{0};
+  std::atomic<double> latest{0};  // s
+  std::atomic<bool> stop{false}, failed{false};
+  std::exception_ptr failure;  // written before `failed`
+  std::thread thread;
+
+  explicit Data(Simulation& s);
+  void run();
+  void wait(Clock::time_point deadline);
+};
+
+static Clock::duration toDuration(double seconds) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+static double threadCpuSeconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+// All that a frame can bring: the servo's thread allocates nothing.
+static ServoRecord emptyRecord(const Simulation& simulation) {
+  ServoRecord record = simulation.record();
+  record.from = record.to = {};
+  simulation.servo().makeRoom(record.loads);
+  return record;
+}
+
+// The dynamics begins at once, with the state at rest handed over: from then on it is one frame ahead.
+LiveServo::Data::Data(Simulation& s) : simulation(s), handedOver({emptyRecord(s), emptyRecord(s), emptyRecord(s)}) {
+  handedOver.writing().start = -s.record().duration;
+  handedOver.publish();
+}
+
+void LiveServo::Data::wait(Clock::time_point deadline) {
+  std::this_thread::sleep_until(deadline);
+  const double lateness = std::chrono::duration<double>(Clock::now() - deadline).count();
+  if (lateness > simulation.tickDuration()) ++lateTicks;
+  if (lateness > latest) latest = lateness;
+}
+
+void LiveServo::Data::run() {
+  Servo& servo = simulation.servo();
+  const int ticksPerFrame = simulation.ticksPerFrame();
+  std::vector<ToolSample> inputs;
+  simulation.sampleInputs(0, inputs);
+  const Clock::time_point start = Clock::now();
+  int within = 0;  // tick of the frame; the first blends from rest to rest
+  for (long tick = 1; !stop; ++tick) {
+    const double time = static_cast<double>(tick) * simulation.tickDuration();
+    wait(start + toDuration(time));
+    const double before = threadCpuSeconds();
+    if (within == ticksPerFrame && servo.beginFrame()) within = 0;
+    const bool stands = within == ticksPerFrame;
+    standingTicks += stands;
+    ServoRecord& record = handedOver.writing();
+    if (within == 0) {
+      record.start = time - simulation.tickDuration();
+      record.inputs[0] = inputs;
+      record.tools[0] = servo.tools();
+    }
+    if (!stands) ++within;
+    simulation.sampleInputs(time, inputs);
+    servo.tick(static_cast<double>(within) / ticksPerFrame, inputs);
+    if (!stands) {
+      record.inputs[within] = inputs;
+      record.tools[within] = servo.tools();
+      if (within == ticksPerFrame) {
+        servo.handOver(record.duration, record.loads);
+        handedOver.publish();
+      }
+    }
+    cpu.add(threadCpuSeconds() - before);
+    ++ticks;
+  }
+}
+
+LiveServo::LiveServo(Simulation& simulation) : data_(std::make_unique<Data>(simulation)) {
+  data_->thread = std::thread([&d = *data_] {
+    try {
+      d.run();
+    } catch (...) {
+      d.failure = std::current_exception();
+      d.failed = true;
+    }
+  });
+}
+
+LiveServo::~LiveServo() {
+  data_->stop = true;
+  data_->thread.join();
+}
+
+void LiveServo::advanceFrame() {
+  constexpr auto pause = std::chrono::microseconds(100);  // of frames of 20 ms; a signal would cost the servo a lock
+  while (!data_->handedOver.take()) {
+    if (data_->failed) std::rethrow_exception(data_->failure);
+    std::this_thread::sleep_for(pause);
+  }
+  data_->simulation.advanceFrame(data_->handedOver.reading());
+}
+
+LiveReport LiveServo::report() const {
+  const Data& d = *data_;
+  return {d.ticks, d.lateTicks, d.standingTicks, d.latest, d.cpu.quantile(0.5), d.cpu.quantile(0.999), d.cpu.longest};
+}
+
+}  // namespace medulla

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "haptics/buckets.h"
+
+// Force shading (Ruspini, Kolarov and Khatib 1997, 4.3; Morgenbesser and Srinivasan 1996): a coarse mesh feels like the
+// smooth surface that it stands for, by normals interpolated between its nodes.
+namespace medulla {
+
+// The smooth surface's unit normal at a point of a triangle, given by its barycentric weights, where a sphere is
+// touched along the unit `normal` (from the point to the sphere's centre). At a crease, where a node's normal is more
+// than 0.75 rad off its triangle's, the node has `normal` instead: a box stays a box.
+Eigen::Vector3d shadedNormal(const BlendedSurface& surface, double alpha, int triangle, const Eigen::Vector3d& weights,
+                             const Eigen::Vector3d& normal);
+
+}  // namespace medulla

@@ -1,0 +1,74 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "tests/tool_run.h"
+
+// Counts what this program asks of operator new; sanitizers bring their own.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define MEDULLA_COUNTS_ALLOCATIONS 0
+#else
+#define MEDULLA_COUNTS_ALLOCATIONS 1
+#endif
+
+static std::atomic<long> allocations{0};
+
+#if MEDULLA_COUNTS_ALLOCATIONS
+// Not inlined: g++ takes a free() that it sees beside a new that it does not for a mistake.
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* p = std::malloc(size == 0 ? 1 : size)) return p;
+  throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete(void* p) noexcept {
+  std::free(p);
+}
+[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept {
+  std::free(p);
+}
+#endif
+
+namespace medulla {
+
+// Press, grab, pull until it slips, let go, jump: with frames taken in between, as the live servo does.
+TEST(Servo, AllocatesNothingOnItsSide) {
+  if (!MEDULLA_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer has operator new";
+  SpringBody body(ellipsoid(24, 20, 7, 0.3));
+  ToolSettings tool;
+  tool.gripForceMax = 0.5;
+  const auto device = [](double t) {
+    if (t > 1.2) return deviceAt({0.5, 0.5, 0.5});
+    const double down = 0.006 * ease(t, 0, 0.2), up = 0.05 * ease(t, 0.4, 0.5);
+    return deviceAt({0.012, 0.004, 0.0545 - down + up}, t > 0.3 && t < 1.1 ? 1 : 0);
+  };
+  DynamicsFrame last = body.frame(), now = last;
+  Servo servo({{body.shape}}, {tool}, 1e-3, now, {device(0)});
+  Loads loads;
+  servo.makeRoom(loads);
+  std::vector<ToolSample> input(1);
+  long allocated = 0;
+  bool contact = false, held = false, slipped = false;
+  for (int frame = 0; frame < 70; ++frame) {
+    const long before = allocations;
+    servo.beginFrame();
+    for (int k = 1; k <= 20; ++k) {
+      input[0] = device(1e-3 * (20 * frame + k));
+      servo.tick(k / 20.0, input);
+      contact = contact || servo.tools()[0].inContact;
+      held = held || servo.tools()[0].holding;
+      slipped = slipped || servo.tools()[0].slipped;
+    }
+    servo.handOver(0.02, loads);
+    allocated += allocations - before;
+    body.advance(loads, 0.02, 200);
+    last = now;
+    now = body.frame();
+    servo.commit(last, now, servo.tools());
+  }
+  EXPECT_TRUE(contact && held && slipped);
+  EXPECT_EQ(allocated, 0);
+}
+
+}  // namespace medulla
