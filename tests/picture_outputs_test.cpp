@@ -20,8 +20,8 @@ class Outputs : public OwnScene {
   }
   // PNG bytes of pictures [0, count), by number.
   std::vector<std::string> pictures(const std::string& name, int count) const {
-    std::vector<std::string> out;
-    for (int n = 0; n < count; ++n) out.push_back(read(fmt::format("{}/{:05d}.png", name, n)));
+    std::vector<std::string> out(count);
+    for (int n = 0; n < count; ++n) out[n] = read(fmt::format("{}/{:05d}.png", name, n));
     return out;
   }
   std::vector<std::string> contents() const {  // but for the scene
