@@ -115,6 +115,29 @@ TEST(SurfaceParts, PartsLeaveAgainOnceWhatTheyWereAskedForIsOver) {
   EXPECT_LT(farthest, 0.02 * kRadius);
 }
 
+// Weight presses on a host whose patch of surface is open, so that nodes do not hang still where their weight alone
+// would have them: along a tube at its ends, across a slab everywhere.
+TEST(SurfaceParts, PartsLeaveAgainUnderTheirWeight) {
+  const Vector3d shift(0, 0, 0.0005);
+  const auto movingAfterATouch = [&](BodyDescription body, int node, const Vector3d& gravity) {
+    body.surface = SurfaceMode::contact;
+    body.tissue.damping = 0.5;
+    World world = worldOf(body, gravity);
+    for (int k = 0; k < 50; ++k) world.advance({});
+    EXPECT_EQ(world.dynamicNodes(0), 0);
+    for (int k = 0; k < 20; ++k) world.advance(holding(world, node, shift));
+    EXPECT_GT(world.dynamicNodes(0), 0);
+    for (int k = 0; k < 150; ++k) world.advance({});
+    return world.dynamicNodes(0);
+  };
+  BodyDescription soft = tube(SurfaceMode::contact, true);
+  soft.tissue.young = 1e3;
+  EXPECT_EQ(movingAfterATouch(soft, 0, {-9.81, 0, 0}), 0);
+  BodyDescription slab = synthetic::abdomenScene()[4];
+  slab.worldFromModel.setIdentity();
+  EXPECT_EQ(movingAfterATouch(slab, 300, {0, 0, -9.81}), 0);
+}
+
 // A free tube is pulled along: what the tool gives is what spheres and moving nodes have, while nodes join and leave.
 // Not to rounding: what edges pull at carried nodes is nobody's until these join, a frame later.
 TEST(SurfaceParts, JoiningAndLeavingKeepMomentum) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 
@@ -259,19 +260,20 @@ std::vector<Attachment> attachmentsToSpans(const SoftBodyModel& m, const std::ve
   return out;
 }
 
-// Each host keeps the volume that lies around it: a section that is squeezed bulges beside. The body's one pressure let
-// it grow wherever the surface is (a cylinder's poke of finite elements: 30 instead of 22 % off). The hosts share the
-// volume by area times distance of their nodes.
-void setBulk(const BodyDescription& body, double volume, BodyMechanics& out) {
+// Each host keeps the volume that lies around it: a section that is squeezed bulges beside. One pressure for the body
+// let it grow wherever there is surface. The hosts share the volume by area times depth, the attachments' with its
+// floor: a pressure so is never more than a few times as stiff as the attachments that it presses.
+void setBulk(const BodyDescription& body, double volume, const std::vector<double>& depth, BodyMechanics& out) {
   const double compression = 1 / (3 * (1 - 2 * body.tissue.poisson));
   const double bulk = std::min(compression, kLargestBulk) * body.tissue.young;
   out.largestPressure = kLargestSwelling * bulk;
   out.linkBulk.assign(body.model->links.size(), 0);
   out.sphereBulk.assign(body.model->spheres.size(), 0);
   double sum = 0;
-  for (const Attachment& a : out.attachments) {
-    (a.onLink ? out.linkBulk : out.sphereBulk)[a.host] += a.area * a.restOffset.norm();
-    sum += a.area * a.restOffset.norm();
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    const Attachment& a = out.attachments[i];
+    (a.onLink ? out.linkBulk : out.sphereBulk)[a.host] += a.area * depth[i];
+    sum += a.area * depth[i];
   }
   for (std::vector<double>* hosts : {&out.linkBulk, &out.sphereBulk})
     for (double& share : *hosts) share = share > 0 && volume > 0 ? bulk / (volume * share / sum) : 0;
@@ -279,16 +281,16 @@ void setBulk(const BodyDescription& body, double volume, BodyMechanics& out) {
 
 void setSurfaceStiffness(const BodyDescription& body, BodyMechanics& out) {
   const SoftBodyModel& m = *body.model;
-  double depthSum = 0;
+  std::vector<double> depth;
   const TriangleMesh mesh{m.restNodes, m.triangles};
   out.normal = vertexNormals(mesh);
   for (std::size_t i = 0; i < m.attachments.size(); ++i) {
     const Attachment& a = m.attachments[i];
-    const double depth = attachmentDepth(a, out.normal[i], m.spheres);
-    out.attachmentStiffness.push_back(depth > 0 ? kFoundationFactor * body.tissue.young * a.area / depth : 0);
-    depthSum += depth;
+    depth.push_back(attachmentDepth(a, out.normal[i], m.spheres));
+    out.attachmentStiffness.push_back(depth[i] > 0 ? kFoundationFactor * body.tissue.young * a.area / depth[i] : 0);
   }
-  setBulk(body, enclosedVolume(mesh), out);
+  setBulk(body, enclosedVolume(mesh), depth, out);
+  const double depthSum = std::accumulate(depth.begin(), depth.end(), 0.0);
   const double thickness =
       kLayerThicknessOverDepth * depthSum / static_cast<double>(std::max<std::size_t>(1, m.restNodes.size()));
   out.edgeStiffness.assign(m.edges.size(), 0);

@@ -168,6 +168,7 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
     NodeGroup& g = n.groups[i / 4];
     g.stiffness[lane] = mechanics[b].attachmentStiffness[k];
     const Vector3d area = a.area * mechanics[b].normal[k];
+    setVector(n.area, i, body.worldFromModel.linear() * area);
     if (!a.onLink) {
       setLane(g.restOffset, lane, a.restOffset);
       setLane(g.restArea, lane, area);

@@ -25,12 +25,12 @@ MEDULLA_INLINE void pullNodes(Nodes& n, Lanes relaxation, const NodeGroup& group
   storeFour(displaced, n.displaced, 4 * g);
 }
 
-// `visit` with the link, once for those that bend and once for the others: as it is known then, no loop asks for it.
+// `visit` with the link, written once for beams and once for springs: which it is, no loop then asks.
 template <class Visit>
 MEDULLA_INLINE void visitLink(const WorldData& d, int link, const Visit& visit) {
   LinkHost host = linkHost(d, link);
   if (host.isBeam) {
-    host.isBeam = true;
+    host.isBeam = true;  // for the compiler, which does not see that it is
     visit(host);
   } else {
     host.isBeam = false;
@@ -70,9 +70,10 @@ struct NodeForces {
 // Finishes the forces on the nodes of group g. The edges' springs answer to what their two nodes are displaced from
 // their anchors one against the other, in all directions. Springs on the edges' lengths have no stiffness of first
 // order across a flat surface, so that a dent would end at the touched nodes, and they would stiffen the whole body: a
-// bar of 10 mm radius by a fifth. The pressure's energy, bulk / 2 (sum area . displaced)^2, presses nodes along areas.
-// The host bears all forces at the anchors, and where it turns: springs pull along the lever from anchor to node and
-// turn nothing, dampers act at the node, and so do the areas, which turn with the host; edges act at the anchors.
+// bar of 10 mm radius by a fifth. The host's pressure presses nodes along areas: energy bulk / 2 (sum area .
+// displaced)^2. The host bears all forces at the anchors, and where it turns: springs pull along the lever from anchor
+// to node and turn nothing, dampers act at the node, and so do the areas, which turn with the host; edges act at the
+// anchors.
 MEDULLA_INLINE NodeForces finishForces(WorldData& d, Lanes pressure, int g) {
   Nodes& n = d.nodes;
   const Lanes3 displaced = gatherFour(n.displaced, 4 * g);
@@ -131,6 +132,7 @@ void placeCarriedNodes(WorldData& d) {
   const auto place = [&d](const Anchor& anchor, int g) {
     put(positionOf(anchor) + gatherFour(d.nodes.displaced, 4 * g), d.nodes.position[g]);
     put(velocityAt(anchor, anchor.offset), d.nodes.velocity[g]);
+    put(anchor.area, d.nodes.area[g]);
   };
   const auto onLink = [&](const HostRange& range) {
     const LinkHost host = linkHost(d, range.host);

@@ -15,20 +15,54 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kUnrest = 0.002;  // of the body's mean radius
-constexpr double kQuiet = 0.5;     // of that: nodes nearer are at rest
-constexpr int kQuietFrames = 10;   // a fifth of a second at 50 Hz: several periods of a node on its attachment
+constexpr double kUnrest =
+    0.002;                        // of the body's mean radius, besides what weight sinks nodes by: edges share that out
+constexpr double kQuiet = 0.5;    // of that: nodes nearer are at rest
+constexpr int kQuietFrames = 10;  // a fifth of a second at 50 Hz: several periods of a node on its attachment
 
 const HostRange& rangeOf(const WorldData& d, std::size_t part) {
   const std::size_t onLinks = d.nodes.onLinks.size();
   return part < onLinks ? d.nodes.onLinks[part] : d.nodes.onSpheres[part - onLinks];
 }
 
-// m: where a node hangs at rest, from its anchor.
-Vector3d sagOf(const WorldData& d, int node) {
+Vector3d sagOf(const WorldData& d, int node) {  // m, without pressure
   if (d.nodes.inverseMass[node] == 0) return Vector3d::Zero();
   return d.nodes.mass[node] / d.nodes.groups[node / 4].stiffness[node % 4] * vectorOf(d.gravity);
 }
+
+double deepestSag(const WorldData& d, const HostRange& range) {
+  double most = 0;
+  for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) most = std::max(most, sagOf(d, i).norm());
+  return most;
+}
+
+// Where a host's nodes hang still from their anchors: k x = m g - p a, and p = bulk sum a.x is the host's pressure.
+// Their mean weight alone would not do: a host's patch of surface is open, so that nodes which all sink alike press.
+class StillNodes {
+ public:
+  StillNodes(const WorldData& d, const HostRange& range) : d_(&d) {
+    double sunk = 0, give = 0;
+    for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
+      if (d.nodes.inverseMass[i] == 0) continue;
+      const Vector3d area = vectorAt(d.nodes.area, i);
+      sunk += area.dot(sagOf(d, i));
+      give += area.squaredNorm() / stiffness(i);
+    }
+    pressure_ = range.bulk * sunk / (1 + range.bulk * give);
+    swollen_ = range.bulk > 0 ? pressure_ / range.bulk : 0;
+  }
+  Vector3d displaced(int node) const {  // m
+    if (d_->nodes.inverseMass[node] == 0) return Vector3d::Zero();
+    return sagOf(*d_, node) - pressure_ / stiffness(node) * vectorAt(d_->nodes.area, node);
+  }
+  double swollen() const { return swollen_; }  // m3
+
+ private:
+  double stiffness(int node) const { return d_->nodes.groups[node / 4].stiffness[node % 4]; }
+
+  const WorldData* d_;
+  double pressure_, swollen_;
+};
 
 // Nothing turns or moves what the part hangs on, so that nodes which hold it have nothing to hold.
 bool isHeld(const WorldData& d, const BodyMechanics& mechanics, std::size_t part) {
@@ -56,7 +90,7 @@ void layOutPart(const WorldData& d, const BodyMechanics& mechanics, std::size_t 
   part.always = d.bodies[range.body].surface != SurfaceMode::contact || d.settings.integrator == Integrator::implicit;
   if (part.always) return;
   listNeighbours(d, d.surface.ofGroup, range, part);
-  part.unrest = kUnrest * meanRadius(*d.bodies[range.body].model);
+  part.unrest = kUnrest * meanRadius(*d.bodies[range.body].model) + deepestSag(d, range);
   const bool held = isHeld(d, mechanics, k);
   for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
     if (d.nodes.mass[i] == 0) continue;
@@ -143,19 +177,27 @@ std::vector<char> loadedParts(const WorldData& d, const Loads& loads) {
 // m: how far the part's nodes are from where they hang at rest, at most.
 double unrestOf(const WorldData& d, std::size_t part) {
   const HostRange& range = rangeOf(d, part);
+  const StillNodes still(d, range);
   double squared = 0;
   for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i)
-    if (d.nodes.mass[i] > 0) squared = std::max(squared, (vectorOf(d.nodes.displaced[i]) - sagOf(d, i)).squaredNorm());
+    if (d.nodes.mass[i] > 0)
+      squared = std::max(squared, (vectorOf(d.nodes.displaced[i]) - still.displaced(i)).squaredNorm());
   return std::sqrt(squared);
 }
 
-void carry(WorldData& d, std::size_t part) {
+// The nodes of a part that does not move are where they hang still.
+void hang(WorldData& d, std::size_t part) {
   const HostRange& range = rangeOf(d, part);
-  d.surface.parts[part].moves = false;
-  d.nodes.swollen[part] = 0;
-  if (part < d.nodes.onLinks.size()) d.links.loads[range.host] = {};
+  const StillNodes still(d, range);
+  d.nodes.swollen[range.part] = still.swollen();
   for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i)
-    if (d.nodes.mass[i] > 0) d.nodes.displaced[i] = quadOf(sagOf(d, i));
+    if (d.nodes.mass[i] > 0) d.nodes.displaced[i] = quadOf(still.displaced(i));
+}
+
+void carry(WorldData& d, std::size_t part) {
+  d.surface.parts[part].moves = false;
+  if (part < d.nodes.onLinks.size()) d.links.loads[rangeOf(d, part).host] = {};
+  hang(d, part);
 }
 
 bool hasChoice(const SurfaceParts& s) {
@@ -207,6 +249,7 @@ void chooseSurfaceParts(WorldData& d, const Loads& loads) {
   for (std::size_t k = 0; k < parts.size(); ++k) {
     SurfacePart& part = parts[k];
     if (part.always) continue;
+    if (!part.moves) hang(d, k);
     const bool quiet = !wanted[k] && unrest[k] < kQuiet * part.unrest;
     part.quietFrames = quiet ? part.quietFrames + 1 : 0;
     if (!part.moves && wanted[k]) {

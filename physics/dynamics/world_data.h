@@ -68,7 +68,7 @@ struct LinkGroup {  // constants of four links
   Lanes couple, coupleDifference;       // N m/rad between the ends: mean over U and V, and half of V less U
   Lanes beam;                           // 1, or 0: a spring, linear along, whose nodes keep to its chord
   bool hasBeams;                        // some link of the four is one
-  Lanes thinning;                       // twice the Poisson\'s ratio that what hangs on a beam follows
+  Lanes thinning;                       // twice the Poisson's ratio that what hangs on a beam follows
   Lanes relaxation;                     // s, damping over stiffness (Rayleigh's beta)
 };
 
@@ -140,7 +140,7 @@ struct HostRange {
   int body;
   double bulk;             // N/m5: pressure per volume between these nodes and their anchors
   double largestPressure;  // Pa
-  int part;                // place in Nodes::swollen; of dynamic nodes
+  int part;                // place in Nodes::swollen and SurfaceParts::parts; of dynamic nodes
 };
 
 struct GroupHost {
