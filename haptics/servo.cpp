@@ -169,6 +169,7 @@ static bool tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
     return false;
   }
   record(force, tool, state);
+  tool.proxy.felt.setZero();  // what is felt after the release does not begin where this grip began
   return true;
 }
 

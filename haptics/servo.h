@@ -28,7 +28,8 @@ struct ToolState {
   Eigen::Vector3d device = Eigen::Vector3d::Zero();  // m
   // m, centre of the proxy sphere; while holding it rides on the held patch
   Eigen::Vector3d proxy = Eigen::Vector3d::Zero();
-  // N, on the hand, clamped: stiffness (proxy - device) + damping; while holding, the sum of the held nodes' springs
+  // N, on the hand, clamped: stiffness (proxy + its shading - device) + damping; while holding, the sum of the held
+  // nodes' springs
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   bool inContact = false;
   bool holding = false;

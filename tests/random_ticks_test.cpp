@@ -92,7 +92,9 @@ static int runEpisode(std::uint64_t seed, int frames) {
     shapes.push_back(randomShape(random));
     motions.emplace_back(random, Vector3d(0, 0, bodies == 1 ? 0 : b == 0 ? -0.075 : 0.075));
   }
-  std::vector<TouchableBody> touchable(shapes.begin(), shapes.end());
+  std::vector<TouchableBody> touchable;
+  touchable.reserve(bodies);
+  for (const TouchShape& shape : shapes) touchable.push_back({shape});
   const std::vector<ToolSettings> tools = {randomTool(random), randomTool(random)};
   RandomDevice devices[2] = {RandomDevice(random), RandomDevice(random)};
   const int ticksPerFrame = std::array<int, 4>{50, 20, 10, 1}[int(random.uniform(0, 4))];
