@@ -5,10 +5,23 @@
 #include "app/files/number_text.h"
 #include "app/verbs.h"
 
-// The verbs that hold methods, steps and models against each other.
+// The verbs that hold pictures, logs, methods, steps and models against each other.
 namespace medulla {
 
 namespace {
+
+struct CompareArguments {
+  CompareOptions options;
+  std::string tolerance = "0";
+};
+
+CompareOptions compareOptions(const CompareArguments& a) {
+  CompareOptions options = a.options;
+  const auto tolerance = parseNumber<double>(a.tolerance);
+  if (!tolerance || *tolerance < 0) usageError("--tolerance", a.tolerance, "a number of 0 or more");
+  options.tolerance = *tolerance;
+  return options;
+}
 
 struct ChartArguments {
   RunArguments run;
@@ -104,6 +117,50 @@ Verb addStability(CLI::App& app) {
   addList("--young", a.young, "stiffnesses of the map, Pa", "PA,PA,...");
   addList("--trial-steps", a.trialSteps, "steps of the trials, ms", "MS,MS,...");
   return {c, [arguments] { return runStability(stabilityOptions(*arguments)); }};
+}
+
+Verb addGolden(CLI::App& app) {
+  const auto options = std::make_shared<GoldenOptions>();
+  GoldenOptions& o = *options;
+  CLI::App* c = app.add_subcommand("golden", "render the scenes' golden moments and compare with the stored images");
+  c->add_option("SCENE", o.scenes, "scene files (default: those that the images in --dir name, or scenes/*.xml)");
+  c->add_option("--dir", o.folder, "folder of the golden images (default: golden_images beside the scene's folder)")
+      ->type_name("DIR");
+  c->add_option("--update", o.update,
+                "store what is drawn now: of a scene, by file or name, or of one moment, such as liver_45 (repeatable)")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  c->add_option("--failures", o.failures, "where report.html and the pictures that fail go")
+      ->type_name("DIR")
+      ->capture_default_str();
+  c->add_option("--context", o.context, "how to draw off screen")
+      ->check(CLI::IsMember({"auto", "osmesa", "egl"}))
+      ->capture_default_str();
+  return {c, [options] { return runGolden(*options); }};
+}
+
+Verb addCompare(CLI::App& app) {
+  const auto arguments = std::make_shared<CompareArguments>();
+  CompareArguments& a = *arguments;
+  CLI::App* c =
+      app.add_subcommand("compare", "say where two logs or two state caches differ first; exit code 3 where they do");
+  c->add_option("A", a.options.a, "log (CSV) or state cache of a run")->required();
+  c->add_option("B", a.options.b, "another")->required();
+  c->add_option("--tolerance", a.tolerance,
+                "differences that do not count, as a share of the column's largest value; 0: every field is the same "
+                "text")
+      ->capture_default_str();
+  return {c, [arguments] { return runCompare(compareOptions(*arguments)); }};
+}
+
+Verb addPlot(CLI::App& app) {
+  const auto options = std::make_shared<PlotOptions>();
+  CLI::App* c = app.add_subcommand(
+      "plot",
+      "draw a log over time: force, penetration, volume, energies, modelled nodes; contact and grab are shaded");
+  c->add_option("LOG", options->log, "log of a run (CSV)")->required();
+  c->add_option("-o,--output", options->output, "picture to write")->type_name("FILE.png|FILE.svg")->required();
+  return {c, [options] { return runPlot(*options); }};
 }
 
 }  // namespace medulla

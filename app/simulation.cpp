@@ -87,15 +87,16 @@ void Simulation::runTicks() {
 }
 
 void Simulation::advanceDynamics() {
+  // Ahead of what may throw: a frame that fails counts as tried.
+  totals_.ticks += ticksPerFrame_;
+  totals_.substeps += world_.substepsPerFrame();
+  totals_.simulated += frameDuration_;
   const FrameReport report = world_.advance(record_.loads);
   std::swap(previous_, current_);
   world_.readFrame(current_);
   // Without tools nobody feels the surface.
   if (!loaded_->trajectories.empty()) servo_->commit(previous_, current_, record_.tools[ticksPerFrame_]);
   ++frame_;
-  totals_.ticks += ticksPerFrame_;
-  totals_.substeps += world_.substepsPerFrame();
-  totals_.simulated += frameDuration_;
   accountTicks();
   accountImpulses(report);
   accountVolumes();

@@ -28,6 +28,9 @@ void addSceneOptions(CLI::App& command, RunArguments& a);  // SCENE, --set, --tr
 RunOptions runOptions(const RunArguments& a);
 
 // measuring_verbs.cpp
+Verb addGolden(CLI::App& app);
+Verb addCompare(CLI::App& app);
+Verb addPlot(CLI::App& app);
 Verb addChart(CLI::App& app);
 Verb addStability(CLI::App& app);
 
