@@ -110,8 +110,10 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
   out += fmt::format("    <fix spheres=\"{}\"/>\n  </body>\n", heldSpheres(model, l));
   out += fmt::format(
       "  <tool name=\"grasper\" trajectory=\"{}.csv\" radius=\"{:.3g}\" stiffness=\"{:.3g}\" damping=\"{:.3g}\" "
-      "friction=\"0.3 0.2\"\n        force_max=\"{:.3g}\" grip_radius=\"{:.3g}\"/>\n",
-      name, 0.03 * l.size, 0.6 * young * l.size, std::pow(scale, 2.5), 8 * std::pow(scale, 3), 0.08 * l.size);
+      "friction=\"0.3 0.2\"\n        force_max=\"{:.3g}\" grip_force_max=\"{:.3g}\" "
+      "grip_radius=\"{:.3g}\"/>\n",
+      name, 0.03 * l.size, 0.6 * young * l.size, std::pow(scale, 2.5), 8 * std::pow(scale, 3), 8 * std::pow(scale, 3),
+      0.08 * l.size);
   out += fmt::format("  <camera position=\"{}\" target=\"{}\" fov=\"{}\"/>\n",
                      vectorText(centre + distance * Vector3d::UnitZ()), vectorText(centre), fov);
   out += fmt::format("  <light offset=\"{}\" reference_distance=\"{:.3g}\"/>\n",
@@ -143,9 +145,9 @@ std::string trajectoryText(const Layout& l) {
   key(2.4, above(-0.05), straight, 0.3);
   out += "# back, open, touch, grab\n";
   key(3.1, above(0.05), straight, 0);
-  key(3.6, above(-0.04), straight, 0);  // deep enough to stay in touch with a body that gives way
-  key(4, above(-0.04), straight, 0);
-  key(4.2, above(-0.04), straight, 1);
+  key(3.6, above(-0.02), straight, 0);
+  key(4, above(-0.05), straight, 0);
+  key(4.2, above(-0.08), straight, 1);  // on its way in as it closes: a body that swings freely is touched then
   out += "# pull\n";
   key(5.2, pulled, straight, 1);
   key(5.6, pulled, straight, 1);
