@@ -44,6 +44,22 @@ TEST(Program, ReplayPrintsItsResultsAndTheSameHashTwice) {
   EXPECT_EQ(valueOf(a.out, "hash"), valueOf(b.out, "hash"));
 }
 
+// The hand feels the same organ whether the dynamics runs twenty or a hundred times a second.
+TEST(Program, ShippedScenesRunAtSlowerAndFasterDynamics) {
+  for (const char* name : {"gallbladder", "liver", "stomach"}) {
+    const std::string scene = std::string(MEDULLA_SOURCE_DIR "/scenes/") + name + ".xml";
+    const auto forceAt = [&](const char* rate) {
+      const ProgramResult r = runProgram({"replay", scene, "--set", std::string("clock.dynamics=") + rate});
+      EXPECT_EQ(r.exitCode, 0) << r.err;
+      return std::atof(valueOf(r.out, "force_max").c_str());
+    };
+    const double expected = forceAt("50");
+    EXPECT_GT(expected, 0.5);
+    for (const char* rate : {"20", "100"})
+      EXPECT_NEAR(forceAt(rate), expected, 0.12 * expected) << name << " at " << rate << " Hz";
+  }
+}
+
 TEST(Program, BodiesThatOverlapAtTheStartAreNamedOnceAndComeApart) {
   const TemporaryFolder folder;
   const std::string body =
