@@ -76,6 +76,10 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
       ->check(CLI::IsMember({"frame", "tick"}))
       ->capture_default_str();
   command
+      .add_option("--frame-times", a.frameTimes,
+                  "write what servo and dynamics took, ms per dynamics frame (CSV); for medulla plot")
+      ->type_name("FILE");
+  command
       .add_option("--record", a.records,
                   "write a tool's motion and force, tick by tick, as a trajectory; read back by --trajectory it gives "
                   "the same hash (repeatable)")
@@ -131,6 +135,7 @@ RunOptions runOptions(const RunArguments& a) {
   options.records = filesByTool(a.records);
   options.logPath = a.log;
   options.logEveryTick = a.logRate == "tick";
+  options.frameTimesPath = a.frameTimes;
   for (const auto& request : a.surfaces) {
     SurfaceRequest r;
     r.path = request.at(1);
@@ -185,6 +190,7 @@ RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) 
   options.run = runOptions(a.run);
   options.run.scene = scene;
   options.run.logPath = fileOf(scene, a.run.log);
+  options.run.frameTimesPath = fileOf(scene, a.run.frameTimes);
   for (SurfaceRequest& surface : options.run.surfaces) surface.path = fileOf(scene, surface.path);
   for (auto& [tool, path] : options.run.records) path = fileOf(scene, path);
   options.cachePath = fileOf(scene, a.cache);
@@ -206,17 +212,18 @@ RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) 
 // Each scene has files of its own, and a run that takes up another draws nothing twice.
 void checkRender(const RenderArguments& a) {
   std::vector<std::string> files = a.outputs;
-  for (const std::string& more : {a.run.log, a.cache})
+  for (const std::string& more : {a.run.log, a.run.frameTimes, a.cache})
     if (!more.empty()) files.push_back(more);
   for (const auto& surface : a.run.surfaces) files.push_back(surface.at(1));
   files.insert(files.end(), a.run.records.begin(), a.run.records.end());
   for (const std::string& file : files)
     if (a.scenes.size() > 1 && file.find("{scene}") == std::string::npos)
       usageError("of several scenes", file, "a name with {scene} in it, which becomes each one's name");
-  const bool asksForRun = !a.run.log.empty() || !a.run.surfaces.empty() || !a.run.records.empty() ||
-                          std::find(a.show.begin(), a.show.end(), "force") != a.show.end();
+  const bool asksForRun = !a.run.log.empty() || !a.run.frameTimes.empty() || !a.run.surfaces.empty() ||
+                          !a.run.records.empty() || std::find(a.show.begin(), a.show.end(), "force") != a.show.end();
   if (!a.cache.empty() && asksForRun)
-    usageError("--cache", a.cache, "no --log, --surface-at, --record or --show force: nothing is simulated");
+    usageError("--cache", a.cache,
+               "no --log, --frame-times, --surface-at, --record or --show force: nothing is simulated");
   if (!a.resume) return;
   if (a.outputs.empty() || !a.still.empty()) usageError("--resume", "", "-o DIR: folders of PNG files can be resumed");
   for (const std::string& output : a.outputs)

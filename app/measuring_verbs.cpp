@@ -159,6 +159,8 @@ Verb addPlot(CLI::App& app) {
       "plot",
       "draw a log over time: force, penetration, volume, energies, modelled nodes; contact and grab are shaded");
   c->add_option("LOG", options->log, "log of a run (CSV)")->required();
+  c->add_option("--frame-times", options->frameTimes, "draw also what frames took: the file of replay --frame-times")
+      ->type_name("FILE");
   c->add_option("-o,--output", options->output, "picture to write")->type_name("FILE.png|FILE.svg")->required();
   return {c, [options] { return runPlot(*options); }};
 }

@@ -37,6 +37,13 @@ struct ServoRecord {
   Loads loads;
 };
 
+// s by the clock: what the last dynamics frame took, and nothing that a run depends on.
+struct FrameTimes {
+  double servo = 0;     // its ticks; 0 where it runs elsewhere
+  double dynamics = 0;  // its substeps
+  double surface = 0;   // the moved surface made ready for the next ticks
+};
+
 // The state that a picture shows.
 struct PictureState {
   double time = 0;
@@ -81,6 +88,7 @@ class Simulation {
   int frame() const { return frame_; }  // dynamics frames done
   int frameCount() const { return frameCount_; }
   double time() const { return frame_ * frameDuration_; }
+  const FrameTimes& times() const { return times_; }
   const ServoRecord& record() const { return record_; }        // of the last frame; before the first: the rest state
   const DynamicsFrame& previous() const { return previous_; }  // dynamics frames, not delayed by blending
   const DynamicsFrame& current() const { return current_; }
@@ -103,6 +111,7 @@ class Simulation {
   std::vector<ToolSample> inputs_;
   std::unique_ptr<Servo> servo_;
   ServoRecord record_;
+  FrameTimes times_;
   RunTotals totals_;
   double lastMismatch_ = 0;
 };

@@ -20,7 +20,7 @@ struct Verb {
 
 // Options as typed; turned into RunOptions after parsing.
 struct RunArguments {
-  std::string scene, log, logRate = "frame", embree;
+  std::string scene, log, logRate = "frame", embree, frameTimes;
   std::vector<std::string> sets, trajectories, records;
   std::vector<std::vector<std::string>> surfaces;
 };

@@ -48,7 +48,7 @@ ProgramResult plot(const std::string& log, const std::string& picture, const Pro
 TEST(Plot, DrawsMagnitudesDepthsAndShades) {
   const TemporaryFolder folder;
   folder.write("run.csv", shortLog());
-  const std::string script = plotScript(readLog(folder / "run.csv"), "run", PlotFormat::svg);
+  const std::string script = plotScript(readLog(folder / "run.csv"), nullptr, "run", PlotFormat::svg);
   for (const char* title : {"hook: force on the hand, N", "hook: device to proxy, mm", "volume, % of rest",
                             "energy, mJ", "surface nodes modelled"})
     EXPECT_TRUE(has(script, title)) << title;
@@ -68,7 +68,7 @@ TEST(Plot, ThinsManyRowsWithoutLosingAPeak) {
   for (int k = 1; k <= 30000; ++k)
     text += std::to_string(k / 1200.0) + (k == 12345 ? ",1.5" : k == 20000 ? ",0.5" : ",1") + ",10,0,0,0\n";
   folder.write("long.csv", text);
-  const std::string script = plotScript(readLog(folder / "long.csv"), "long", PlotFormat::png);
+  const std::string script = plotScript(readLog(folder / "long.csv"), nullptr, "long", PlotFormat::png);
   const std::string volume = blockOf(script, "p0_0");
   EXPECT_TRUE(has(volume, " 150\n") && has(volume, " 50\n"));
   EXPECT_LT(std::count(volume.begin(), volume.end(), '\n'), 2001);
@@ -95,7 +95,7 @@ TEST(Plot, NamesAreTextAndNothingElse) {
   const std::string name = "s`touch " + folder / "made" + "`'\"\\";
   folder.write("run.csv", "t," + name + ".volume_ratio," + name +
                               ".dynamic_nodes,energy.kinetic,energy.elastic\n1,1,2,3,4\n2,1,2,3,4\n");
-  const std::string script = plotScript(readLog(folder / "run.csv"), "a`b'c", PlotFormat::svg);
+  const std::string script = plotScript(readLog(folder / "run.csv"), nullptr, "a`b'c", PlotFormat::svg);
   EXPECT_TRUE(has(script, "set label 1 'a`b''c' noenhanced"));
   if (std::system("gnuplot --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "gnuplot is not installed";
   const ProgramResult r = plot(folder / "run.csv", folder / "a.svg");
@@ -125,6 +125,34 @@ TEST(Plot, RefusesInOneLineAndLeavesNothing) {
   refused(plot(folder / "run.csv", folder / "a.png", bare), "gnuplot is not installed");
   EXPECT_EQ(folder.contents().size(), 3u);
   EXPECT_EQ(runProgram({"plot", folder / "run.csv"}).exitCode, 2);
+}
+
+// What frames took is a file of its own, so that logs are equal in every run; its rows need not be the log's.
+TEST(Plot, DrawsWhatFramesTook) {
+  const TemporaryFolder folder;
+  folder.write("run.csv", shortLog());
+  folder.write("times.csv", "t,servo,dynamics,surface\n0.02,0.1,1.5,0.2\n0.04,0.3,2.5,0.2\n");
+  const LogTable times = readLog(folder / "times.csv");
+  const std::string script = plotScript(readLog(folder / "run.csv"), &times, "run", PlotFormat::svg);
+  EXPECT_TRUE(has(script, "what a dynamics frame took, ms"));
+  EXPECT_EQ(blockOf(script, "p5_1"), "0.02 1.5\n0.04 2.5\n");
+  folder.write("other.csv", "t,servo\n0.02,1\n");
+  const ProgramResult r =
+      runProgram({"plot", folder / "run.csv", "--frame-times", folder / "other.csv", "-o", folder / "picture.svg"});
+  EXPECT_EQ(r.exitCode, 1);
+  EXPECT_NE(r.err.find("other.csv: column dynamics is missing"), std::string::npos) << r.err;
+}
+
+TEST(Plot, ARunTellsWhatItsFramesTook) {
+  const TemporaryFolder folder;
+  const ProgramResult r =
+      runProgram({"replay", MEDULLA_SOURCE_DIR "/scenes/gallbladder.xml", "--set", "clock.duration=0.2", "--set",
+                  "output.golden=0", "--frame-times", folder / "times.csv"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  const LogTable times = readLog(folder / "times.csv");
+  ASSERT_EQ(times.value.size(), 10u);
+  for (const auto& row : times.value)
+    for (const double value : row) EXPECT_GT(value, 0);
 }
 
 }  // namespace medulla

@@ -66,6 +66,7 @@ int runCompare(const CompareOptions& options);
 
 struct PlotOptions {
   std::string log, output;  // output: FILE.png or FILE.svg
+  std::string frameTimes;   // empty: no panel of them
 };
 int runPlot(const PlotOptions& options);
 

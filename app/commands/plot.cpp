@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <optional>
+#include <vector>
 
 #include "app/commands/commands.h"
 #include "app/files/gnuplot.h"
@@ -14,11 +16,15 @@ int runPlot(const PlotOptions& options) {
   const std::filesystem::path path = options.output;
   if (path.extension() != ".png" && path.extension() != ".svg")
     throw std::runtime_error(fmt::format("{}: expected FILE.png or FILE.svg", options.output));
-  requireDistinctFiles({options.output}, {options.log});
+  std::vector<std::string> inputs{options.log};
+  if (!options.frameTimes.empty()) inputs.push_back(options.frameTimes);
+  requireDistinctFiles({options.output}, inputs);
   const LogTable log = readLog(options.log);
+  std::optional<LogTable> frameTimes;
+  if (!options.frameTimes.empty()) frameTimes = readLog(options.frameTimes);
   const PlotFormat format = path.extension() == ".png" ? PlotFormat::png : PlotFormat::svg;
-  const std::optional<std::string> picture =
-      runGnuplot(plotScript(log, std::filesystem::path(options.log).stem().string(), format));
+  const std::optional<std::string> picture = runGnuplot(
+      plotScript(log, frameTimes ? &*frameTimes : nullptr, std::filesystem::path(options.log).stem().string(), format));
   if (!picture)
     throw std::runtime_error(
         fmt::format("{}: gnuplot is not installed, expected it (Debian package gnuplot-nox)", options.output));

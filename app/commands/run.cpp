@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <optional>
 
 #include "app/files/content_hash.h"
 #include "app/files/log_file.h"
+#include "app/files/output_file.h"
 #include "app/files/state_cache.h"
 #include "app/files/surface_file.h"
 #include "app/files/text_file.h"
@@ -208,6 +210,28 @@ class MotionRecorder {
   std::vector<std::unique_ptr<TrajectoryFile>> files_;  // one per tool
 };
 
+// CSV, a row per dynamics frame: t in s, what servo, dynamics and the surface's renewal took in ms.
+class FrameTimesRecorder {
+ public:
+  explicit FrameTimesRecorder(const RunOptions& options) {
+    if (options.frameTimesPath.empty()) return;
+    file_.emplace(options.frameTimesPath);
+    file_->write("t,servo,dynamics,surface\n");
+  }
+  void afterFrame(const Simulation& simulation) {
+    if (!file_) return;
+    const FrameTimes& times = simulation.times();
+    file_->write(fmt::format("{:.6g},{:.4g},{:.4g},{:.4g}\n", simulation.time(), 1e3 * times.servo,
+                             1e3 * times.dynamics, 1e3 * times.surface));
+  }
+  void commit() {
+    if (file_) file_->commit();
+  }
+
+ private:
+  std::optional<OutputFile> file_;
+};
+
 std::vector<Result> forceResults(const LoadedScene& loaded, const ForceComparison& forces) {
   std::vector<Result> out;
   const auto matches = forces.matches();
@@ -251,6 +275,7 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
   std::vector<std::string> outputs = pictures;
   outputs.push_back(options.logPath);
   outputs.push_back(options.cachePath);
+  outputs.push_back(options.frameTimesPath);
   for (const auto& [tool, path] : options.records) outputs.push_back(path);
   for (const SurfaceRequest& request : options.surfaces) outputs.push_back(request.path);
   requireDistinctFiles(outputs, inputFiles(loaded.scene));
@@ -290,6 +315,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   LogRecorder log(loaded, options);
   CacheRecorder cache(loaded, options);
   MotionRecorder motions(loaded, options);
+  FrameTimesRecorder frameTimes(options);
   ForceComparison forces(loaded);
   RestWatch rest(loaded);
   for (const BodyOverlap& o : simulation.world().startOverlaps())
@@ -306,6 +332,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
     last = simulation.finished() || rest.atRest();
     log.afterFrame(simulation);
     motions.afterFrame(simulation);
+    frameTimes.afterFrame(simulation);
     forces.afterFrame(simulation);
     surfaces.afterFrame(simulation, last);
     cache.afterFrame(simulation);
@@ -315,6 +342,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   log.commit();
   cache.commit(simulation);
   motions.commit();
+  frameTimes.commit();
   surfaces.write(simulation);
   return forceResults(loaded, forces);
 }

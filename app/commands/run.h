@@ -28,6 +28,7 @@ struct RunOptions {
   std::map<std::string, std::string> records;       // the same -> file for the motion and the force of its ticks
   std::string logPath;
   bool logEveryTick = false;
+  std::string frameTimesPath;  // what each dynamics frame took, apart from the log, which is the same in every run
   std::vector<SurfaceRequest> surfaces;
   std::string cachePath;  // what every picture shows, for `render --cache`; empty: none
   EmbreeSettings embree;

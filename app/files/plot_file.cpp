@@ -28,6 +28,7 @@ struct Span {
 
 struct Panel {
   std::string title;
+  Series time;  // s; empty: the log's
   std::vector<Curve> curves;
   std::vector<Span> contact, held;
   bool logarithmic = false, fromZero = false;
@@ -151,6 +152,16 @@ std::vector<Panel> panelsOf(const LogTable& log, const Series& time) {
   return panels;
 }
 
+Panel panelOfFrameTimes(const LogTable& times) {
+  Panel panel;
+  panel.title = "what a dynamics frame took, ms";
+  panel.time = column(times, "t");
+  panel.fromZero = true;
+  for (const char* name : {"servo", "dynamics", "surface"})
+    panel.curves.push_back(line(name, panel.curves.size(), 1.3, column(times, name)));
+  return panel;
+}
+
 // ---- The script ------------------------------------------------------------------------------------------
 
 // Names come from a file: in single quotes gnuplot takes them as they are, where double quotes would run what stands
@@ -231,10 +242,13 @@ std::string drawingOf(const Panel& panel, std::size_t index, bool explainsShades
 
 }  // namespace
 
-std::string plotScript(const LogTable& log, const std::string& title, PlotFormat format) {
+std::string plotScript(const LogTable& log, const LogTable* frameTimes, const std::string& title, PlotFormat format) {
   if (log.value.empty()) throw inputError(log.path, 0, "no rows after the header, expected a log of a run (--log)");
   const Series time = column(log, "t");
-  const std::vector<Panel> panels = panelsOf(log, time);
+  std::vector<Panel> panels = panelsOf(log, time);
+  if (frameTimes != nullptr && frameTimes->value.empty())
+    throw inputError(frameTimes->path, 0, "no rows after the header");
+  if (frameTimes != nullptr) panels.push_back(panelOfFrameTimes(*frameTimes));
   constexpr double kPanel = 124, kGap = 36, kHead = 62, kFoot = 58;  // pixels of the SVG
   const double height = kHead + kFoot + static_cast<double>(panels.size()) * (kPanel + kGap) - kGap;
   std::string out =
@@ -245,7 +259,8 @@ std::string plotScript(const LogTable& log, const std::string& title, PlotFormat
   out += " enhanced background 'white'\n";
   for (std::size_t p = 0; p < panels.size(); ++p)
     for (std::size_t c = 0; c < panels[p].curves.size(); ++c)
-      out += block(fmt::format("p{}_{}", p, c), time, panels[p].curves[c].values);
+      out += block(fmt::format("p{}_{}", p, c), panels[p].time.empty() ? time : panels[p].time,
+                   panels[p].curves[c].values);
   const double begin = time.size() > 1 ? 2 * time[0] - time[1] : time[0];  // the first row tells how a frame ended
   const double end = std::max(time.back(), begin + 1e-3);
   out += fmt::format(
