@@ -96,8 +96,8 @@ TEST_P(BentAnchors, VelocitiesOfASkinAreThePlacesDifferences) {
   shake(d, 3, GetParam(), 0.003, 0.5);
   const auto places = [](WorldData& of) {
     placeCarriedNodes(of);
-    std::vector<Vector3d> out;
-    for (int i = 0; i < of.nodes.count; ++i) out.push_back(vectorAt(of.nodes.position, i));
+    std::vector<Vector3d> out(of.nodes.count);
+    for (int i = 0; i < of.nodes.count; ++i) out[i] = vectorAt(of.nodes.position, i);
     return out;
   };
   const std::vector<Vector3d> expected = differences(d, motionOfSpheres(d), places);
@@ -155,8 +155,8 @@ TEST_P(BentAnchors, TheImplicitStepsMapIsTheAnchorsDerivativeAndReturnsItsTransp
   // Nodes stand still here, so that what they are displaced by falls as the anchors move.
   const std::vector<Vector3d> falling = differences(d, motion, [](WorldData& of) {
     evaluateAttachments(of);
-    std::vector<Vector3d> out;
-    for (int i = 0; i < of.nodes.dynamicEnd; ++i) out.push_back(vectorOf(of.nodes.displaced[i]));
+    std::vector<Vector3d> out(of.nodes.dynamicEnd);
+    for (int i = 0; i < of.nodes.dynamicEnd; ++i) out[i] = vectorOf(of.nodes.displaced[i]);
     return out;
   });
   for (const BodyRange& range : d.ranges)
