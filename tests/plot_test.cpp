@@ -145,9 +145,9 @@ TEST(Plot, DrawsWhatFramesTook) {
 
 TEST(Plot, ARunTellsWhatItsFramesTook) {
   const TemporaryFolder folder;
-  const ProgramResult r =
-      runProgram({"replay", MEDULLA_SOURCE_DIR "/scenes/gallbladder.xml", "--set", "clock.duration=0.2", "--set",
-                  "output.golden=0", "--frame-times", folder / "times.csv"});
+  const std::string scene = MEDULLA_SOURCE_DIR "/scenes/gallbladder.xml";
+  const ProgramResult r = runProgram({"replay", scene, "--set", "clock.duration=0.2", "--set", "output.golden=0",
+                                      "--frame-times", folder / "times.csv"});
   ASSERT_EQ(r.exitCode, 0) << r.err;
   const LogTable times = readLog(folder / "times.csv");
   ASSERT_EQ(times.value.size(), 10u);
