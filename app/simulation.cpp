@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cassert>
-#include <chrono>
 #include <cmath>
+
+#include "render/stage_times.h"
 
 namespace medulla {
 
@@ -61,14 +62,10 @@ void Simulation::sampleInputs(double time, std::vector<ToolSample>& out) const {
   for (std::size_t k = 0; k < out.size(); ++k) out[k] = sampleTrajectory(loaded_->trajectories[k], time);
 }
 
-static double secondsBetween(std::chrono::steady_clock::time_point a, std::chrono::steady_clock::time_point b) {
-  return std::chrono::duration<double>(b - a).count();
-}
-
 void Simulation::advanceFrame() {
-  const auto start = std::chrono::steady_clock::now();
+  const double start = wallSeconds();
   runTicks();
-  times_.servo = secondsBetween(start, std::chrono::steady_clock::now());
+  times_.servo = wallSeconds() - start;
   advanceDynamics();
   servo_->beginFrame();
 }
@@ -98,15 +95,15 @@ void Simulation::advanceDynamics() {
   totals_.ticks += ticksPerFrame_;
   totals_.substeps += world_.substepsPerFrame();
   totals_.simulated += frameDuration_;
-  const auto start = std::chrono::steady_clock::now();
+  const double start = wallSeconds();
   const FrameReport report = world_.advance(record_.loads);
-  const auto stepped = std::chrono::steady_clock::now();
+  const double stepped = wallSeconds();
   std::swap(previous_, current_);
   world_.readFrame(current_);
   // Without tools nobody feels the surface.
   if (!loaded_->trajectories.empty()) servo_->commit(previous_, current_, record_.tools[ticksPerFrame_]);
-  times_.dynamics = secondsBetween(start, stepped);
-  times_.surface = secondsBetween(stepped, std::chrono::steady_clock::now());
+  times_.dynamics = stepped - start;
+  times_.surface = wallSeconds() - stepped;
   ++frame_;
   accountTicks();
   accountImpulses(report);

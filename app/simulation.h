@@ -68,7 +68,8 @@ struct RunTotals {
 };
 
 // The loop of a run in logical time: ticks of the servo over the two last dynamics frames, then one dynamics frame
-// under the springs that the servo hands over (paper 5). No clock, no thread: the same scene gives the same hash.
+// under the springs that the servo hands over (paper 5). No thread, and a clock only to tell what took how long: the
+// same scene gives the same hash.
 class Simulation {
  public:
   explicit Simulation(const LoadedScene& loaded, const EmbreeSettings& embree = {});

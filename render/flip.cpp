@@ -150,10 +150,7 @@ Seen see(const Image& image, float pixelsPerDegree) {
   const Size size{image.width, image.height};
   const std::size_t count = image.pixels.size() / 4;
   std::array<float, 256> linear;
-  for (int v = 0; v < 256; ++v) {
-    const float s = float(v) / 255;
-    linear[v] = s <= 0.04045f ? s / 12.92f : std::pow((s + 0.055f) / 1.055f, 2.4f);
-  }
+  for (int v = 0; v < 256; ++v) linear[v] = float(lightFromSrgb(v / 255.0));
   Plane channel[3];
   for (Plane& c : channel) c.resize(count);
   for (std::size_t i = 0; i < count; ++i) {

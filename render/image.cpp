@@ -58,4 +58,12 @@ Image amplifiedDifference(const Image& a, const Image& b, int gain) {
   return out;
 }
 
+double lightFromSrgb(double shown) {
+  return shown <= 0.04045 ? shown / 12.92 : std::pow((shown + 0.055) / 1.055, 2.4);
+}
+
+double srgbFromLight(double light) {
+  return light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
+}
+
 }  // namespace medulla

@@ -35,4 +35,8 @@ ImageDifference compareImages(const Image& a, const Image& b);
 bool withinTolerance(const ImageDifference& d);  // <= 0.05 % over 4, <= 5 pixels over 16, PSNR >= 50 dB
 Image amplifiedDifference(const Image& a, const Image& b, int gain = 16);
 
+// The sRGB transfer (IEC 61966-2-1) of a channel, 0 to 1 both.
+double lightFromSrgb(double shown);
+double srgbFromLight(double light);
+
 }  // namespace medulla

@@ -62,10 +62,7 @@ struct LightTables {
   std::vector<std::uint8_t> shown = std::vector<std::uint8_t>(1 << 16);
 
   LightTables() {
-    for (int v = 0; v < 256; ++v) {
-      const double s = v / 255.0, linear = s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
-      light[v] = static_cast<std::uint16_t>(std::lround(65535 * linear));
-    }
+    for (int v = 0; v < 256; ++v) light[v] = static_cast<std::uint16_t>(std::lround(65535 * lightFromSrgb(v / 255.0)));
     for (int v = 0, next = 0; v < 256; ++v) {
       const int until = v < 255 ? (light[v] + light[v + 1] + 1) / 2 : 1 << 16;
       for (; next < until; ++next) shown[next] = static_cast<std::uint8_t>(v);

@@ -16,18 +16,22 @@ double processCpuSeconds() {
   return secondsOf(CLOCK_PROCESS_CPUTIME_ID);
 }
 
+double wallSeconds() {
+  return secondsOf(CLOCK_MONOTONIC);
+}
+
 void StageTimes::start(const std::string& name) {
   stop();
   const auto known = std::find_if(stages_.begin(), stages_.end(), [&](const Stage& s) { return s.name == name; });
   running_ = static_cast<int>(known - stages_.begin());
   if (known == stages_.end()) stages_.push_back({name, 0, 0});
-  wall_ = secondsOf(CLOCK_MONOTONIC);
+  wall_ = wallSeconds();
   cpu_ = processCpuSeconds();
 }
 
 void StageTimes::stop() {
   if (running_ < 0) return;
-  stages_[running_].wall += secondsOf(CLOCK_MONOTONIC) - wall_;
+  stages_[running_].wall += wallSeconds() - wall_;
   stages_[running_].cpu += processCpuSeconds() - cpu_;
   running_ = -1;
 }

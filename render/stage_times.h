@@ -25,4 +25,7 @@ class StageTimes {
 // CPU time of the process over all threads, s.
 double processCpuSeconds();
 
+// By the clock, s; from an unknown beginning on.
+double wallSeconds();
+
 }  // namespace medulla

@@ -38,8 +38,7 @@ class Ink {
   // Puts it on the picture and starts anew.
   void apply(glm::vec3 colour, float opacity) {
     glm::vec3 shown;
-    for (int c = 0; c < 3; ++c)  // the sRGB transfer
-      shown[c] = 255 * (colour[c] <= 0.0031308f ? 12.92f * colour[c] : 1.055f * std::pow(colour[c], 1 / 2.4f) - 0.055f);
+    for (int c = 0; c < 3; ++c) shown[c] = 255 * float(srgbFromLight(colour[c]));
     for (const std::size_t i : touched_) {
       const float share = opacity * cover_[i];
       for (std::size_t c = 0; c < 3; ++c) {

@@ -112,24 +112,22 @@ TEST_P(BentAnchors, OneNodeMovesAsTheWholeSurfaceDoesAndLoadsReturnTheSamePower)
   WorldData& d = world.data();
   shake(d, 4, GetParam(), 0.003, 0.5);
   placeCarriedNodes(d);
-  const auto motionOf = [&d](int sphere) {
-    return SphereMotion{vectorOf(d.spheres.velocity[sphere]), vectorOf(d.spheres.angularVelocity[sphere])};
-  };
   const Vector3d force(1, -2, 0.5);
   for (const BodyRange& range : d.ranges) {
     for (const int i : range.node) {
-      const GroupHost host = d.nodes.groupHosts[i / 4];
-      if (!host.onLink) continue;
-      const LinkPoint point = linkPoint(d, host.host, i);
-      const Vector3d velocity = velocityOf(point, motionOf(point.sphere0), motionOf(point.sphere1));
-      EXPECT_LT((velocity - vectorAt(d.nodes.velocity, i)).norm(), 1e-12 * velocity.norm());
+      const HostPoint point = hostPoint(d, i);
+      ASSERT_GT(point.count, 0);
+      Vector3d velocity = Vector3d::Zero();
       double power = 0;
-      const auto loads = loadsOf(point, force);
-      for (const int end : {0, 1}) {
-        const SphereMotion motion = motionOf(end == 0 ? point.sphere0 : point.sphere1);
-        power += loads[end].linear.dot(motion.linear) + loads[end].angular.dot(motion.angular);
+      for (int k = 0; k < point.count; ++k) {
+        const Vector3d linear = vectorOf(d.spheres.velocity[point.spheres[k]]),
+                       angular = vectorOf(d.spheres.angularVelocity[point.spheres[k]]);
+        velocity += point.force[k].transpose() * linear + point.torque[k].transpose() * angular;
+        power += linear.dot(point.force[k] * force) + angular.dot(point.torque[k] * force);
       }
-      EXPECT_NEAR(power, force.dot(velocity), 1e-12 * force.norm() * velocity.norm());
+      const Vector3d expected = vectorAt(d.nodes.velocity, i);
+      EXPECT_LT((velocity - expected).norm(), 1e-12 * expected.norm());
+      EXPECT_NEAR(power, force.dot(expected), 1e-12 * force.norm() * expected.norm());
     }
   }
 }

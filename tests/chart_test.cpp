@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <sstream>
 
@@ -64,6 +65,24 @@ std::vector<std::vector<std::string>> rowsOf(const std::string& path) {
     while (std::getline(cells, cell, ',')) out.back().push_back(cell);
   }
   return out;
+}
+
+// A run that fails in its first dynamics frame has taken time for something all the same.
+TEST_F(ChartCommand, RunsThatFailAtOnceHaveACost) {
+  const ProgramResult r = chart({"--steps", "0.05,20", "--methods", "full", "--set", "tissue.t.young=5e5", "--set",
+                                 "clock.dynamics=20", "--set", "clock.duration=0.1"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  const auto rows = rowsOf(folder / "out/chart.csv");
+  ASSERT_EQ(rows.size(), 3u);
+  const auto column = [&](const std::string& name) {
+    return std::find(rows[0].begin(), rows[0].end(), name) - rows[0].begin();
+  };
+  const auto failed = static_cast<std::size_t>(column("failed_at[s]")),
+             cpu = static_cast<std::size_t>(column("cpu[s/s]"));
+  ASSERT_LT(failed, rows[0].size());
+  ASSERT_LT(cpu, rows[0].size());
+  EXPECT_EQ(rows[1].at(failed), "0.05");
+  EXPECT_TRUE(std::isfinite(std::stod(rows[1].at(cpu)))) << rows[1].at(cpu);
 }
 
 TEST_F(ChartCommand, SmallerStepsComeNearerAndTooLargeOnesFail) {

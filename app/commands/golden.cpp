@@ -125,22 +125,22 @@ std::vector<Moment> renderMoments(const std::string& path, const std::string& co
   const Scene& scene = loaded.scene;
   std::vector<Moment> moments = momentsOf(scene);
   Simulation simulation(loaded);
-  Renderer renderer({.width = scene.width, .height = scene.height, .context = context});
+  Renderer renderer(rendererSettings(scene.width, scene.height, context, Quality::standard));
   renderedWith = renderer.description();
   const SceneView view(loaded, simulation.current(), renderer);
-  PictureState state;
+  std::vector<double> times;
+  for (const Moment& moment : moments) times.push_back(moment.frame / scene.fps);
+  PictureTimes pictures(times, 0);
   Picture picture;
-  std::size_t next = 0;
-  while (!simulation.finished() && next < moments.size()) {
+  while (!simulation.finished()) {
     checkInterrupt();
     simulation.advanceFrame();
-    const double end = simulation.record().start + simulation.record().duration;
-    for (; next < moments.size() && moments[next].frame / scene.fps <= end + 1e-9; ++next) {
-      stateAt(simulation.record(), moments[next].frame / scene.fps, state);
+    pictures.afterFrame(simulation, [&](int k, const PictureState& state) {
       view.compose(state, {}, picture);
-      renderer.render(picture, moments[next].image);
-      moments[next].state = fmt::format("{:016x}", simulation.world().stateHash());
-    }
+      renderer.render(picture, moments[k].image);
+      moments[k].state = fmt::format("{:016x}", simulation.world().stateHash());
+    });
+    if (!moments.back().state.empty()) break;
   }
   return moments;
 }

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <tuple>
@@ -135,10 +134,6 @@ void printFiles(const RenderOptions& options, const Artist& artist, double wall)
   fmt::print("pictures_per_second {:.4g}\n", artist.drawn() / wall);
 }
 
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 // Of the cached run, the pictures that were asked for.
 std::vector<int> cachedNumbers(const CacheReader& cache, const Wanted& wanted, const RenderOptions& options) {
   std::vector<int> numbers;
@@ -176,7 +171,7 @@ void renderCache(const LoadedScene& loaded, const RenderOptions& options, const 
   PictureState state;
   cache.read(0, state);  // the first picture is the scene at rest
   Artist artist(loaded, options, wanted, state.frame, times);
-  const auto start = std::chrono::steady_clock::now();
+  const double start = wallSeconds();
   for (std::size_t k = 0; k < numbers.size(); ++k) {
     checkInterrupt();
     times.start("read cache");
@@ -184,7 +179,7 @@ void renderCache(const LoadedScene& loaded, const RenderOptions& options, const 
     artist.draw(wanted.first + static_cast<int>(k), state, nullptr);
   }
   artist.finish();
-  printFiles(options, artist, secondsSince(start));
+  printFiles(options, artist, wallSeconds() - start);
   fmt::print("hash {:016x}\n", cache.finalHash());
 }
 
@@ -194,7 +189,7 @@ void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wa
   ForceView forceView(loaded);
   PictureTimes pictures(wanted.times, wanted.first);
   const double cpuStart = processCpuSeconds();
-  const auto start = std::chrono::steady_clock::now();
+  const double start = wallSeconds();
   times.start("simulate");
   const auto afterFrame = [&] {
     if (options.view.showForce) forceView.afterFrame(simulation);
@@ -204,7 +199,7 @@ void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wa
     times.start("simulate");
   };
   const std::vector<Result> forces = runToEnd(loaded, options.run, simulation, afterFrame, [&] { artist.finish(); });
-  const double wall = secondsSince(start);
+  const double wall = wallSeconds() - start;
   printFiles(options, artist, wall);
   printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));
   printResults(forces);

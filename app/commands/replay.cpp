@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <chrono>
-
 #include "app/commands/commands.h"
 #include "app/live_servo.h"
 #include "app/progress.h"
@@ -25,7 +23,7 @@ int runReplay(const RunOptions& options) {
   Simulation simulation(loaded, options.embree);
   Progress progress("replay", loaded.scene.duration, "s");
   const double cpuStart = processCpuSeconds();
-  const auto start = std::chrono::steady_clock::now();
+  const double start = wallSeconds();
   std::optional<LiveServo> live;
   std::function<void()> advance;
   if (options.realtime) {
@@ -34,7 +32,7 @@ int runReplay(const RunOptions& options) {
   }
   const std::vector<Result> forces = runToEnd(
       loaded, options, simulation, [&] { progress.update(simulation.time()); }, {}, advance);
-  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double wall = wallSeconds() - start;
   std::vector<Result> results = runResults(simulation, processCpuSeconds() - cpuStart, wall);
   if (options.untilRest) results.insert(results.begin(), {"rest_at", fmt::format("{:.6g}", simulation.time()), "s"});
   results.insert(results.end(), forces.begin(), forces.end());

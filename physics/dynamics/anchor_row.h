@@ -6,7 +6,7 @@
 // The anchors of a link's nodes as a matrix on the motion of its two spheres, row by row.
 namespace medulla {
 
-// One link, the same in all lanes: of group and frame what endLoads() needs.
+// One link, the same in all lanes: of group and frame what sphereLoads() needs.
 struct OneLink {
   int sphere0, sphere1;
   LinkGroup group;
@@ -48,11 +48,9 @@ inline Lanes3 unit(int k) {
 inline AnchorRow anchorRow(const OneLink& link, const NodeGroup& g, const Lanes3& offset, const Lanes3& direction) {
   AnchorLoads loads = noLoads();
   addLoads(link.host, g, offset, direction, cross(offset, direction), loads);
-  const EndLoads e = endLoads(link.group, link.frame, loads);
-  const Lanes3 torque0 = e.torque0 + cross(link.frame.arm0, e.force0),
-               torque1 = e.torque1 + cross(link.frame.arm1, e.force1);
-  return {{e.force0.x, e.force0.y, e.force0.z, torque0.x, torque0.y, torque0.z, e.force1.x, e.force1.y, e.force1.z,
-           torque1.x, torque1.y, torque1.z}};
+  const EndLoads e = sphereLoads(link.group, link.frame, loads);
+  return {{e.force0.x, e.force0.y, e.force0.z, e.torque0.x, e.torque0.y, e.torque0.z, e.force1.x, e.force1.y,
+           e.force1.z, e.torque1.x, e.torque1.y, e.torque1.z}};
 }
 
 }  // namespace medulla

@@ -28,21 +28,12 @@ void addTerm(ImplicitData& s, int quad, const Vector3d& coefficient) {
   s.rowCoefficient.push_back(quadOf(coefficient));
 }
 
-// The terms of a node's velocity along `axis`, times `weight`.
-void addNodeTerms(const WorldData& d, ImplicitData& s, int node, double weight, const Vector3d& axis) {
-  if (!isSkin(d, node)) return addTerm(s, 2 * d.spheres.count + node, weight * axis);
-  const GroupHost host = d.nodes.groupHosts[node / 4];
-  if (!host.onLink) {
-    addTerm(s, 2 * host.host, weight * axis);
-    addTerm(s, 2 * host.host + 1, weight * sphereOffset(d, host.host, node).cross(axis));
-    return;
-  }
-  const LinkPoint p = linkPoint(d, host.host, node);
-  const auto loads = loadsOf(p, weight * axis);
-  const int spheres[2] = {p.sphere0, p.sphere1};
-  for (int k = 0; k < 2; ++k) {
-    addTerm(s, 2 * spheres[k], loads[k].linear);
-    addTerm(s, 2 * spheres[k] + 1, loads[k].angular);
+// The terms of a node's velocity along `axis`.
+void addNodeTerms(const WorldData& d, ImplicitData& s, int node, const HostPoint& host, const Vector3d& axis) {
+  if (host.count == 0) addTerm(s, 2 * d.spheres.count + node, axis);
+  for (int k = 0; k < host.count; ++k) {
+    addTerm(s, 2 * host.spheres[k], host.force[k] * axis);
+    addTerm(s, 2 * host.spheres[k] + 1, host.torque[k] * axis);
   }
 }
 
@@ -122,7 +113,7 @@ void addDeadLoads(const WorldData& d, ImplicitData& s, double time) {
     const double share = time < load.to ? (time - load.from) / (load.to - load.from) : 1;
     LoadRow row;
     row.first = static_cast<int>(s.rowQuad.size());
-    addNodeTerms(d, s, load.node, 1, load.force / size);
+    addNodeTerms(d, s, load.node, hostPoint(d, load.node), load.force / size);
     row.end = static_cast<int>(s.rowQuad.size());
     row.impulse = s.duration * share * size;
     s.rows.push_back(row);
@@ -139,8 +130,10 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   for (std::size_t k = 0; k < d.contact.contacts.size(); ++k) addContactRows(d, s, k);
   for (std::size_t k = 0; k < d.loadForces.size(); ++k) {
     const PointSpring p = pointSpring(d, *stage.loads, k, stage.remaining);
+    std::array<HostPoint, 3> hosts;
+    for (int i = 0; i < p.count; ++i) hosts[i] = hostPoint(d, p.nodes[i]);
     addRows(s, false, k, p.outward != nullptr ? *p.outward : Vector3d::UnitX(), [&](const Vector3d& axis) {
-      for (int i = 0; i < p.count; ++i) addNodeTerms(d, s, p.nodes[i], p.weights[i], axis);
+      for (int i = 0; i < p.count; ++i) addNodeTerms(d, s, p.nodes[i], hosts[i], p.weights[i] * axis);
     });
   }
   for (std::size_t k = 0; k < s.loads.size(); ++k) {

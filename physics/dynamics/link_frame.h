@@ -59,4 +59,12 @@ MEDULLA_INLINE EndLoads endLoads(const LinkGroup& g, const LinkFrame& f, const A
   return out;
 }
 
+// The same on the spheres' frames.
+MEDULLA_INLINE EndLoads sphereLoads(const LinkGroup& g, const LinkFrame& f, const AnchorLoads& loads) {
+  EndLoads out = endLoads(g, f, loads);
+  out.torque0 = out.torque0 + cross(f.arm0, out.force0);
+  out.torque1 = out.torque1 + cross(f.arm1, out.force1);
+  return out;
+}
+
 }  // namespace medulla

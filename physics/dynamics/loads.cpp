@@ -40,35 +40,21 @@ void addImpulse(WorldData& d, int sphere, const Vector3d& linear, const Vector3d
   add(d.spheres.angularMomentum[sphere], g.freeToTurn[sphere % 4] * angular);
 }
 
-SphereMotion motionOf(const WorldData& d, int sphere) {
-  return {vectorOf(d.spheres.velocity[sphere]), angularVelocity(d, sphere)};
-}
-
-Vector3d nodeVelocity(const WorldData& d, int node) {
-  if (!isSkin(d, node)) return vectorAt(d.nodes.velocity, node);
-  const GroupHost host = d.nodes.groupHosts[node / 4];
-  if (host.onLink) {
-    const LinkPoint p = linkPoint(d, host.host, node);
-    return velocityOf(p, motionOf(d, p.sphere0), motionOf(d, p.sphere1));
+Vector3d nodeVelocity(const WorldData& d, int node, const HostPoint& host) {
+  if (host.count == 0) return vectorAt(d.nodes.velocity, node);
+  Vector3d sum = Vector3d::Zero();
+  for (int k = 0; k < host.count; ++k) {
+    sum += host.force[k].transpose() * vectorOf(d.spheres.velocity[host.spheres[k]]);
+    sum += host.torque[k].transpose() * angularVelocity(d, host.spheres[k]);
   }
-  return vectorOf(d.spheres.velocity[host.host]) +
-         angularVelocity(d, host.host).cross(sphereOffset(d, host.host, node));
+  return sum;
 }
 
-void addNodeImpulse(WorldData& d, int node, const Vector3d& impulse) {
-  if (!isSkin(d, node)) {
+void addNodeImpulse(WorldData& d, int node, const HostPoint& host, const Vector3d& impulse) {
+  if (host.count == 0)
     setVector(d.nodes.velocity, node, vectorAt(d.nodes.velocity, node) + d.nodes.inverseMass[node] * impulse);
-    return;
-  }
-  const GroupHost host = d.nodes.groupHosts[node / 4];
-  if (host.onLink) {
-    const LinkPoint p = linkPoint(d, host.host, node);
-    const auto [at0, at1] = loadsOf(p, impulse);
-    addImpulse(d, p.sphere0, at0.linear, at0.angular);
-    addImpulse(d, p.sphere1, at1.linear, at1.angular);
-  } else {
-    addImpulse(d, host.host, impulse, sphereOffset(d, host.host, node).cross(impulse));
-  }
+  for (int k = 0; k < host.count; ++k)
+    addImpulse(d, host.spheres[k], host.force[k] * impulse, host.torque[k] * impulse);
 }
 
 // The square of a matrix' largest stretch is not more than its largest row's sum times its largest column's.
@@ -77,43 +63,53 @@ double stretchBound(const Eigen::Matrix3d& m) {
 }
 
 // 1/kg: velocity per impulse at the node; exact on masses, an upper bound on skin, where it only steers convergence.
-double mobility(const WorldData& d, int node) {
-  if (!isSkin(d, node)) return d.nodes.inverseMass[node];
-  const GroupHost host = d.nodes.groupHosts[node / 4];
-  const auto ofSphere = [&](int sphere, double linear, double angular) {
-    const SphereGroup& g = d.spheres.groups[sphere / 4];
-    const int l = sphere % 4;
+double mobility(const WorldData& d, int node, const HostPoint& host) {
+  if (host.count == 0) return d.nodes.inverseMass[node];
+  double sum = 0;
+  for (int k = 0; k < host.count; ++k) {
+    const SphereGroup& g = d.spheres.groups[host.spheres[k] / 4];
+    const int l = host.spheres[k] % 4;
     const double turning = g.inverseInertia[0][l] + g.inverseInertia[1][l] + g.inverseInertia[2][l];
-    return g.inverseMass[l] * linear + g.freeToTurn[l] * turning * angular;
-  };
-  if (!host.onLink) return ofSphere(host.host, 1, sphereOffset(d, host.host, node).squaredNorm());
-  const LinkPoint p = linkPoint(d, host.host, node);
-  const auto bound = [&p](int row) { return stretchBound(p.loads.middleRows<3>(row)); };
-  return ofSphere(p.sphere0, bound(0), bound(3)) + ofSphere(p.sphere1, bound(6), bound(9));
+    sum += g.inverseMass[l] * stretchBound(host.force[k]) + g.freeToTurn[l] * turning * stretchBound(host.torque[k]);
+  }
+  return sum;
 }
 
-// One pass of Gauss-Seidel at one load: its force goes to what the spring asks for now. Returns the change's size.
-double settle(WorldData& d, const PointSpring& p, Vector3d& force) {
-  const double h = d.substep;
-  Vector3d x = Vector3d::Zero(), v = Vector3d::Zero();
+// What nodes share of masses adds up by squares; on skin the roots add, since nodes may hang on the same spheres.
+void prepare(const WorldData& d, const PointSpring& p, SettlingSpring& out) {
+  out.spring = p;
+  out.place = Vector3d::Zero();
   double ofMasses = 0, rootOfSkin = 0;
   for (int i = 0; i < p.count; ++i) {
     const double w = p.weights[i];
-    x += w * nodePosition(d, p.nodes[i]);
-    v += w * nodeVelocity(d, p.nodes[i]);
-    const double m = mobility(d, p.nodes[i]);
-    if (isSkin(d, p.nodes[i])) {
+    out.hosts[i] = hostPoint(d, p.nodes[i]);
+    out.place += w * nodePosition(d, p.nodes[i]);
+    const double m = mobility(d, p.nodes[i], out.hosts[i]);
+    if (out.hosts[i].count > 0) {
       rootOfSkin += std::abs(w) * std::sqrt(m);
     } else {
       ofMasses += w * w * m;
     }
   }
-  const double gain = p.stiffness * h * h + p.damping * h;
-  const Vector3d wanted = p.stiffness * (p.anchor - x - h * v) + p.damping * (p.anchorVelocity - v);
-  Vector3d next = force + (wanted - force) / (1 + gain * (ofMasses + rootOfSkin * rootOfSkin));
+  out.mobility = ofMasses + rootOfSkin * rootOfSkin;
+}
+
+void addImpulse(WorldData& d, const SettlingSpring& s, const Vector3d& impulse) {
+  for (int i = 0; i < s.spring.count; ++i)
+    addNodeImpulse(d, s.spring.nodes[i], s.hosts[i], s.spring.weights[i] * impulse);
+}
+
+// One pass of Gauss-Seidel at one load: its force goes to what the spring asks for now. Returns the change's size.
+double settle(WorldData& d, const SettlingSpring& s, Vector3d& force) {
+  const PointSpring& p = s.spring;
+  const double h = d.substep, gain = p.stiffness * h * h + p.damping * h;
+  Vector3d v = Vector3d::Zero();
+  for (int i = 0; i < p.count; ++i) v += p.weights[i] * nodeVelocity(d, p.nodes[i], s.hosts[i]);
+  const Vector3d wanted = p.stiffness * (p.anchor - s.place - h * v) + p.damping * (p.anchorVelocity - v);
+  Vector3d next = force + (wanted - force) / (1 + gain * s.mobility);
   if (p.outward != nullptr) next -= std::max(0.0, next.dot(*p.outward)) * *p.outward;
   const Vector3d change = next - force;
-  for (int i = 0; i < p.count; ++i) addNodeImpulse(d, p.nodes[i], h * p.weights[i] * change);
+  addImpulse(d, s, h * change);
   force = next;
   return change.norm();
 }
@@ -183,7 +179,7 @@ void applyDeadLoads(WorldData& d, double time) {
   for (const NodeForce& load : d.deadLoads) {
     if (time < load.from) continue;
     const double share = time < load.to ? (time - load.from) / (load.to - load.from) : 1;
-    addNodeImpulse(d, load.node, d.substep * share * load.force);
+    addNodeImpulse(d, load.node, hostPoint(d, load.node), d.substep * share * load.force);
   }
 }
 
@@ -194,22 +190,22 @@ void applyLoads(WorldData& d, const Loads& loads, double remaining, std::vector<
   constexpr double kSettled = 1e-12;  // of the largest force
   const std::size_t count = loads.toolSprings.size() + loads.heldNodes.size();
   assert(d.loadForces.size() == count);
+  d.settling.resize(count);
   // From the forces of the substep before: in a body at rest they are the answer already, and what few passes leave
   // open settles over the substeps.
   for (std::size_t k = 0; k < count; ++k) {
-    const PointSpring p = pointSpring(d, loads, k, remaining);
-    for (int i = 0; i < p.count; ++i) addNodeImpulse(d, p.nodes[i], d.substep * p.weights[i] * d.loadForces[k]);
+    prepare(d, pointSpring(d, loads, k, remaining), d.settling[k]);
+    addImpulse(d, d.settling[k], d.substep * d.loadForces[k]);
   }
   for (int pass = 0; pass < kPasses; ++pass) {
     double change = 0, largest = 0;
     for (std::size_t k = 0; k < count; ++k) {
-      change = std::max(change, settle(d, pointSpring(d, loads, k, remaining), d.loadForces[k]));
+      change = std::max(change, settle(d, d.settling[k], d.loadForces[k]));
       largest = std::max(largest, d.loadForces[k].norm());
     }
     if (!(change > kSettled * largest)) break;
   }
-  for (std::size_t k = 0; k < count; ++k)
-    toolImpulse[pointSpring(d, loads, k, remaining).tool] += d.substep * d.loadForces[k];
+  for (std::size_t k = 0; k < count; ++k) toolImpulse[d.settling[k].spring.tool] += d.substep * d.loadForces[k];
 }
 
 }  // namespace medulla

@@ -1,5 +1,7 @@
 #include "physics/dynamics/node_motion.h"
 
+#include <Eigen/Geometry>
+
 #include "physics/dynamics/anchor_row.h"
 
 namespace medulla {
@@ -15,32 +17,33 @@ Vector3d nodePosition(const WorldData& d, int node) {
   return vectorOf(positionOf(anchor), node % 4);
 }
 
-LinkPoint linkPoint(const WorldData& d, int link, int node) {
-  const OneLink one = oneLink(d, link);
+HostPoint hostPoint(const WorldData& d, int node) {
+  HostPoint p;
+  if (!isSkin(d, node)) return p;
+  const GroupHost host = d.nodes.groupHosts[node / 4];
   const NodeGroup& group = d.nodes.groups[node / 4];
+  if (!host.onLink) {
+    const Vector3d offset = vectorOf(anchorOnSphere(sphereHost(d, host.host), group).offset, node % 4);
+    p.count = 1;
+    p.spheres[0] = host.host;
+    p.force[0].setIdentity();
+    for (int k = 0; k < 3; ++k) p.torque[0].col(k) = offset.cross(Vector3d::Unit(k));
+    return p;
+  }
+  const OneLink one = oneLink(d, host.host);
   const Lanes3 offset = anchorOnLink(one.host, group).offset;
-  LinkPoint p{one.sphere0, one.sphere1, {}};
+  p.count = 2;
+  p.spheres = {one.sphere0, one.sphere1};
   for (int k = 0; k < 3; ++k) {
     const AnchorRow row = anchorRow(one, group, offset, unit(k));
-    for (int i = 0; i < 12; ++i) p.loads(i, k) = row.c[i][node % 4];
+    for (int i = 0; i < 3; ++i) {
+      for (int end = 0; end < 2; ++end) {
+        p.force[end](i, k) = row.c[6 * end + i][node % 4];
+        p.torque[end](i, k) = row.c[6 * end + 3 + i][node % 4];
+      }
+    }
   }
   return p;
-}
-
-Vector3d sphereOffset(const WorldData& d, int sphere, int node) {
-  return vectorOf(anchorOnSphere(sphereHost(d, sphere), d.nodes.groups[node / 4]).offset, node % 4);
-}
-
-Vector3d velocityOf(const LinkPoint& p, const SphereMotion& of0, const SphereMotion& of1) {
-  Eigen::Matrix<double, 12, 1> motion;
-  motion << of0.linear, of0.angular, of1.linear, of1.angular;
-  return p.loads.transpose() * motion;
-}
-
-std::array<SphereMotion, 2> loadsOf(const LinkPoint& p, const Vector3d& force) {
-  const Eigen::Matrix<double, 12, 1> loads = p.loads * force;
-  return {SphereMotion{loads.segment<3>(0), loads.segment<3>(3)},
-          SphereMotion{loads.segment<3>(6), loads.segment<3>(9)}};
 }
 
 }  // namespace medulla

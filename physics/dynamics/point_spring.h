@@ -4,9 +4,18 @@
 #include <array>
 #include <cstddef>
 
-#include "physics/dynamics/world_data.h"
-
 namespace medulla {
+
+struct Loads;
+struct WorldData;
+
+// A massless node on the spheres that carry it: what a force on it is to each of them. Transposed, what their
+// velocities are to it.
+struct HostPoint {
+  int count = 0;  // of spheres; 0: the node has a mass of its own
+  std::array<int, 2> spheres;
+  std::array<Eigen::Matrix3d, 2> force, torque;  // 1, m
+};
 
 // The common form of what tools do: ToolSpring and HeldNode.
 struct PointSpring {
@@ -16,6 +25,14 @@ struct PointSpring {
   Eigen::Vector3d anchor, anchorVelocity;  // m, m/s, at the substep's end
   const Eigen::Vector3d* outward;          // null: pulls and pushes
   double stiffness, damping;
+};
+
+// One of them while the velocities of a substep settle, with all that stays meanwhile.
+struct SettlingSpring {
+  PointSpring spring;
+  std::array<HostPoint, 3> hosts;  // of its nodes
+  Eigen::Vector3d place;           // m, of its nodes, weighted
+  double mobility;                 // 1/kg: their velocity per impulse
 };
 
 // The k-th of `loads`, tool springs first; `remaining` is the time (s) from the substep's end to the frame's.

@@ -33,9 +33,7 @@ void returnFromLinks(WorldData& d, Motion& motion) {
   for (std::size_t k = 0; k < d.links.groups.size(); ++k) {
     const LinkFrame& f = d.links.frames[k];
     const LinkGroup& g = d.links.groups[k];
-    EndLoads e = endLoads(g, f, gatherLoads(&d.links.loads[4 * k], g.hasBeams));
-    e.torque0 = e.torque0 + cross(f.arm0, e.force0);
-    e.torque1 = e.torque1 + cross(f.arm1, e.force1);
+    const EndLoads e = sphereLoads(g, f, gatherLoads(&d.links.loads[4 * k], g.hasBeams));
     Quad q[4][4];
     const Lanes3* parts[4] = {&e.force0, &e.torque0, &e.force1, &e.torque1};
     for (int p = 0; p < 4; ++p) {

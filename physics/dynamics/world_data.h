@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "physics/dynamics/contact_data.h"
+#include "physics/dynamics/point_spring.h"
 #include "physics/dynamics/simd.h"
 #include "physics/dynamics/world.h"
 
@@ -276,6 +277,7 @@ struct WorldData {
 
   // Force of each tool load in the current substep, tool springs first, then held nodes; zero at the frame's start.
   std::vector<Eigen::Vector3d> loadForces;
+  std::vector<SettlingSpring> settling;  // the loads of the current substep
 
   Quad gravity;
   int substeps = 1;
