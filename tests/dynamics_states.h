@@ -71,7 +71,7 @@ inline void shake(WorldData& d, std::uint64_t seed, double angle, double shift, 
       setVector(d.nodes.velocity, i, speed * random.vector());
     }
   }
-  evaluateLinks(d);
+  runStage(d, evaluateLinks);
 }
 
 struct Momentum {
@@ -96,8 +96,8 @@ inline Momentum momentum(const WorldData& d) {
 }
 
 inline double elastic(WorldData& d) {
-  evaluateLinks(d);
-  evaluateAttachments(d);
+  runStage(d, evaluateLinks);
+  runStage(d, evaluateAttachments);
   return linkEnergy(d) + surfaceEnergy(d);
 }
 

@@ -30,7 +30,7 @@ static World bareChain(int spheres, SurfaceMode surface, double damping) {
 
 // Central differences of the elastic energy along every freedom, against the forces.
 static void expectForcesAreMinusGradient(WorldData& d, double tolerance) {
-  evaluateForces(d);
+  runStage(d, evaluateForces);
   const std::vector<Quad> force = d.spheres.force, torque = d.spheres.torque;
   const std::vector<Lanes3> nodeForce = d.nodes.force;
   double forceScale = 0, torqueScale = 0;
