@@ -46,7 +46,7 @@ Look gallbladder() {
   l.vesselTint = {1.9f, 0.36f, 0.45f};
   l.bump = 0.30f;
   l.detailScale = 15;
-  l.detail = {512, 6, 2.4f, -1.3f, 0, 0, 0};
+  l.detail = {512, 7, 2.4f, -1.3f, 0, 0, 0};
   return l;
 }
 
@@ -65,7 +65,7 @@ Look stomach() {
   l.vesselTint = {0.78f, 0.16f, 0.25f};
   l.bump = 0.50f;
   l.detailScale = 8.4f;
-  l.detail = {1024, 7, 2.6f, -0.6f, 0, 0, 0};
+  l.detail = {1024, 10, 2.6f, -0.6f, 0, 0, 0};
   return l;
 }
 
@@ -82,7 +82,7 @@ Look gut() {
   l.bump = 0.42f;
   l.specular = 1.1f;
   l.detailScale = 11;
-  l.detail = {1024, 9, 2.0f, 1.2f, 0, 0, 0};
+  l.detail = {1024, 12, 2.0f, 1.2f, 0, 0, 0};
   return l;
 }
 
@@ -142,7 +142,7 @@ Look wall() {
   l.detailScale = 5.0f;
   l.castsShadow = false;
   l.encloses = true;
-  l.detail = {1024, 6, 2.2f, 0.4f, 0, 0, 0};
+  l.detail = {1024, 10, 2.4f, 0.4f, 0, 0, 0};
   return l;
 }
 
