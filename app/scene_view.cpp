@@ -109,6 +109,7 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   constexpr double kOpenJaw = 0.38, kClosedJaw = 0.03;  // rad
   instrument.jawAngle = float(kClosedJaw + (kOpenJaw - kClosedJaw) * std::max(0.0, 1 - 2 * input.grip));
   instrument.touching = state.inContact || state.holding;
+  instrument.holding = state.holding;
   picture.instruments.push_back(instrument);
   if (!options.showProxy) return;
   picture.balls.push_back({toGlm(state.proxy), float(tool.settings.radius), kProxyColour});

@@ -17,6 +17,10 @@ Look liver() {
   l.albedoHigh = {0.235f, 0.047f, 0.029f};
   l.mottleFrequency = 22;
   l.wrap = {0.24f, 0.07f, 0.05f};
+  l.glow = {0.34f, 0.040f, 0.020f};
+  l.glowDepth = 0.006f;
+  l.blood = 0.75f;
+  l.bloodless = {0.36f, 0.185f, 0.120f};
   l.roughness = 0.36f;
   l.wetRoughness = 0.13f;
   l.mottle = 0.95f;
@@ -32,21 +36,25 @@ Look liver() {
 Look gallbladder() {
   Look l;
   l.name = "gallbladder";
-  l.albedoLow = {0.060f, 0.088f, 0.042f};
-  l.albedoHigh = {0.235f, 0.222f, 0.108f};
+  l.albedoLow = {0.040f, 0.070f, 0.038f};
+  l.albedoHigh = {0.225f, 0.235f, 0.118f};
   l.mottleFrequency = 34;
   l.patches[0] = {{0.34f, 0.185f, 0.120f}, 60, 21, 1, {}, 0.44f, 0.68f, 0.52f};               // blood shining through
   l.patches[1] = {{0.33f, 0.130f, 0.085f}, 66, 9, 0.25f, {0, 1.1f, 0}, 0.62f, 1.15f, 0.85f};  // red neck
   l.patches[2] = {{0.62f, 0.40f, 0.13f}, 75, 40, 1, {0, 0.42f, 0}, 0.76f, 0.92f, 0.70f};      // fat
   l.wrap = {0.34f, 0.22f, 0.12f};
+  l.glow = {0.26f, 0.24f, 0.065f};
+  l.glowDepth = 0.006f;
+  l.blood = 0.8f;
+  l.bloodless = {0.36f, 0.33f, 0.19f};
   l.roughness = 0.37f;
   l.wetRoughness = 0.17f;
-  l.mottle = 0.70f;
+  l.mottle = 1.0f;
   l.vessels = 0.85f;
-  l.vesselTint = {1.9f, 0.36f, 0.45f};
-  l.bump = 0.30f;
-  l.detailScale = 15;
-  l.detail = {512, 7, 2.4f, -1.3f, 0, 0, 0};
+  l.vesselTint = {1.25f, 0.26f, 0.30f};
+  l.bump = 0.42f;
+  l.detailScale = 17;
+  l.detail = {512, 11, 2.2f, -1.3f, 0, 0, 0};
   return l;
 }
 
@@ -58,6 +66,10 @@ Look stomach() {
   l.mottleFrequency = 22;
   l.patches[0] = {{0.86f, 0.56f, 0.22f}, 22, 3, 1, {}, 0.60f, 0.74f, 0.5f};
   l.wrap = {0.45f, 0.20f, 0.14f};
+  l.glow = {0.42f, 0.11f, 0.065f};
+  l.glowDepth = 0.005f;
+  l.blood = 0.8f;
+  l.bloodless = {0.78f, 0.60f, 0.46f};
   l.roughness = 0.42f;
   l.wetRoughness = 0.14f;
   l.mottle = 0.55f;
@@ -77,6 +89,8 @@ Look gut() {
   l.albedoHigh = {0.66f, 0.30f, 0.235f};
   l.mottleFrequency = 30;
   l.patches[0] = {{0.60f, 0.14f, 0.12f}, 34, 5, 1, {}, 0.52f, 0.72f, 0.45f};
+  l.glow = {0.52f, 0.14f, 0.085f};
+  l.glowDepth = 0.005f;
   l.vessels = 0.85f;
   l.vesselTint = {0.68f, 0.12f, 0.18f};
   l.bump = 0.42f;
@@ -92,7 +106,9 @@ Look colon() {
   l.name = "colon";
   l.albedoLow = {0.34f, 0.172f, 0.130f};
   l.albedoHigh = {0.52f, 0.315f, 0.245f};
-  l.patches[0] = {{0.74f, 0.45f, 0.14f}, 26, 8, 1, {}, 0.58f, 0.66f, 0.85f};
+  l.patches[0] = {{0.72f, 0.42f, 0.15f}, 38, 8, 1, {}, 0.54f, 0.72f, 0.75f};
+  l.glow = {0.42f, 0.17f, 0.10f};
+  l.glowDepth = 0.005f;
   l.vessels = 0.75f;
   l.bump = 0.38f;
   l.specular = 0.8f;
@@ -109,6 +125,10 @@ Look fat() {
   l.mottleFrequency = 22;
   l.patches[0] = {{0.50f, 0.15f, 0.08f}, 22, 3, -1, {}, -0.47f, -0.36f, 0.55f};
   l.wrap = {0.34f, 0.26f, 0.10f};
+  l.glow = {0.50f, 0.27f, 0.05f};
+  l.glowDepth = 0.005f;
+  l.blood = 0.7f;
+  l.bloodless = {0.80f, 0.58f, 0.26f};
   l.roughness = 0.38f;
   l.wetRoughness = 0.14f;
   l.mottle = 0.75f;
@@ -120,7 +140,7 @@ Look fat() {
   l.unrollRadius = 0.006f;
   l.unrollTilt = 0.96f;  // lies flat, seen from above its front
   l.castsShadow = false;
-  l.detail = {512, 7, 2.0f, 0.9f, 19, 0.13f, 0.30f};
+  l.detail = {512, 9, 2.0f, 0.9f, 19, 0.07f, 0.20f};
   return l;
 }
 
@@ -214,6 +234,8 @@ Look candy(const std::string& colourName, vec3 albedo) {
   l.albedoLow = 0.9f * albedo;
   l.albedoHigh = albedo;
   l.wrap = vec3(0.15f) + 0.2f * albedo;
+  l.glow = 0.5f * albedo;
+  l.glowDepth = 0.012f;
   l.roughness = 0.34f;
   l.wetRoughness = 0.20f;
   l.specular = 0.8f;

@@ -39,6 +39,10 @@ struct Look {
   float mottleFrequency = 22;                   // 1/m
   std::array<Patch, 4> patches;
   glm::vec3 wrap{0};          // 0..1 per channel: light that bleeds past the terminator (subsurface scattering)
+  glm::vec3 glow{0};          // linear RGB: light that comes through where the tissue is thin
+  float glowDepth = 0.004f;   // m of tissue that let 1/e of it through
+  float blood = 0;            // 0..1: share of the colour that pressure and stretch drive out
+  glm::vec3 bloodless{0.56f, 0.44f, 0.33f};  // linear RGB, without it
   float roughness = 0.4f;     // of the tissue's own highlight
   float wetRoughness = 0.2f;  // of the film of fluid over it
   float specular = 1;         // factor on the highlights: 0 matt, 1 wet tissue, more: metal

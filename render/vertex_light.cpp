@@ -14,7 +14,6 @@ using glm::vec3;
 // surfaces, and the veil of moist air.
 constexpr vec3 kAmbientBelow(0.070f, 0.022f, 0.018f), kAmbientAbove(0.130f, 0.075f, 0.065f);
 constexpr vec3 kRimLight(0.10f, 0.045f, 0.035f), kVeil(0.085f, 0.022f, 0.016f);
-constexpr vec3 kBlanched(0.56f, 0.44f, 0.33f);
 
 // Reflectance at normal incidence of a film of water, a little raised (Schlick 1994).
 constexpr float kFilmReflectance = 0.035f;
@@ -41,7 +40,7 @@ struct Shading {
   vec3 veilColour;
   float falloff;  // light's distance and cone
   vec3 albedo;
-  float openness;
+  float openness, thinness;
 };
 
 Shading shadingOf(const SceneMesh& mesh, const Look& look, std::size_t i, vec3 picture, const Surroundings& s) {
@@ -67,8 +66,11 @@ Shading shadingOf(const SceneMesh& mesh, const Look& look, std::size_t i, vec3 p
   v.veilLight = s.haze ? vignette : v.exposure;
   v.veilColour = s.haze ? s.haze->toward(-v.toEye) : kVeil;
   const float blanch = mesh.blanch[i];
-  v.albedo = glm::mix(mesh.albedo[i], kBlanched, 0.75f * blanch);
-  v.openness = mesh.openness[i] * (1 - 0.3f * blanch);
+  const vec3 dammed(0.86f, 0.62f, 0.62f);  // factor on the albedo of tissue full of blood
+  v.albedo = blanch > 0 ? glm::mix(mesh.albedo[i], look.bloodless, look.blood * blanch)
+                        : mesh.albedo[i] * glm::mix(vec3(1), dammed, -blanch * look.blood);
+  v.openness = mesh.openness[i];
+  v.thinness = mesh.thinness[i];
   return v;
 }
 
@@ -84,6 +86,11 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
   const float crease = look.ambient > 0 ? 0.55f + 0.45f * v.openness : 1.f;
   out.direct = v.albedo * diffuse * s.lamp * (v.falloff * visible * crease);
   const vec3 sky = glm::mix(s.below, s.above, v.normal.y * 0.5f + 0.5f) * v.openness;
+  // Light that came in elsewhere and leaves where the tissue is thin, most of it sideways.
+  if (v.thinness > 0) {
+    const float grazing = 1 - std::max(glm::dot(v.normal, v.toEye), 0.f);
+    out.direct += look.glow * s.lamp * (v.thinness * (0.35f + 0.65f * grazing) * v.falloff * visible);
+  }
   const vec3 rim = s.rim * (fresnelEdge(v) * v.openness * 0.8f * std::min(v.falloff, 1.5f));
   out.ambient = (v.albedo * sky * 1.2f + rim) * (visible * look.ambient);
 }
@@ -193,7 +200,7 @@ Shading lightVertex(const SceneMesh& mesh, const Look& look, std::size_t i, vec3
                     LitVertex& o) {
   o.position = mesh.position[i];
   o.uv = mesh.uv[i];
-  o.detail = 1 - mesh.blanch[i];
+  o.detail = 1 - look.blood * mesh.blanch[i] * std::max(mesh.blanch[i], 0.f);
   const Shading v = shadingOf(mesh, look, i, picture, s);
   if (look.metal)
     lightMetal(v, o);
