@@ -36,14 +36,14 @@ Look liver() {
 Look gallbladder() {
   Look l;
   l.name = "gallbladder";
-  l.albedoLow = {0.040f, 0.070f, 0.038f};
-  l.albedoHigh = {0.225f, 0.235f, 0.118f};
+  l.albedoLow = {0.034f, 0.062f, 0.036f};
+  l.albedoHigh = {0.205f, 0.215f, 0.105f};
   l.mottleFrequency = 34;
   l.patches[0] = {{0.34f, 0.185f, 0.120f}, 60, 21, 1, {}, 0.44f, 0.68f, 0.52f};               // blood shining through
   l.patches[1] = {{0.33f, 0.130f, 0.085f}, 66, 9, 0.25f, {0, 1.1f, 0}, 0.62f, 1.15f, 0.85f};  // red neck
   l.patches[2] = {{0.62f, 0.40f, 0.13f}, 75, 40, 1, {0, 0.42f, 0}, 0.76f, 0.92f, 0.70f};      // fat
   l.wrap = {0.34f, 0.22f, 0.12f};
-  l.glow = {0.26f, 0.24f, 0.065f};
+  l.glow = {0.16f, 0.155f, 0.045f};
   l.glowDepth = 0.006f;
   l.blood = 0.8f;
   l.bloodless = {0.36f, 0.33f, 0.19f};
@@ -227,6 +227,25 @@ Look bowl() {
   return l;
 }
 
+// Oiled wood.
+Look wood() {
+  Look l;
+  l.name = "wood";
+  l.albedoLow = {0.30f, 0.165f, 0.085f};
+  l.albedoHigh = {0.40f, 0.235f, 0.130f};
+  l.mottleFrequency = 3;
+  l.roughness = 0.5f;
+  l.wetRoughness = 0.35f;
+  l.specular = 0.35f;
+  l.mottle = 0.35f;
+  l.bump = 0.10f;
+  l.detailScale = 2;
+  l.unrollTilt = 1.5708f;
+  l.castsShadow = false;
+  l.detail = {512, 0, 0, 0, 0, 0, 0};
+  return l;
+}
+
 // Soft toys of coloured jelly.
 Look candy(const std::string& colourName, vec3 albedo) {
   Look l;
@@ -288,7 +307,8 @@ const std::vector<Look>& looks() {
                                           bowl(),
                                           candy("red", {0.74f, 0.045f, 0.040f}),
                                           candy("yellow", {0.88f, 0.50f, 0.035f}),
-                                          candy("blue", {0.035f, 0.17f, 0.66f})};
+                                          candy("blue", {0.035f, 0.17f, 0.66f}),
+                                          wood()};
   return table;
 }
 

@@ -7,7 +7,7 @@ namespace medulla {
 
 void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part) {
   // Full effect of stretch at this share of area gained, or lost; of a fold per slope.
-  constexpr float kStretch = 1.1f, kSqueeze = 0.8f, kFold = 1.6f, kDarkest = 0.55f;
+  constexpr float kStretch = 1.8f, kSqueeze = 0.8f, kFold = 1.6f, kDarkest = 0.55f;
   for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
     const float gained = mesh.area[i] / std::max(rest.area[i], 1e-16f) - 1;
     mesh.blanch[i] = glm::clamp(gained / (gained > 0 ? kStretch : kSqueeze), -1.f, 0.4f);
