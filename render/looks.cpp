@@ -231,9 +231,9 @@ Look bowl() {
 Look wood() {
   Look l;
   l.name = "wood";
-  l.albedoLow = {0.30f, 0.165f, 0.085f};
-  l.albedoHigh = {0.40f, 0.235f, 0.130f};
-  l.mottleFrequency = 3;
+  l.albedoLow = {0.120f, 0.056f, 0.026f};
+  l.albedoHigh = {0.215f, 0.110f, 0.054f};
+  l.mottleFrequency = 5;
   l.roughness = 0.5f;
   l.wetRoughness = 0.35f;
   l.specular = 0.35f;
