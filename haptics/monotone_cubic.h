@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
-// A smooth way through keys: structs with a strictly increasing `time`. Without a step of velocity, without overshoot on
-// any axis, at rest at both ends.
+// A smooth way through keys: structs with a strictly increasing `time`. Without a step of velocity, without overshoot
+// on any axis, at rest at both ends.
 namespace medulla {
 
 // Tangent at a key between the secants to its two neighbours: the parabola through the three keys (the non-uniform

@@ -8,9 +8,9 @@
 namespace medulla {
 namespace {
 
-// Vessel trees grown on the torus of texels, the widest tip first, so that trunks have their room before twigs fill what
-// is left. A vessel keeps its heading, winds about it, thins at each fork after Murray (1926), r0^3 = r1^3 + r2^3, and
-// turns away from, or ends before, any other: vessels of one layer do not cross.
+// Vessel trees grown on the torus of texels, the widest tip first, so that trunks have their room before twigs fill
+// what is left. A vessel keeps its heading, winds about it, thins at each fork after Murray (1926), r0^3 = r1^3 + r2^3,
+// and turns away from, or ends before, any other: vessels of one layer do not cross.
 class VesselPainter {
  public:
   VesselPainter(const DetailPattern& pattern, int seed)

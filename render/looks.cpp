@@ -17,17 +17,17 @@ Look liver() {
   l.albedoHigh = {0.235f, 0.047f, 0.029f};
   l.mottleFrequency = 22;
   l.wrap = {0.24f, 0.07f, 0.05f};
-  l.glow = {0.34f, 0.040f, 0.020f};
-  l.glowDepth = 0.006f;
+  l.glow = {0.46f, 0.055f, 0.024f};
+  l.glowDepth = 0.008f;
   l.blood = 0.75f;
   l.bloodless = {0.36f, 0.185f, 0.120f};
-  l.roughness = 0.36f;
+  l.roughness = 0.40f;
   l.wetRoughness = 0.13f;
   l.mottle = 0.95f;
   l.vessels = 0.10f;
   l.vesselTint = {1.3f, 0.6f, 0.6f};
-  l.bump = 0.28f;  // more and the highlight crinkles like foil
-  l.specular = 0.66f;
+  l.bump = 0.33f;  // more and the highlight crinkles like foil
+  l.specular = 0.85f;
   l.detailScale = 11;
   l.detail = {1024, 3, 1.2f, 0.4f, 74, 0.10f, 0};
   return l;
@@ -106,7 +106,7 @@ Look colon() {
   l.name = "colon";
   l.albedoLow = {0.34f, 0.172f, 0.130f};
   l.albedoHigh = {0.52f, 0.315f, 0.245f};
-  l.patches[0] = {{0.72f, 0.42f, 0.15f}, 38, 8, 1, {}, 0.54f, 0.72f, 0.75f};
+  l.patches[0] = {{0.64f, 0.33f, 0.105f}, 38, 8, 1, {}, 0.54f, 0.72f, 0.7f};
   l.glow = {0.42f, 0.17f, 0.10f};
   l.glowDepth = 0.005f;
   l.vessels = 0.75f;
@@ -153,11 +153,11 @@ Look wall() {
   l.patches[0] = {{0.88f, 0.58f, 0.20f}, 11, 2, 1, {}, 0.50f, 0.66f, 0.8f};
   l.wrap = {0.40f, 0.16f, 0.10f};
   l.roughness = 0.42f;
-  l.wetRoughness = 0.14f;
+  l.wetRoughness = 0.19f;
   l.mottle = 0.60f;
   l.vessels = 0.60f;
   l.vesselTint = {0.75f, 0.20f, 0.25f};
-  l.bump = 0.30f;
+  l.bump = 0.20f;
   l.specular = 0.35f;
   l.detailScale = 5.0f;
   l.castsShadow = false;

@@ -64,7 +64,8 @@ vec3 spiralDirection(int k) {
 
 // Averages values of vertices over the edges of triangles `first` to `last` of the mesh's index.
 template <class Value>
-void smoothOverEdges(const SceneMesh& mesh, std::size_t first, std::size_t last, int passes, std::vector<Value>& value) {
+void smoothOverEdges(const SceneMesh& mesh, std::size_t first, std::size_t last, int passes,
+                     std::vector<Value>& value) {
   std::vector<Value> sum;
   std::vector<float> weight(value.size());
   for (int pass = 0; pass < passes; ++pass) {
@@ -88,7 +89,7 @@ bool occludes(const MeshPart& part) {
 
 // Cosine-weighted sums over directions, per vertex.
 struct Gathered {
-  std::vector<float> light, total;        // outside: unhindered, and all
+  std::vector<float> light, total;           // outside: unhindered, and all
   std::vector<float> through, totalThrough;  // inside: what comes through the tissue, and all
 };
 

@@ -111,7 +111,7 @@ void lightMetal(const Shading& v, vec3 tangent, LitVertex& out) {
   const float streak = smoothStep(0.90f, 1.0f, glm::dot(v.normal, across) / std::max(glm::length(across), 1e-3f));
   const float edge = facing < 0 ? 0.f : fresnelEdge(v);
   out.direct = v.albedo * (std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 0.10f * visible);
-  out.ambient = ((v.albedo * 1.15f + 0.022f + 0.10f * edge) * cavity + (0.45f * v.albedo + 0.05f) * streak) *
+  out.ambient = ((v.albedo * 1.15f + 0.022f + 0.10f * edge) * cavity + (0.45f * v.albedo + 0.09f) * streak) *
                 (v.openness * visible * std::min(v.falloff, 1.4f));
 }
 
