@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "app/files/input_error.h"
+#include "haptics/monotone_cubic.h"
 
 namespace medulla {
 
@@ -109,6 +110,7 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   constexpr double kOpenJaw = 0.38, kClosedJaw = 0.03;  // rad
   instrument.jawAngle = float(kClosedJaw + (kOpenJaw - kClosedJaw) * std::max(0.0, 1 - 2 * input.grip));
   instrument.touching = state.inContact || state.holding;
+  instrument.holding = state.holding;
   picture.instruments.push_back(instrument);
   if (!options.showProxy) return;
   picture.balls.push_back({toGlm(state.proxy), float(tool.settings.radius), kProxyColour});
@@ -151,17 +153,20 @@ void evaluateRenderSurface(const RenderSurface& surface, const std::vector<Eigen
 }
 
 Camera cameraAt(const std::vector<CameraKey>& keys, double time) {
-  std::size_t next = 0;
-  while (next < keys.size() && keys[next].time <= time) ++next;
-  const CameraKey& a = keys[next > 0 ? next - 1 : 0];
-  const CameraKey& b = keys[std::min(next, keys.size() - 1)];
-  const double span = b.time - a.time;
-  double u = span > 0 ? std::clamp((time - a.time) / span, 0.0, 1.0) : 0;
-  u = u * u * (3 - 2 * u);  // eases in and out of every key
+  std::size_t k = 0;
+  while (k + 1 < keys.size() && keys[k + 1].time <= time) ++k;
+  CameraKey at = keys[k];
+  if (k + 1 < keys.size() && time > at.time) {
+    const double s = (time - at.time) / (keys[k + 1].time - at.time);
+    const auto through = [&](const auto& value) { return cubicThrough(keys, k, s, value); };
+    at.position = through([](const CameraKey& key) { return key.position; });
+    at.target = through([](const CameraKey& key) { return key.target; });
+    at.fovDegrees = through([](const CameraKey& key) { return Eigen::Vector3d(key.fovDegrees, 0, 0); }).x();
+  }
   Camera camera;
-  camera.position = toGlm(blendPoint(a.position, b.position, u));
-  camera.target = toGlm(blendPoint(a.target, b.target, u));
-  camera.fovDegrees = float((1 - u) * a.fovDegrees + u * b.fovDegrees);
+  camera.position = toGlm(at.position);
+  camera.target = toGlm(at.target);
+  camera.fovDegrees = float(at.fovDegrees);
   return camera;
 }
 

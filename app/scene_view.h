@@ -37,7 +37,7 @@ class SceneView {
 void evaluateRenderSurface(const RenderSurface& surface, const std::vector<Eigen::Vector3d>& nodes,
                            std::vector<glm::vec3>& out);
 
-// Camera at a time: smooth through the keys, still before the first and after the last.
+// Camera at a time: through the keys without a step of velocity, still before the first and after the last.
 Camera cameraAt(const std::vector<CameraKey>& keys, double time);
 
 }  // namespace medulla

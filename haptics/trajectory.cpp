@@ -2,48 +2,12 @@
 #include <cassert>
 #include <cmath>
 
+#include "haptics/monotone_cubic.h"
 #include "haptics/tool_input.h"
 
 namespace medulla {
 
 using Eigen::Quaterniond, Eigen::Vector3d;
-
-// Tangent at a key between the secants to its two neighbours: the parabola through the three keys (the non-uniform
-// Catmull-Rom tangent), limited as Fritsch and Carlson 1980 show to be enough for a monotone cubic: zero where the
-// secants differ in sign or one vanishes, at most three times the flatter one. A device that rests between two equal
-// keys therefore rests exactly.
-static double limitedTangent(double before, double durationBefore, double after, double durationAfter) {
-  if (before * after <= 0) return 0;
-  const double parabola = (before * durationAfter + after * durationBefore) / (durationBefore + durationAfter);
-  const double limit = 3 * std::min(std::abs(before), std::abs(after));
-  return std::clamp(parabola, -limit, limit);
-}
-
-// Zero at both ends, because the device stands still outside of its recording. difference(a, b): what leads from one
-// key to the next.
-template <class Difference>
-static Vector3d tangentAt(const std::vector<ToolSample>& keys, std::size_t k, const Difference& difference) {
-  if (k == 0 || k + 1 == keys.size()) return Vector3d::Zero();
-  const double before = keys[k].time - keys[k - 1].time, after = keys[k + 1].time - keys[k].time;
-  const Vector3d secantBefore = difference(keys[k - 1], keys[k]) / before;
-  const Vector3d secantAfter = difference(keys[k], keys[k + 1]) / after;
-  Vector3d tangent;
-  for (int axis = 0; axis < 3; ++axis)
-    tangent[axis] = limitedTangent(secantBefore[axis], before, secantAfter[axis], after);
-  return tangent;
-}
-
-static Vector3d shift(const ToolSample& a, const ToolSample& b) {
-  return b.position - a.position;
-}
-
-static Vector3d positionBetween(const std::vector<ToolSample>& keys, std::size_t k, double s) {
-  const double duration = keys[k + 1].time - keys[k].time, s2 = s * s, s3 = s2 * s;
-  const Vector3d &p0 = keys[k].position, &p1 = keys[k + 1].position;
-  const Vector3d m0 = tangentAt(keys, k, shift), m1 = tangentAt(keys, k + 1, shift);
-  // p0 + h (p1 - p0) rather than two weights that sum to one only up to rounding: equal keys give exactly that key.
-  return p0 + (3 * s2 - 2 * s3) * (p1 - p0) + duration * ((s3 - 2 * s2 + s) * m0 + (s3 - s2) * m1);
-}
 
 // The short way, rad along its axis: the same in the frames of both keys.
 static Vector3d rotationVector(const Quaterniond& q) {
@@ -97,7 +61,7 @@ ToolSample sampleTrajectory(const Trajectory& trajectory, double time) {
   // At a key the key itself: what was recorded tick by tick is replayed to the bit.
   if (k + 1 < keys.size() && time > out.time) {
     const double s = (time - out.time) / (keys[k + 1].time - out.time);
-    out.position = positionBetween(keys, k, s);
+    out.position = cubicThrough(keys, k, s, [](const ToolSample& key) { return key.position; });
     out.worldFromTool = orientationBetween(keys, k, s);
     out.grip += s * (keys[k + 1].grip - out.grip);
   }

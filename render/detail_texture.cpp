@@ -8,107 +8,178 @@
 namespace medulla {
 namespace {
 
-constexpr int kMaxForks = 6;
-
-// Vessel trees grown by walkers on the torus of texels. A vessel keeps its heading (a wobble that returns to the mean:
-// plain random walks curl), and thins at each fork after Murray (1926): r0^3 = r1^3 + r2^3.
+// Vessel trees grown on the torus of texels, the widest tip first, so that trunks have their room before twigs fill
+// what is left. A vessel keeps its heading, winds about it, thins at each fork after Murray (1926), r0^3 = r1^3 + r2^3,
+// and turns away from, or ends before, any other: vessels of one layer do not cross.
 class VesselPainter {
  public:
   VesselPainter(const DetailPattern& pattern, int seed)
-      : side_(pattern.side), unit_(float(pattern.side) / 512), random_(seed), opacity_(side_ * side_, 0.f) {
+      : side_(pattern.side),
+        unit_(float(pattern.side) / 512),
+        bend_(pattern.vesselBend),
+        random_(seed),
+        opacity_(std::size_t(side_) * side_, 0.f),
+        owner_(opacity_.size(), 0) {
     for (int k = 0; k < pattern.vesselTrees; ++k) {
-      const float turn = random_.next() < 0.3f ? 3.1416f : 0.f;
-      const float heading = pattern.vesselHeading + (random_.next() - 0.5f) * 1.5f + turn;
-      const int row = k / 3;
-      // One tree per cell of a coarse grid: bare and crowded corners would betray the tile.
-      const float x = (float(k % 3) + 0.2f + 0.6f * random_.next()) * float(side_) / 3;
-      const float y = (float(row) + 0.2f + 0.6f * random_.next()) * float(side_) / 3;
-      grow({x, y, heading, heading, pattern.vesselWidth * (0.55f + 0.45f * random_.next()) * unit_, 0});
+      // The R2 sequence (Roberts 2018) is even on the torus for any count: bare and crowded corners would betray the
+      // tile.
+      const float x = std::fmod(0.5f + float(k) * 0.75487767f, 1.f), y = std::fmod(0.5f + float(k) * 0.56984029f, 1.f);
+      Tip t;
+      t.x = (x + 0.06f * random_.next()) * float(side_);
+      t.y = (y + 0.06f * random_.next()) * float(side_);
+      t.heading = pattern.vesselHeading + (random_.next() - 0.5f) * 1.1f + (random_.next() < 0.35f ? kPi : 0.f);
+      t.width = pattern.vesselWidth * (0.6f + 0.4f * random_.next()) * unit_;
+      t.trunk = true;
+      t.phase = 2 * kPi * random_.next();
+      push(t);
+    }
+    while (!tips_.empty()) {
+      std::pop_heap(tips_.begin(), tips_.end(), thinner);
+      const Tip t = tips_.back();
+      tips_.pop_back();
+      grow(t);
     }
   }
   const std::vector<float>& opacity() const { return opacity_; }
 
  private:
-  struct Walker {
-    float x, y, angle, heading, width;
-    int forks;
+  static constexpr float kPi = 3.14159265f;
+  struct Tip {
+    float x = 0, y = 0, heading = 0, width = 0;  // texels, rad
+    float phase = 0;                             // of the winding
+    float clear = 0;                             // texels until it must keep away from others: it leaves its parent
+    float age = 0;                               // texels
+    bool trunk = false;
+    std::uint16_t id = 0;
   };
+  static bool thinner(const Tip& a, const Tip& b) { return a.width != b.width ? a.width < b.width : a.id > b.id; }
 
-  void grow(Walker w) {
-    float wobble = 0, untilFork = (26 + 30 * random_.next()) * unit_ * (0.6f + 0.4f * w.width / unit_);
-    float turn = random_.next() < 0.5f ? -1.f : 1.f;
-    const float steps = (150 + 90 * random_.next()) * unit_ * std::min(1.f, 0.25f + w.width / (2.2f * unit_));
-    for (int step = 0; step < int(std::ceil(steps)); ++step) {
-      wobble += -0.06f * wobble + (random_.next() - 0.5f) * 0.11f;
-      w.angle += (w.heading - w.angle) * 0.012f;
-      const float angle = w.angle + wobble;
-      w.x += std::cos(angle);
-      w.y += std::sin(angle);
+  void push(Tip t) {
+    t.id = ++count_;
+    tips_.push_back(t);
+    std::push_heap(tips_.begin(), tips_.end(), thinner);
+  }
+
+  std::size_t texelAt(float x, float y) const {
+    const int px = int(std::floor(x)) % side_, py = int(std::floor(y)) % side_;
+    return std::size_t(py < 0 ? py + side_ : py) * side_ + (px < 0 ? px + side_ : px);
+  }
+  bool taken(const Tip& t, float angle, float ahead) const {
+    const std::uint16_t owner = owner_[texelAt(t.x + ahead * std::cos(angle), t.y + ahead * std::sin(angle))];
+    return owner != 0 && owner != t.id;
+  }
+
+  // From fork to fork, or to the end.
+  void grow(Tip t) {
+    const float thick = t.width / unit_;
+    const float length = (22 + 34 * random_.next()) * unit_ * (0.45f + 0.5f * thick);
+    // Thin vessels wind more, and in shorter waves.
+    const float amplitude = bend_ * 1.25f / (0.7f + 0.4f * thick), wave = (26 + 16 * thick) * unit_;
+    float drift = 0;
+    for (float s = 0; s < length; s += 1) {
+      drift += -0.05f * drift + (random_.next() - 0.5f) * 0.09f;
+      const float angle = t.heading + drift + amplitude * std::sin(t.phase + 2 * kPi * t.age / wave);
+      if (t.clear <= 0 && !steer(t, angle)) t.width *= 0.93f;
+      t.x += std::cos(angle);
+      t.y += std::sin(angle);
+      t.age += 1;
+      t.clear -= 1;
       // A trunk fades in as if it surfaced from the depth.
-      splat(w, w.forks ? 1.f : std::min(1.f, float(step) / (70 * unit_)));
-      w.width *= 0.9990f;
-      untilFork -= 1;
-      if (untilFork < 0 && w.forks < kMaxForks - 1) {
-        turn = -turn;
-        sideBranch(w, angle, turn);
-        untilFork = (18 + 34 * random_.next()) * unit_ * (0.5f + 0.5f * w.width / unit_);
-      }
-      if (w.width < 0.32f * unit_) return;
+      splat(t, t.trunk ? std::min(1.f, t.age / (60 * unit_)) : 1.f);
+      t.width *= 0.9992f;
+      if (t.width < kThinnest * unit_) return;
     }
-    if (w.forks >= kMaxForks || w.width < 0.5f * unit_) return;
-    grow({w.x, w.y, w.angle + 0.38f, w.heading + 0.30f, w.width * 0.78f, w.forks + 1});
-    grow({w.x, w.y, w.angle - 0.42f, w.heading - 0.30f, w.width * 0.70f, w.forks + 1});
+    fork(t);
   }
 
-  void sideBranch(Walker& w, float angle, float turn) {
-    const float ratio = 0.50f + 0.26f * random_.next();
-    if (w.width * ratio < 0.34f * unit_) return;
-    const float a = angle + turn * (0.55f + 0.35f * random_.next());
-    const float h = w.heading + turn * (0.25f + 0.25f * random_.next());
-    grow({w.x, w.y, a, h, w.width * ratio, w.forks + 1});
-    w.angle -= turn * 0.12f * ratio;
-    w.width *= std::cbrt(1 - 0.8f * ratio * ratio * ratio);
+  // False where there is no room ahead.
+  bool steer(Tip& t, float angle) {
+    const float near = t.width + 3 * unit_, far = 2.2f * near;
+    const bool left = taken(t, angle + 0.5f, far), right = taken(t, angle - 0.5f, far);
+    if (left != right) t.heading += left ? -0.035f / unit_ : 0.035f / unit_;
+    return !taken(t, angle, near);
   }
 
-  void splat(const Walker& w, float fade) {
-    const float strength = std::clamp(0.30f + w.width / unit_ * 0.30f, 0.f, 0.95f) * fade;
-    const int reach = int(std::ceil(w.width + 1.5f));
+  // A twig that leaves at a wide angle, or two branches of like width at a narrow one.
+  void fork(Tip t) {
+    const bool twig = random_.next() < (t.trunk ? 0.75f : 0.35f);
+    const float share = (twig ? 0.42f : 0.66f) + 0.2f * random_.next();
+    const float turn = random_.next() < 0.5f ? -1.f : 1.f, apart = 1.25f - 0.75f * share;
+    Tip branch = t;
+    branch.width = t.width * share;
+    branch.heading += turn * (apart + 0.25f * random_.next());
+    branch.trunk = false;
+    branch.clear = 2.2f * t.width + 2.5f * kClearance * unit_;
+    t.heading -= turn * 0.55f * share * share;
+    t.width *= std::cbrt(1 - share * share * share);
+    t.clear = branch.clear;
+    if (branch.width > kThinnest * unit_) {
+      branch.phase = 2 * kPi * random_.next();
+      push(branch);
+    }
+    if (t.width > kThinnest * unit_) push(t);
+  }
+
+  void splat(const Tip& t, float fade) {
+    const float strength = std::clamp(0.34f + t.width / unit_ * 0.30f, 0.f, 0.95f) * fade;
+    const float guard = t.width + kClearance * unit_;
+    const int reach = int(std::ceil(guard + 0.5f));
     for (int j = -reach; j <= reach; ++j)
       for (int i = -reach; i <= reach; ++i) {
-        const int px = int(std::floor(w.x)) + i, py = int(std::floor(w.y)) + j;
-        const float dx = float(px) - w.x, dy = float(py) - w.y;
-        const float cover = std::clamp(w.width + 0.5f - std::sqrt(dx * dx + dy * dy), 0.f, 1.f) * strength;
-        float& texel = opacity_[((py % side_ + side_) % side_) * side_ + (px % side_ + side_) % side_];
-        texel = std::max(texel, cover);
+        const std::size_t at = texelAt(t.x + float(i), t.y + float(j));
+        const float dx = std::floor(t.x + float(i)) + 0.5f - t.x, dy = std::floor(t.y + float(j)) + 0.5f - t.y;
+        const float distance = std::sqrt(dx * dx + dy * dy);
+        if (distance > guard) continue;
+        if (owner_[at] == 0) owner_[at] = t.id;
+        opacity_[at] = std::max(opacity_[at], std::clamp(t.width + 0.5f - distance, 0.f, 1.f) * strength);
       }
   }
 
+  static constexpr float kThinnest = 0.3f, kClearance = 3.5f;  // texels of a 512 tile
   int side_;
   float unit_;  // texels per texel of a 512 tile
+  float bend_;
   RandomSequence random_;
   std::vector<float> opacity_;
+  std::vector<std::uint16_t> owner_;  // 0: free
+  std::vector<Tip> tips_;             // heap
+  std::uint16_t count_ = 0;
 };
 
+// Adds amplitude * tiledNoise(period * x / side + shift, period * y / side, period, seed) to every texel. Row by row:
+// the lattice is blended along y once per lattice column instead of once per texel.
+void addNoise(int period, float shift, int seed, float amplitude, std::vector<float>& image, int side) {
+  std::vector<int> cell(side);
+  std::vector<float> share(side), column(period + 1);
+  const float scale = float(period) / float(side);
+  for (int x = 0; x < side; ++x) {
+    const float u = float(x) * scale + shift, floor = std::floor(u), t = u - floor;
+    cell[x] = int(floor) % period;
+    share[x] = t * t * (3 - 2 * t);
+  }
+  for (int y = 0; y < side; ++y) {
+    for (int k = 0; k < period; ++k) column[k] = amplitude * tiledNoise(float(k), float(y) * scale, period, seed);
+    column[period] = column[0];
+    float* row = &image[std::size_t(y) * side];
+    for (int x = 0; x < side; ++x) {
+      const float a = column[cell[x]];
+      row[x] += a + (column[cell[x] + 1] - a) * share[x];
+    }
+  }
+}
+
 // Lobules: distance to the border between cells whose grid is warped, so that no cell looks like its neighbour.
-float lobule(float u, float v, int cells) {
-  const float warpU = 0.9f / float(cells) * tiledNoise(u * 14, v * 14, 14, 61),
-              warpV = 0.9f / float(cells) * tiledNoise(u * 14, v * 14, 14, 62);
-  return smoothStep(0, 0.5f, tiledCells((u + warpU) * float(cells), (v + warpV) * float(cells), cells, 77));
-}
-
-float mottling(float u, float v, int seed, const DetailPattern& pattern) {
-  float sum = 0, amplitude = 0.5f;
-  for (int octave = 0, period = 4; octave < 6; ++octave, period *= 2, amplitude *= 0.5f)
-    sum += amplitude * tiledNoise(u * float(period), v * float(period), period, octave + 31 * seed);
-  if (pattern.cells == 0) return sum;
-  return glm::mix(sum, lobule(u, v, pattern.cells), pattern.cellContrast);
-}
-
-float relief(float u, float v, int seed, const DetailPattern& pattern) {
-  float sum = 0, amplitude = 0.5f;
-  for (int octave = 0, period = 20; octave < 4; ++octave, period *= 2, amplitude *= 0.5f)
-    sum += amplitude * tiledNoise(u * float(period) + 0.3f, v * float(period), period, 17 + octave + 31 * seed);
-  return pattern.cellRelief > 0 ? sum + pattern.cellRelief * lobule(u, v, pattern.cells) : sum;
+std::vector<float> lobules(const DetailPattern& pattern) {
+  const int n = pattern.side, cells = pattern.cells;
+  std::vector<float> out(std::size_t(n) * n, 0.f), warpU = out, warpV = out;
+  if (cells == 0) return out;
+  addNoise(14, 0, 61, 0.9f, warpU, n);
+  addNoise(14, 0, 62, 0.9f, warpV, n);
+  const float scale = float(cells) / float(n);
+  for (int y = 0, i = 0; y < n; ++y)
+    for (int x = 0; x < n; ++x, ++i)
+      out[i] = smoothStep(0, 0.5f, tiledCells(float(x) * scale + warpU[i], float(y) * scale + warpV[i], cells, 77));
+  return out;
 }
 
 std::uint8_t toByte(float v) {
@@ -120,20 +191,25 @@ std::uint8_t toByte(float v) {
 std::vector<std::uint8_t> makeDetailTexture(const DetailPattern& pattern, int seed) {
   const int n = pattern.side;
   const VesselPainter vessels(pattern, seed + 3);
-  std::vector<float> height(n * n);
+  const std::vector<float> lobule = lobules(pattern);
+  std::vector<float> mottling(lobule.size(), 0.f), height = mottling;
+  for (int octave = 0; octave < 6; ++octave)
+    addNoise(4 << octave, 0, octave + 31 * seed, 0.5f / float(1 << octave), mottling, n);
+  for (int octave = 0; octave < 4; ++octave)
+    addNoise(20 << octave, 0.3f, 17 + octave + 31 * seed, 0.5f / float(1 << octave), height, n);
   // Vessels stand out a little, but not among lobules: there they read as scratches.
   const float vesselHeight = pattern.cellContrast > 0 ? 0.f : 0.05f;
-  for (int y = 0; y < n; ++y)
-    for (int x = 0; x < n; ++x)
-      height[y * n + x] =
-          relief(float(x) / float(n), float(y) / float(n), seed, pattern) + vesselHeight * vessels.opacity()[y * n + x];
+  for (std::size_t i = 0; i < height.size(); ++i) {
+    mottling[i] = glm::mix(mottling[i], lobule[i], pattern.cellContrast);
+    height[i] += pattern.cellRelief * lobule[i] + vesselHeight * vessels.opacity()[i];
+  }
   const auto at = [&](int x, int y) { return height[((y + n) % n) * n + (x + n) % n]; };
   const float slope = 6 * float(n) / 512;
   std::vector<std::uint8_t> out(4ul * n * n);
   for (int y = 0; y < n; ++y)
     for (int x = 0; x < n; ++x) {
       std::uint8_t* texel = &out[4ul * (y * n + x)];
-      texel[0] = toByte(mottling(float(x) / float(n), float(y) / float(n), seed, pattern));
+      texel[0] = toByte(mottling[y * n + x]);
       texel[1] = toByte(vessels.opacity()[y * n + x]);
       texel[2] = toByte((at(x + 1, y) - at(x - 1, y)) * slope * 0.5f + 0.5f);
       texel[3] = toByte((at(x, y + 1) - at(x, y - 1)) * slope * 0.5f + 0.5f);

@@ -51,7 +51,7 @@ vec3 HazeField::toward(vec3 direction) const {
   const glm::vec2 on = about * (kShafts / length);
   const float wide = valueNoise({on.x, on.y, kDrift * time_}),
               fine = valueNoise({2.7f * on.x, 2.7f * on.y, 20 + 1.6f * kDrift * time_});
-  const float fade = smoothStep(-0.25f, 0.55f, glm::dot(direction, lamp_));
+  const float fade = smoothStep(-0.5f, 0.5f, glm::dot(direction, lamp_));
   return level * (1 + shafts_ * fade * (1.1f * wide + 0.7f * fine - 0.9f));
 }
 

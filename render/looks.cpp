@@ -17,13 +17,17 @@ Look liver() {
   l.albedoHigh = {0.235f, 0.047f, 0.029f};
   l.mottleFrequency = 22;
   l.wrap = {0.24f, 0.07f, 0.05f};
-  l.roughness = 0.36f;
+  l.glow = {0.46f, 0.055f, 0.024f};
+  l.glowDepth = 0.008f;
+  l.blood = 0.75f;
+  l.bloodless = {0.36f, 0.185f, 0.120f};
+  l.roughness = 0.40f;
   l.wetRoughness = 0.13f;
   l.mottle = 0.95f;
   l.vessels = 0.10f;
   l.vesselTint = {1.3f, 0.6f, 0.6f};
-  l.bump = 0.28f;  // more and the highlight crinkles like foil
-  l.specular = 0.66f;
+  l.bump = 0.33f;  // more and the highlight crinkles like foil
+  l.specular = 0.85f;
   l.detailScale = 11;
   l.detail = {1024, 3, 1.2f, 0.4f, 74, 0.10f, 0};
   return l;
@@ -32,21 +36,25 @@ Look liver() {
 Look gallbladder() {
   Look l;
   l.name = "gallbladder";
-  l.albedoLow = {0.060f, 0.088f, 0.042f};
-  l.albedoHigh = {0.235f, 0.222f, 0.108f};
+  l.albedoLow = {0.034f, 0.062f, 0.036f};
+  l.albedoHigh = {0.205f, 0.215f, 0.105f};
   l.mottleFrequency = 34;
   l.patches[0] = {{0.34f, 0.185f, 0.120f}, 60, 21, 1, {}, 0.44f, 0.68f, 0.52f};               // blood shining through
   l.patches[1] = {{0.33f, 0.130f, 0.085f}, 66, 9, 0.25f, {0, 1.1f, 0}, 0.62f, 1.15f, 0.85f};  // red neck
   l.patches[2] = {{0.62f, 0.40f, 0.13f}, 75, 40, 1, {0, 0.42f, 0}, 0.76f, 0.92f, 0.70f};      // fat
   l.wrap = {0.34f, 0.22f, 0.12f};
+  l.glow = {0.16f, 0.155f, 0.045f};
+  l.glowDepth = 0.006f;
+  l.blood = 0.8f;
+  l.bloodless = {0.36f, 0.33f, 0.19f};
   l.roughness = 0.37f;
   l.wetRoughness = 0.17f;
-  l.mottle = 0.70f;
+  l.mottle = 1.0f;
   l.vessels = 0.85f;
-  l.vesselTint = {1.9f, 0.36f, 0.45f};
-  l.bump = 0.30f;
-  l.detailScale = 15;
-  l.detail = {512, 6, 2.4f, -1.3f, 0, 0, 0};
+  l.vesselTint = {1.25f, 0.26f, 0.30f};
+  l.bump = 0.42f;
+  l.detailScale = 17;
+  l.detail = {512, 11, 2.2f, -1.3f, 0, 0, 0};
   return l;
 }
 
@@ -58,6 +66,10 @@ Look stomach() {
   l.mottleFrequency = 22;
   l.patches[0] = {{0.86f, 0.56f, 0.22f}, 22, 3, 1, {}, 0.60f, 0.74f, 0.5f};
   l.wrap = {0.45f, 0.20f, 0.14f};
+  l.glow = {0.42f, 0.11f, 0.065f};
+  l.glowDepth = 0.005f;
+  l.blood = 0.8f;
+  l.bloodless = {0.78f, 0.60f, 0.46f};
   l.roughness = 0.42f;
   l.wetRoughness = 0.14f;
   l.mottle = 0.55f;
@@ -65,7 +77,7 @@ Look stomach() {
   l.vesselTint = {0.78f, 0.16f, 0.25f};
   l.bump = 0.50f;
   l.detailScale = 8.4f;
-  l.detail = {1024, 7, 2.6f, -0.6f, 0, 0, 0};
+  l.detail = {1024, 10, 2.6f, -0.6f, 0, 0, 0};
   return l;
 }
 
@@ -77,12 +89,14 @@ Look gut() {
   l.albedoHigh = {0.66f, 0.30f, 0.235f};
   l.mottleFrequency = 30;
   l.patches[0] = {{0.60f, 0.14f, 0.12f}, 34, 5, 1, {}, 0.52f, 0.72f, 0.45f};
+  l.glow = {0.52f, 0.14f, 0.085f};
+  l.glowDepth = 0.005f;
   l.vessels = 0.85f;
   l.vesselTint = {0.68f, 0.12f, 0.18f};
   l.bump = 0.42f;
   l.specular = 1.1f;
   l.detailScale = 11;
-  l.detail = {1024, 9, 2.0f, 1.2f, 0, 0, 0};
+  l.detail = {1024, 12, 2.0f, 1.2f, 0, 0, 0};
   return l;
 }
 
@@ -92,7 +106,9 @@ Look colon() {
   l.name = "colon";
   l.albedoLow = {0.34f, 0.172f, 0.130f};
   l.albedoHigh = {0.52f, 0.315f, 0.245f};
-  l.patches[0] = {{0.74f, 0.45f, 0.14f}, 26, 8, 1, {}, 0.58f, 0.66f, 0.85f};
+  l.patches[0] = {{0.64f, 0.33f, 0.105f}, 38, 8, 1, {}, 0.54f, 0.72f, 0.7f};
+  l.glow = {0.42f, 0.17f, 0.10f};
+  l.glowDepth = 0.005f;
   l.vessels = 0.75f;
   l.bump = 0.38f;
   l.specular = 0.8f;
@@ -109,6 +125,10 @@ Look fat() {
   l.mottleFrequency = 22;
   l.patches[0] = {{0.50f, 0.15f, 0.08f}, 22, 3, -1, {}, -0.47f, -0.36f, 0.55f};
   l.wrap = {0.34f, 0.26f, 0.10f};
+  l.glow = {0.50f, 0.27f, 0.05f};
+  l.glowDepth = 0.005f;
+  l.blood = 0.7f;
+  l.bloodless = {0.80f, 0.58f, 0.26f};
   l.roughness = 0.38f;
   l.wetRoughness = 0.14f;
   l.mottle = 0.75f;
@@ -120,7 +140,7 @@ Look fat() {
   l.unrollRadius = 0.006f;
   l.unrollTilt = 0.96f;  // lies flat, seen from above its front
   l.castsShadow = false;
-  l.detail = {512, 7, 2.0f, 0.9f, 19, 0.13f, 0.30f};
+  l.detail = {512, 9, 2.0f, 0.9f, 19, 0.07f, 0.20f};
   return l;
 }
 
@@ -133,16 +153,16 @@ Look wall() {
   l.patches[0] = {{0.88f, 0.58f, 0.20f}, 11, 2, 1, {}, 0.50f, 0.66f, 0.8f};
   l.wrap = {0.40f, 0.16f, 0.10f};
   l.roughness = 0.42f;
-  l.wetRoughness = 0.14f;
+  l.wetRoughness = 0.19f;
   l.mottle = 0.60f;
   l.vessels = 0.60f;
   l.vesselTint = {0.75f, 0.20f, 0.25f};
-  l.bump = 0.30f;
+  l.bump = 0.20f;
   l.specular = 0.35f;
   l.detailScale = 5.0f;
   l.castsShadow = false;
   l.encloses = true;
-  l.detail = {1024, 6, 2.2f, 0.4f, 0, 0, 0};
+  l.detail = {1024, 10, 2.4f, 0.4f, 0, 0, 0};
   return l;
 }
 
@@ -207,6 +227,25 @@ Look bowl() {
   return l;
 }
 
+// Oiled wood.
+Look wood() {
+  Look l;
+  l.name = "wood";
+  l.albedoLow = {0.120f, 0.056f, 0.026f};
+  l.albedoHigh = {0.215f, 0.110f, 0.054f};
+  l.mottleFrequency = 5;
+  l.roughness = 0.5f;
+  l.wetRoughness = 0.35f;
+  l.specular = 0.35f;
+  l.mottle = 0.35f;
+  l.bump = 0.10f;
+  l.detailScale = 2;
+  l.unrollTilt = 1.5708f;
+  l.castsShadow = false;
+  l.detail = {512, 0, 0, 0, 0, 0, 0};
+  return l;
+}
+
 // Soft toys of coloured jelly.
 Look candy(const std::string& colourName, vec3 albedo) {
   Look l;
@@ -214,6 +253,8 @@ Look candy(const std::string& colourName, vec3 albedo) {
   l.albedoLow = 0.9f * albedo;
   l.albedoHigh = albedo;
   l.wrap = vec3(0.15f) + 0.2f * albedo;
+  l.glow = 0.5f * albedo;
+  l.glowDepth = 0.012f;
   l.roughness = 0.34f;
   l.wetRoughness = 0.20f;
   l.specular = 0.8f;
@@ -266,7 +307,8 @@ const std::vector<Look>& looks() {
                                           bowl(),
                                           candy("red", {0.74f, 0.045f, 0.040f}),
                                           candy("yellow", {0.88f, 0.50f, 0.035f}),
-                                          candy("blue", {0.035f, 0.17f, 0.66f})};
+                                          candy("blue", {0.035f, 0.17f, 0.66f}),
+                                          wood()};
   return table;
 }
 

@@ -30,6 +30,7 @@ struct DetailPattern {
   int cells = 0;            // lobules along a tile's side
   float cellContrast = 0;   // 0..1, share of the mottling they make
   float cellRelief = 0;     // 0..1, how far they bulge
+  float vesselBend = 0.4f;  // rad, how far vessels wind about their heading
 };
 
 struct Look {
@@ -37,21 +38,25 @@ struct Look {
   glm::vec3 albedoLow{0.5f}, albedoHigh{0.5f};  // linear RGB; noise at mottleFrequency mixes between them
   float mottleFrequency = 22;                   // 1/m
   std::array<Patch, 4> patches;
-  glm::vec3 wrap{0};          // 0..1 per channel: light that bleeds past the terminator (subsurface scattering)
-  float roughness = 0.4f;     // of the tissue's own highlight
-  float wetRoughness = 0.2f;  // of the film of fluid over it
-  float specular = 1;         // factor on the highlights: 0 matt, 1 wet tissue, more: metal
-  float mottle = 0;           // contrast of the detail texture's colour
-  float vessels = 0;          // 0..1 opacity
-  glm::vec3 vesselTint{1};    // factor on the albedo where a vessel runs
-  float bump = 0;             // slope of the wet film's micro relief
-  float detailScale = 10;     // tiles per m
-  float unrollRadius = 0;     // m, of the bumps the texture follows; 0: from the surface's volume and area
-  float unrollTilt = 0;       // rad about x, of the axis the texture is unrolled around (0: +z)
-  float ambient = 1;          // share of the cavity's light
-  bool metal = false;         // mirrors the cavity instead of scattering
-  bool castsShadow = true;    // what lies behind everything casts none worth its time
-  bool encloses = false;      // the cavity's wall: the ambient light comes from it
+  glm::vec3 wrap{0};         // 0..1 per channel: light that bleeds past the terminator (subsurface scattering)
+  glm::vec3 glow{0};         // linear RGB: light that comes through where the tissue is thin
+  float glowDepth = 0.004f;  // m of tissue that let 1/e of it through
+  float blood = 0;           // 0..1: share of the colour that pressure and stretch drive out
+  glm::vec3 bloodless{0.56f, 0.44f, 0.33f};  // linear RGB, without it
+  float roughness = 0.4f;                    // of the tissue's own highlight
+  float wetRoughness = 0.2f;                 // of the film of fluid over it
+  float specular = 1;                        // factor on the highlights: 0 matt, 1 wet tissue, more: metal
+  float mottle = 0;                          // contrast of the detail texture's colour
+  float vessels = 0;                         // 0..1 opacity
+  glm::vec3 vesselTint{1};                   // factor on the albedo where a vessel runs
+  float bump = 0;                            // slope of the wet film's micro relief
+  float detailScale = 10;                    // tiles per m
+  float unrollRadius = 0;   // m, of the bumps the texture follows; 0: from the surface's volume and area
+  float unrollTilt = 0;     // rad about x, of the axis the texture is unrolled around (0: +z)
+  float ambient = 1;        // share of the cavity's light
+  bool metal = false;       // mirrors the cavity instead of scattering
+  bool castsShadow = true;  // what lies behind everything casts none worth its time
+  bool encloses = false;    // the cavity's wall: the ambient light comes from it
   DetailPattern detail;
 };
 

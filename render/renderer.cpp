@@ -167,6 +167,7 @@ void Renderer::Data::placeSurfaces(const Picture& picture) {
       assert(positions.size() == part.vertexCount);
       std::copy(positions.begin(), positions.end(), mesh.position.begin() + first);
       computeNormals(mesh, part);
+      applyStrain(rest, mesh, part);
       computeTangents(mesh, part);
     } else {
       std::copy(rest.position.begin() + first, rest.position.begin() + last, mesh.position.begin() + first);

@@ -59,6 +59,7 @@ struct Instrument {
   glm::quat worldFromTool{1, 0, 0, 0};  // shaft along +z away from the tip, jaws open in its yz plane
   float jawAngle = 0.3f;                // rad, of each jaw from the axis
   bool touching = false;                // tissue blanches and dimples around the tip
+  bool holding = false;                 // it rises between the jaws instead
 };
 
 // Model view, after the paper's figures 2 and 11, and proxy and device.

@@ -20,20 +20,35 @@ void SceneMesh::resizeVertices(std::size_t count) {
   uv.resize(count);
   albedo.resize(count);
   openness.resize(count, 1.f);
+  thinness.resize(count, 0.f);
+  area.resize(count, 0.f);
+  hollow.resize(count, 0.f);
   blanch.resize(count, 0.f);
 }
 
 void computeNormals(SceneMesh& mesh, const MeshPart& part) {
-  const auto first = mesh.normal.begin() + part.firstVertex, last = first + part.vertexCount;
-  std::fill(first, last, glm::vec3(0));
+  const std::uint32_t last = part.firstVertex + part.vertexCount;
+  std::vector<glm::vec3>& around = mesh.tangent;  // scratch: the tangents follow
+  std::fill_n(mesh.normal.begin() + part.firstVertex, part.vertexCount, glm::vec3(0));
+  std::fill_n(around.begin() + part.firstVertex, part.vertexCount, glm::vec3(0));
   for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
     const std::uint32_t a = mesh.index[k], b = mesh.index[k + 1], c = mesh.index[k + 2];
-    const glm::vec3 n = glm::cross(mesh.position[b] - mesh.position[a], mesh.position[c] - mesh.position[a]);
+    const glm::vec3 pa = mesh.position[a], pb = mesh.position[b], pc = mesh.position[c], sum = pa + pb + pc;
+    const glm::vec3 n = glm::cross(pb - pa, pc - pa);
     mesh.normal[a] += n;
     mesh.normal[b] += n;
     mesh.normal[c] += n;
+    around[a] += sum - 3.f * pa;
+    around[b] += sum - 3.f * pb;
+    around[c] += sum - 3.f * pc;
   }
-  for (auto n = first; n != last; ++n) *n = normalizedOr(*n, {0, 0, 1});
+  for (std::uint32_t i = part.firstVertex; i < last; ++i) {
+    const glm::vec3 n = mesh.normal[i];
+    mesh.area[i] = glm::length(n);
+    mesh.normal[i] = normalizedOr(n, {0, 0, 1});
+    // Six even triangles of edge e: twice their area is 5.2 e^2, and each neighbour counts twice.
+    mesh.hollow[i] = glm::dot(mesh.normal[i], around[i]) * 0.19f / std::sqrt(std::max(mesh.area[i], 1e-16f));
+  }
 }
 
 void computeTangents(SceneMesh& mesh, const MeshPart& part) {

@@ -25,7 +25,10 @@ struct SceneMesh {
   std::vector<glm::vec2> uv;       // of the detail texture, 1 per tile; baked at rest, so that it sticks to the tissue
   std::vector<glm::vec3> albedo;   // linear RGB, baked at rest
   std::vector<float> openness;     // 0..1: share of the cavity's light that arrives (ambient occlusion), baked at rest
-  std::vector<float> blanch;       // 0..1: blood pressed out by an instrument
+  std::vector<float> thinness;     // 0..1: share of light that comes through from behind, baked at rest
+  std::vector<float> area;         // m^2, six times that of the vertex: twice its triangles'
+  std::vector<float> hollow;       // mean slope at which the surface rises around the vertex: > 0 in a fold
+  std::vector<float> blanch;       // 0..1: blood pressed out by an instrument or by stretch; < 0: dammed up
   std::vector<std::uint32_t> index;
   std::vector<MeshPart> parts;
 
@@ -34,7 +37,7 @@ struct SceneMesh {
 
 using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
-// Area-weighted vertex normals (Max's sum of cross products) of one part.
+// Area-weighted vertex normals (the sum of cross products) of one part, and what else its triangles tell: area, hollow.
 void computeNormals(SceneMesh& mesh, const MeshPart& part);
 // Tangents from the gradient of u over each triangle; needs normals.
 void computeTangents(SceneMesh& mesh, const MeshPart& part);

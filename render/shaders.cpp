@@ -99,13 +99,13 @@ uniform sampler2DShadow shadowMap;
 uniform float texel;
 uniform int squares;
 
-// Taps on three turned squares and in the middle. A rotation per pixel would hide their steps better but leaves a
+// Taps on three turned squares and in the middle, evenly apart seen along any edge, or it shows steps. A rotation per pixel would hide their steps better but leaves a
 // pattern. Most pixels agree on the widest square and are done: llvmpipe runs both sides of a branch but leaves a loop
 // when all its pixels do, so the squares are a loop whose length the compiler cannot know.
 float softShadow(vec3 q, float radius) {
   float r = radius * texel, sum = texture(shadowMap, q), taps = 1.;
   for (int k = 0; k < squares; ++k) {
-    vec2 d = r * (k == 0 ? vec2(.40, .90) : k == 1 ? vec2(.60, -.32) : vec2(.33, .10));
+    vec2 d = r * (k == 0 ? vec2(.24, .78) : k == 1 ? vec2(.40, .56) : vec2(.50, .30));
     sum += texture(shadowMap, q + vec3(d, 0)) + texture(shadowMap, q - vec3(d, 0)) +
            texture(shadowMap, q + vec3(-d.y, d.x, 0)) + texture(shadowMap, q + vec3(d.y, -d.x, 0));
     taps += 4.;

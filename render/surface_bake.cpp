@@ -53,7 +53,7 @@ vec3 mixClamped(vec3 a, vec3 b, float t) {
   return glm::mix(a, b, glm::clamp(t, 0.f, 1.f));
 }
 
-constexpr int kDirections = 64, kMapSide = 512;
+constexpr int kDirections = 64, kMapSide = 512, kUnrollPasses = 12;
 
 // Points of the golden spiral: even over the sphere for any count, no table.
 vec3 spiralDirection(int k) {
@@ -62,21 +62,24 @@ vec3 spiralDirection(int k) {
   return {r * std::cos(turn), r * std::sin(turn), z};
 }
 
-// Visibility is averaged over the edges twice: 64 directions leave bands otherwise.
-void smoothOpenness(SceneMesh& mesh) {
-  std::vector<float> sum(mesh.openness.size()), weight(mesh.openness.size());
-  for (int pass = 0; pass < 2; ++pass) {
-    sum = mesh.openness;
+// Averages values of vertices over the edges of triangles `first` to `last` of the mesh's index.
+template <class Value>
+void smoothOverEdges(const SceneMesh& mesh, std::size_t first, std::size_t last, int passes,
+                     std::vector<Value>& value) {
+  std::vector<Value> sum;
+  std::vector<float> weight(value.size());
+  for (int pass = 0; pass < passes; ++pass) {
+    sum = value;
     std::fill(weight.begin(), weight.end(), 1.f);
-    for (std::size_t k = 0; k < mesh.index.size(); k += 3)
+    for (std::size_t k = first; k < last; k += 3)
       for (int e = 0; e < 3; ++e) {
         const std::uint32_t a = mesh.index[k + e], b = mesh.index[k + (e + 1) % 3];
-        sum[a] += mesh.openness[b];
-        sum[b] += mesh.openness[a];
+        sum[a] += value[b];
+        sum[b] += value[a];
         weight[a] += 1;
         weight[b] += 1;
       }
-    for (std::size_t i = 0; i < sum.size(); ++i) mesh.openness[i] = sum[i] / weight[i];
+    for (std::size_t i = 0; i < sum.size(); ++i) value[i] = sum[i] / weight[i];
   }
 }
 
@@ -84,9 +87,16 @@ bool occludes(const MeshPart& part) {
   return !part.look->encloses && !part.instrument;
 }
 
-// Orthographic depth map of the scene seen against `direction`, and how much light each vertex gets along it.
+// Cosine-weighted sums over directions, per vertex.
+struct Gathered {
+  std::vector<float> light, total;           // outside: unhindered, and all
+  std::vector<float> through, totalThrough;  // inside: what comes through the tissue, and all
+};
+
+// Orthographic depth map of the scene seen against `direction`, and how much light each vertex gets along it: from
+// outside past what is in the way, from inside through it (Barre-Brisebois and Bouchard 2011, local thickness).
 void gatherDirection(const SceneMesh& mesh, vec3 centre, float radius, vec3 direction, DepthMap& map,
-                     std::vector<vec3>& texel, std::vector<float>& light, std::vector<float>& total) {
+                     std::vector<vec3>& texel, const std::vector<float>& perDepth, Gathered& sum) {
   const vec3 aside = std::abs(direction.x) < 0.7f ? vec3(1, 0, 0) : vec3(0, 1, 0);
   const vec3 right = glm::normalize(glm::cross(aside, direction)), up = glm::cross(direction, right);
   const float scale = 0.5f / radius;
@@ -104,13 +114,20 @@ void gatherDirection(const SceneMesh& mesh, vec3 centre, float radius, vec3 dire
   const float bias = 2.5f / kMapSide;  // two and a half texels
   for (std::size_t i = 0; i < texel.size(); ++i) {
     const float cosine = glm::dot(mesh.normal[i], direction);
-    if (cosine <= 0) continue;
-    total[i] += cosine;
+    if (cosine <= 0) {
+      if (perDepth[i] == 0) continue;
+      const int x = int(texel[i].x), y = int(texel[i].y);
+      if (x < 0 || y < 0 || x >= kMapSide || y >= kMapSide) continue;
+      sum.totalThrough[i] -= cosine;
+      sum.through[i] -= cosine * std::exp(-perDepth[i] * std::max(texel[i].z - map.at(x, y), 0.f));
+      continue;
+    }
+    sum.total[i] += cosine;
     // Reading one texel along the normal keeps the surface from hiding itself at grazing angles.
     const int x = int(texel[i].x + 1.5f * glm::dot(mesh.normal[i], right)),
               y = int(texel[i].y + 1.5f * glm::dot(mesh.normal[i], up));
     const bool outside = x < 0 || y < 0 || x >= kMapSide || y >= kMapSide;
-    if (outside || texel[i].z - bias <= map.at(x, y)) light[i] += cosine;
+    if (outside || texel[i].z - bias <= map.at(x, y)) sum.light[i] += cosine;
   }
 }
 
@@ -119,9 +136,13 @@ void gatherDirection(const SceneMesh& mesh, vec3 centre, float radius, vec3 dire
 void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
   const float c = std::cos(part.look->unrollTilt), s = std::sin(part.look->unrollTilt);
   const float radius = part.look->unrollRadius > 0 ? part.look->unrollRadius : meanRadius(mesh, part);
+  // Where the texture does not follow the bumps, they must not fold it.
+  std::vector<vec3> normal = mesh.normal;
+  if (part.look->unrollRadius <= 0)
+    smoothOverEdges(mesh, part.firstIndex, part.firstIndex + part.indexCount, kUnrollPasses, normal);
   const auto tilted = [c, s](vec3 v) { return vec3(v.x, c * v.y - s * v.z, s * v.y + c * v.z); };
   for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
-    mesh.uv[i] = unroll(tilted(mesh.position[i]), tilted(mesh.normal[i]), radius) * part.look->detailScale;
+    mesh.uv[i] = unroll(tilted(mesh.position[i]), tilted(glm::normalize(normal[i])), radius) * part.look->detailScale;
 }
 
 void bakeAlbedo(SceneMesh& mesh, const MeshPart& part) {
@@ -158,11 +179,21 @@ void bakeOpenness(SceneMesh& mesh) {
   const float radius = std::max(0.5f * glm::length(bounds.high - bounds.low), 1e-6f);
   DepthMap map(kMapSide);
   std::vector<vec3> texel(n);
-  std::vector<float> light(n, 0.f), total(n, 0.f);
+  const std::vector<float> zero(n, 0.f);
+  Gathered sum{zero, zero, zero, zero};
+  std::vector<float> perDepth = zero;  // of depths 0..1 of the map: how fast light fades in the tissue
+  for (const MeshPart& part : mesh.parts)
+    if (part.look->glow != vec3(0) && occludes(part))
+      std::fill_n(perDepth.begin() + part.firstVertex, part.vertexCount, 2 * radius / part.look->glowDepth);
   for (int k = 0; k < kDirections; ++k)
-    gatherDirection(mesh, centre, radius, spiralDirection(k), map, texel, light, total);
-  for (std::size_t i = 0; i < n; ++i) mesh.openness[i] = total[i] > 0 ? light[i] / total[i] : 1.f;
-  smoothOpenness(mesh);
+    gatherDirection(mesh, centre, radius, spiralDirection(k), map, texel, perDepth, sum);
+  for (std::size_t i = 0; i < n; ++i) {
+    mesh.openness[i] = sum.total[i] > 0 ? sum.light[i] / sum.total[i] : 1.f;
+    mesh.thinness[i] = sum.totalThrough[i] > 0 ? sum.through[i] / sum.totalThrough[i] : 0.f;
+  }
+  // 64 directions leave bands otherwise.
+  smoothOverEdges(mesh, 0, mesh.index.size(), 2, mesh.openness);
+  smoothOverEdges(mesh, 0, mesh.index.size(), 2, mesh.thinness);
 }
 
 }  // namespace medulla

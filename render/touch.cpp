@@ -5,26 +5,80 @@
 
 namespace medulla {
 
-void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
-  // m: widths of the Gaussians and depth of the dimple. The simulation moves nodes a centimetre apart; this is what
-  // happens between them.
-  constexpr float kDimpleWidth = 0.0055f, kBlanchWidth = 0.0050f, kDepth = 0.0012f, kFarthest = 0.02f;
-  const glm::vec3 push = instrument.worldFromTool * glm::vec3(0, 0, -1);
+void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part) {
+  // Full effect of stretch at this share of area gained, or lost; of a fold per slope.
+  constexpr float kStretch = 1.8f, kSqueeze = 0.8f, kFold = 1.6f, kDarkest = 0.55f;
+  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+    const float gained = mesh.area[i] / std::max(rest.area[i], 1e-16f) - 1;
+    mesh.blanch[i] = glm::clamp(gained / (gained > 0 ? kStretch : kSqueeze), -1.f, 0.4f);
+    const float deeper = mesh.hollow[i] - rest.hollow[i];
+    mesh.openness[i] *= 1 - glm::clamp(kFold * deeper, 0.f, kDarkest);
+  }
+}
+
+namespace {
+
+// x -> x + offset exp(-(x - centre)^2 / width^2), m. A normal turns to n - grad w (offset . n), up to length (inverse
+// transpose, first order).
+void displace(const MeshPart& part, glm::vec3 centre, glm::vec3 offset, float width, SceneMesh& mesh) {
+  constexpr float kShade = 1.8f;  // share of the cavity's light lost, per slope
+  for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+    const glm::vec3 d = mesh.position[i] - centre;
+    const float q = glm::dot(d, d) / (width * width);
+    if (q > 9) continue;
+    const float w = std::exp(-q);
+    const glm::vec3 gradient = d * (-2 * w / (width * width));
+    const float along = glm::dot(offset, mesh.normal[i]);
+    mesh.normal[i] = glm::normalize(mesh.normal[i] - gradient * along);
+    mesh.position[i] += offset * w;
+    if (along < 0) mesh.openness[i] *= std::max(1 + kShade * along * glm::length(gradient), 0.3f);
+  }
+}
+
+// The vertex of a moving part that is nearest to p, at most `reach` away; nullptr as part where there is none.
+struct Nearest {
+  const MeshPart* part = nullptr;
+  glm::vec3 position{0};
+};
+Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
+  Nearest nearest;
+  float best = reach * reach;
   for (const MeshPart& part : mesh.parts) {
-    if (part.instrument) continue;
+    if (!part.moving) continue;
     for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
-      const glm::vec3 d = mesh.position[i] - instrument.tip;
-      const float q = glm::dot(d, d);
-      if (q > kFarthest * kFarthest) continue;
-      const float w = kDepth * std::exp(-q / (kDimpleWidth * kDimpleWidth));
-      // Under x -> x + push w(x) a normal turns to n - grad w (push . n), up to length (inverse transpose, first
-      // order).
-      const glm::vec3 gradient = d * (-2 * w / (kDimpleWidth * kDimpleWidth));
-      glm::vec3& n = mesh.normal[i];
-      n = glm::normalize(n - gradient * glm::dot(push, n));
-      mesh.position[i] += push * w;
-      mesh.blanch[i] = std::max(mesh.blanch[i], std::exp(-q / (kBlanchWidth * kBlanchWidth)));
+      const glm::vec3 d = mesh.position[i] - p;
+      if (const float q = glm::dot(d, d); q < best) {
+        best = q;
+        nearest = {&part, mesh.position[i]};
+      }
     }
+  }
+  return nearest;
+}
+
+}  // namespace
+
+// The simulation moves nodes a centimetre apart; this is what happens between them.
+void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
+  constexpr float kWidth = 0.0055f, kBlanchWidth = 0.0050f, kPressed = 0.0014f;  // m
+  // A smooth surface stays behind the held nodes that it hangs on, up to kReach; the jaws bite kBite of it.
+  constexpr float kReach = 0.014f, kBite = 0.0035f;
+  const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, 1);
+  glm::vec3 blanched = instrument.tip;
+  if (instrument.holding) {
+    const Nearest held = nearestMoving(mesh, instrument.tip, kReach);
+    if (!held.part) return;
+    const glm::vec3 offset = instrument.tip + kBite * axis - held.position;
+    displace(*held.part, held.position, offset, std::max(kWidth, 1.3f * glm::length(offset)), mesh);
+    blanched += kBite * axis;
+  } else {
+    for (const MeshPart& part : mesh.parts)
+      if (!part.instrument) displace(part, instrument.tip, -kPressed * axis, kWidth, mesh);
+  }
+  for (std::size_t i = 0; i < mesh.position.size(); ++i) {
+    const glm::vec3 d = mesh.position[i] - blanched;
+    const float q = glm::dot(d, d) / (kBlanchWidth * kBlanchWidth);
+    if (q < 9) mesh.blanch[i] = std::max(mesh.blanch[i], std::exp(-q));
   }
 }
 

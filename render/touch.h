@@ -5,8 +5,13 @@
 
 namespace medulla {
 
+// What the part's deformation since `rest` does to its colour: stretched tissue pales, compressed tissue reddens, and
+// less of the cavity's light reaches into a fold. Changes blanch and openness.
+void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part);
+
 // Where an instrument touches: the tissue around its tip is pressed in softly along the instrument and loses its blood.
-// Changes positions, normals and blanch of the surfaces.
+// What a closed grip
+// holds comes up between its jaws instead. Changes positions, normals, openness and blanch of the surfaces.
 void applyTouch(const Instrument& instrument, SceneMesh& mesh);
 
 // The instrument's contact shadow: it hides part of the cavity from the surfaces near it. The lamp beside the lens

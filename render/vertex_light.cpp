@@ -14,7 +14,6 @@ using glm::vec3;
 // surfaces, and the veil of moist air.
 constexpr vec3 kAmbientBelow(0.070f, 0.022f, 0.018f), kAmbientAbove(0.130f, 0.075f, 0.065f);
 constexpr vec3 kRimLight(0.10f, 0.045f, 0.035f), kVeil(0.085f, 0.022f, 0.016f);
-constexpr vec3 kBlanched(0.56f, 0.44f, 0.33f);
 
 // Reflectance at normal incidence of a film of water, a little raised (Schlick 1994).
 constexpr float kFilmReflectance = 0.035f;
@@ -41,7 +40,7 @@ struct Shading {
   vec3 veilColour;
   float falloff;  // light's distance and cone
   vec3 albedo;
-  float openness;
+  float openness, thinness;
 };
 
 Shading shadingOf(const SceneMesh& mesh, const Look& look, std::size_t i, vec3 picture, const Surroundings& s) {
@@ -67,8 +66,11 @@ Shading shadingOf(const SceneMesh& mesh, const Look& look, std::size_t i, vec3 p
   v.veilLight = s.haze ? vignette : v.exposure;
   v.veilColour = s.haze ? s.haze->toward(-v.toEye) : kVeil;
   const float blanch = mesh.blanch[i];
-  v.albedo = glm::mix(mesh.albedo[i], kBlanched, 0.75f * blanch);
-  v.openness = mesh.openness[i] * (1 - 0.3f * blanch);
+  const vec3 dammed(0.86f, 0.62f, 0.62f);  // factor on the albedo of tissue full of blood
+  v.albedo = blanch > 0 ? glm::mix(mesh.albedo[i], look.bloodless, look.blood * blanch)
+                        : mesh.albedo[i] * glm::mix(vec3(1), dammed, -blanch * look.blood);
+  v.openness = mesh.openness[i];
+  v.thinness = mesh.thinness[i];
   return v;
 }
 
@@ -84,22 +86,33 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
   const float crease = look.ambient > 0 ? 0.55f + 0.45f * v.openness : 1.f;
   out.direct = v.albedo * diffuse * s.lamp * (v.falloff * visible * crease);
   const vec3 sky = glm::mix(s.below, s.above, v.normal.y * 0.5f + 0.5f) * v.openness;
+  // Light that came in elsewhere and leaves where the tissue is thin, most of it sideways.
+  if (v.thinness > 0) {
+    const float grazing = 1 - std::max(glm::dot(v.normal, v.toEye), 0.f);
+    out.direct += look.glow * s.lamp * (v.thinness * (0.35f + 0.65f * grazing) * v.falloff * visible);
+  }
   const vec3 rim = s.rim * (fresnelEdge(v) * v.openness * 0.8f * std::min(v.falloff, 1.5f));
   out.ambient = (v.albedo * sky * 1.2f + rim) * (visible * look.ambient);
 }
 
-// Steel mirrors the cavity: dim red below, pale above, and bands where lamp and lit organs would be.
-void lightMetal(const Shading& v, LitVertex& out) {
+// Polished metal and the sheath's lacquer mirror the cavity: dim red below, pale tissue above, black where the port and
+// the gaps between organs are, and the lamp's wide reflector, seen beside the lens.
+void lightMetal(const Shading& v, vec3 tangent, LitVertex& out) {
   const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
   const vec3 mirrored = 2.f * v.normal * facing - v.toEye;
-  const float above = mirrored.y * 0.5f + 0.5f;
-  const float band = 0.55f * smoothStep(0.80f, 0.99f, glm::dot(mirrored, v.toEye)) +
-                     0.45f * smoothStep(-0.75f, -0.35f, mirrored.x) * smoothStep(0.15f, -0.3f, mirrored.x);
-  const vec3 cavity =
-      vec3(0.05f, 0.018f, 0.014f) + vec3(0.16f, 0.085f, 0.07f) * (above * above) + vec3(0.55f, 0.53f, 0.50f) * band;
+  const float above = mirrored.y * 0.5f + 0.5f, toLamp = glm::dot(mirrored, v.toLight);
+  const float lamp = 0.9f * smoothStep(0.55f, 0.97f, toLamp) + 0.22f * smoothStep(-0.2f, 0.5f, toLamp);
+  const float gap = 1 - 0.75f * smoothStep(0.35f, 0.05f, std::abs(mirrored.y + 0.25f));
+  const vec3 cavity = (vec3(0.045f, 0.014f, 0.011f) + vec3(0.17f, 0.085f, 0.07f) * (above * above)) * gap +
+                      vec3(0.60f, 0.58f, 0.55f) * lamp;
+  // Brushed or drawn along its length, it shows the lamp as a streak (Kajiya and Kay 1989).
+  const vec3 along = glm::cross(v.normal, tangent), halfway = glm::normalize(v.toLight + v.toEye);
+  const vec3 across = halfway - along * glm::dot(halfway, along);
+  const float streak = smoothStep(0.90f, 1.0f, glm::dot(v.normal, across) / std::max(glm::length(across), 1e-3f));
   const float edge = facing < 0 ? 0.f : fresnelEdge(v);
-  out.direct = v.albedo * (std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 0.16f * visible);
-  out.ambient = (v.albedo * 1.1f + 0.010f + 0.06f * edge) * cavity * (v.openness * visible * std::min(v.falloff, 1.4f));
+  out.direct = v.albedo * (std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 0.10f * visible);
+  out.ambient = ((v.albedo * 1.15f + 0.022f + 0.10f * edge) * cavity + (0.45f * v.albedo + 0.09f) * streak) *
+                (v.openness * visible * std::min(v.falloff, 1.4f));
 }
 
 // Can the highlight be seen anywhere within the slopes of the relief? (Most pixels of tissue cannot: they go to a
@@ -193,10 +206,10 @@ Shading lightVertex(const SceneMesh& mesh, const Look& look, std::size_t i, vec3
                     LitVertex& o) {
   o.position = mesh.position[i];
   o.uv = mesh.uv[i];
-  o.detail = 1 - mesh.blanch[i];
+  o.detail = 1 - look.blood * mesh.blanch[i] * std::max(mesh.blanch[i], 0.f);
   const Shading v = shadingOf(mesh, look, i, picture, s);
   if (look.metal)
-    lightMetal(v, o);
+    lightMetal(v, mesh.tangent[i], o);
   else
     lightTissue(v, look, s, o);
   o.ambient += v.veilColour * (v.veil * v.veilLight * look.ambient);

@@ -344,6 +344,27 @@ TEST(Renderer, MovedSurfaceIsDrawnWhereItIsAndStaticOneReturns) {
   EXPECT_TRUE(compareImages(atRest, again).equal);
 }
 
+// Colour, texture and relief hang on the tissue: turned by half a turn together with the camera it is the same picture,
+// seen from where it was it is another.
+TEST(Renderer, TextureSticksToATurnedBody) {
+  RendererSettings settings = settingsOf(160, 160);
+  Renderer renderer(settings);
+  SurfaceShape organ = sphere("stomach", {0, 0, 0}, 0.03f, 48);
+  for (vec3& p : organ.restPositions) p.x *= 1.6f;
+  renderer.addSurface(organ);
+  Picture p = viewFromFront(0.2f);
+  Image rest, turned, back;
+  renderer.render(p, rest);
+  p.surfaces.resize(1);
+  p.surfaces[0].positions = organ.restPositions;
+  for (vec3& x : p.surfaces[0].positions) x = vec3(-x.x, x.y, -x.z);
+  renderer.render(p, back);
+  p.camera.position.z *= -1;
+  renderer.render(p, turned);
+  EXPECT_TRUE(withinTolerance(compareImages(rest, turned)));
+  EXPECT_FALSE(withinTolerance(compareImages(rest, back)));
+}
+
 TEST(Renderer, MovingSkinIsSeenThroughInBothAndStaticSkinIsNot) {
   Renderer renderer(settingsOf(64, 64));
   const SurfaceShape skin = sphere("matte", {0, 0, 0}, 0.03f);

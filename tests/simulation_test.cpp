@@ -73,4 +73,20 @@ TEST(SceneView, CameraStandsStillOutsideItsKeysAndPassesThroughThem) {
   EXPECT_NEAR(cameraAt({a, b}, 1).fovDegrees, 50, 1e-4);
 }
 
+// A key on the way is no stop: the camera passes it as fast after as before, and never leaves the keys' range.
+TEST(SceneView, CameraPassesAKeyWithoutAStepOfVelocity) {
+  std::vector<CameraKey> keys(3);
+  for (int k = 0; k < 3; ++k) {
+    keys[k].time = 2 * k;
+    keys[k].position = {k == 2 ? 5.0 : k, 0, 1};
+  }
+  const auto x = [&](double t) { return double(cameraAt(keys, t).position.x); };
+  constexpr double h = 1e-2;
+  const double before = (x(2) - x(2 - h)) / h, after = (x(2 + h) - x(2)) / h;
+  EXPECT_NEAR(before, after, 0.03);
+  EXPECT_GT(before, 0.5);
+  for (double t = 0; t <= 4; t += 0.05) EXPECT_LE(x(t), x(t + 0.05));
+  EXPECT_EQ(x(2), 1);
+}
+
 }  // namespace medulla
