@@ -153,8 +153,8 @@ namespace {
 struct RenderArguments {
   RunArguments run;
   std::vector<std::string> scenes, outputs;
-  std::string view = "tissue", size, fps, frames, still, quality, cache, context = "auto";
-  std::vector<std::string> show;
+  std::string size, fps, frames, still, quality, cache, context = "auto";
+  std::vector<std::string> view = {"tissue"}, show;
   bool resume = false, timings = false;
 };
 
@@ -185,6 +185,20 @@ void readPictures(const RenderArguments& a, RenderOptions& options) {
   }
 }
 
+void readView(const RenderArguments& a, ViewOptions& view) {
+  view.panels.clear();
+  for (const std::string& name : a.view)
+    view.panels.push_back(name == "model" ? ViewKind::model : name == "both" ? ViewKind::both : ViewKind::tissue);
+  try {
+    view.shown = readShown(a.show);
+  } catch (const std::invalid_argument& error) {
+    usageError("--show", joined(a.show, ","), error.what());
+  }
+  const auto isTissue = [](ViewKind kind) { return kind == ViewKind::tissue; };
+  if (namesModelPart(a.show) && std::all_of(view.panels.begin(), view.panels.end(), isTissue))
+    usageError("--show", joined(a.show, ","), "--view model, both or tissue,model with it: skins hide the model");
+}
+
 RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) {
   RenderOptions options;
   options.run = runOptions(a.run);
@@ -196,10 +210,7 @@ RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) 
   options.cachePath = fileOf(scene, a.cache);
   for (const std::string& output : a.outputs) options.outputs.push_back(fileOf(scene, output));
   if (options.outputs.empty()) options.outputs = {fileOf(scene, a.still.empty() ? "{scene}.mp4" : "{scene}.png")};
-  options.view.view = a.view == "model" ? ViewKind::model : a.view == "both" ? ViewKind::both : ViewKind::tissue;
-  const auto shown = [&](const char* what) { return std::find(a.show.begin(), a.show.end(), what) != a.show.end(); };
-  options.view.showProxy = shown("proxy");
-  options.view.showForce = shown("force");
+  readView(a, options.view);
   readPictures(a, options);
   const std::string quality = !a.quality.empty() ? a.quality : options.still ? "best" : "standard";
   options.quality = quality == "draft" ? Quality::draft : quality == "best" ? Quality::best : Quality::standard;
@@ -245,14 +256,19 @@ int runRenders(const RenderArguments& a) {
 }
 
 void addPictureOptions(CLI::App* c, RenderArguments& a) {
-  c->add_option("--view", a.view, "skin; or spheres, links and attachments; or both")
+  c->add_option("--view", a.view,
+                "tissue: skins; model: what they hide; both: seen through; several stand side by side: tissue,model")
+      ->delimiter(',')
       ->check(CLI::IsMember({"tissue", "model", "both"}))
-      ->capture_default_str();
-  c->add_option("--show", a.show,
-                "draw also (repeatable): proxy (proxy sphere, device and the spring between them); force (on the hand: "
-                "an arrow at the proxy, and a strip chart of the last seconds)")
-      ->check(CLI::IsMember({"proxy", "force"}))
-      ->allow_extra_args(false);
+      ->type_name("KIND,...")
+      ->expected(1, 3)
+      ->allow_extra_args(false)
+      ->default_str("tissue");
+  std::string parts = "draw also:";
+  for (const ShownPart& part : shownParts()) parts += fmt::format(" {} ({}),", part.name, part.meaning);
+  parts.back() = ';';
+  parts += " of the model what is named [mesh,spheres,links]";
+  c->add_option("--show", a.show, parts)->delimiter(',')->type_name("PART,...")->allow_extra_args(false);
   c->add_option("--size", a.size, "picture size in pixels, even numbers from 16 to 8192 (default: the scene's)")
       ->type_name("WxH");
   c->add_option(

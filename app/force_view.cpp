@@ -18,6 +18,10 @@ constexpr double kWindow = 5;  // s
 constexpr glm::vec4 kColours[] = {
     {0.95f, 0.75f, 0.05f, 1}, {0.10f, 0.60f, 0.95f, 1}, {0.15f, 0.80f, 0.35f, 1}, {0.90f, 0.35f, 0.75f, 1}};
 
+glm::vec4 colourOf(std::size_t tool) {
+  return kColours[tool % std::size(kColours)];
+}
+
 }  // namespace
 
 ForceView::ForceView(const LoadedScene& loaded) : loaded_(&loaded), sizes_(loaded.scene.tools.size()) {
@@ -41,29 +45,33 @@ void ForceView::growRange(double time) {
       if (sizes[seen_] > range_) range_ = nextRoundNumber(sizes[seen_]);
 }
 
-void ForceView::compose(const PictureState& state, Picture& picture) {
-  picture.arrows.clear();
-  picture.chart.reset();
-  if (sizes_.empty()) return;
+StripChart ForceView::chart(const PictureState& state) {
+  StripChart chart;
+  if (sizes_.empty()) return chart;
   growRange(state.time);
-  StripChart& chart = picture.chart.emplace();
   chart.range = float(range_);
   chart.seconds = float(kWindow);
   chart.now = float(state.time);
   chart.rangeLabel = fmt::format("{:g} N", range_);
   chart.windowLabel = fmt::format("{:g} s", kWindow);
-  const float height = 2 * glm::length(picture.camera.target - picture.camera.position) *
-                       std::tan(0.5f * glm::radians(picture.camera.fovDegrees));
   const auto window = static_cast<std::size_t>(std::lround(kWindow * loaded_->scene.servoRate));
   for (std::size_t k = 0; k < sizes_.size(); ++k) {
-    const glm::vec4 colour = kColours[k % std::size(kColours)];
-    const Eigen::Vector3d& force = state.tools[k].force;
-    const glm::vec3 from = toGlm(state.tools[k].proxy), along = 0.2f * height * toGlm(force / range_);
-    if (force.norm() > 0.005 * range_) picture.arrows.push_back({from, from + along, 0.006f * height, colour});
-    StripCurve curve{colour, std::vector<float>(window + 1, 0.f), fmt::format("{:.2f} N", force.norm())};
+    StripCurve curve{colourOf(k), std::vector<float>(window + 1, 0.f),
+                     fmt::format("{:.2f} N", state.tools[k].force.norm())};
     for (std::size_t back = 0; back <= window && back < seen_; ++back)
       curve.values[window - back] = sizes_[k][seen_ - 1 - back];
     chart.curves.push_back(std::move(curve));
+  }
+  return chart;
+}
+
+void ForceView::addArrows(const PictureState& state, Picture& picture) const {
+  const float height = heightAtTarget(picture.camera);
+  for (std::size_t k = 0; k < sizes_.size(); ++k) {
+    const Eigen::Vector3d& force = state.tools[k].force;
+    if (force.norm() <= 0.005 * range_) continue;
+    const glm::vec3 from = toGlm(state.tools[k].proxy), along = 0.2f * height * toGlm(force / range_);
+    picture.overlay.arrows.push_back({from, from + along, 0.006f * height, colourOf(k)});
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include "app/simulation.h"
 #include "render/renderer.h"
+#include "render/strip_chart.h"
 
 namespace medulla {
 
@@ -14,8 +15,10 @@ namespace medulla {
 class ForceView {
  public:
   explicit ForceView(const LoadedScene& loaded);
-  void afterFrame(const Simulation& simulation);              // every dynamics frame, in order
-  void compose(const PictureState& state, Picture& picture);  // times do not fall
+  void afterFrame(const Simulation& simulation);  // every dynamics frame, in order
+  StripChart chart(const PictureState& state);    // times do not fall
+  // To a picture that is composed, in the range of the last chart.
+  void addArrows(const PictureState& state, Picture& picture) const;
 
  private:
   void growRange(double time);

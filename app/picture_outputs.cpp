@@ -134,6 +134,16 @@ void PictureOutputs::write(int number, const Image& image) {
   if (!stills_.empty()) still_ = image;
 }
 
+StageTimes::Stage PictureOutputs::encoding() const {
+  StageTimes::Stage sum{"encode", 0, 0};
+  for (const VideoWriter& video : videos_) {
+    const StageTimes::Stage one = video.encoding();
+    sum.wall += one.wall;
+    sum.cpu += one.cpu;
+  }
+  return sum;
+}
+
 void PictureOutputs::finish() {
   for (VideoWriter& video : videos_) video.finish();
   for (const auto& folder : folders_) folder->finish();

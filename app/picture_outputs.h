@@ -52,6 +52,7 @@ class PictureOutputs {
   bool has(int number) const;  // nobody needs this picture any more
   void write(int number, const Image& image);
   void finish();
+  StageTimes::Stage encoding() const;  // of all videos, in threads of their own
 
  private:
   std::vector<VideoWriter> videos_;

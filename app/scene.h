@@ -74,6 +74,12 @@ struct CameraKey {
   int line = 0;
 };
 
+// What happens, for those who watch.
+struct SceneCaption {
+  double from = 0, to = 0;  // s, from < to
+  std::string text;
+};
+
 struct Scene {
   std::string path, name;
   double servoRate = 1200, dynamicsRate = 50;  // Hz, up to 20000 and 20 to 1200; the first a multiple of the second
@@ -100,6 +106,7 @@ struct Scene {
   int width = 1280, height = 720;                // 16 to 8192, even
   double fps = 30;                               // 1 to 240
   std::vector<double> goldenTimes;               // s, strictly increasing, within 0 to duration
+  std::vector<SceneCaption> captions;            // in the order of their times, none over another
   // Of what the file and its overrides say, however it is laid out; files that they name are not looked into.
   std::uint64_t contentHash = 0;  // of everything
   std::uint64_t motionHash = 0;   // without camera, light, output and looks: the same motion, however it is drawn

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "app/files/input_error.h"
+#include "app/model_drawing.h"
 #include "haptics/monotone_cubic.h"
 
 namespace medulla {
@@ -17,16 +18,6 @@ glm::quat toGlm(const Eigen::Quaterniond& q) {
 }
 
 namespace {
-
-// Colours of the model view, linear RGB: after the paper's figures, told apart by brightness too.
-constexpr glm::vec4 kBallColour{0.80f, 0.30f, 0.22f, 0.55f};
-constexpr glm::vec4 kFixedBallColour{0.30f, 0.32f, 0.36f, 0.70f};
-constexpr glm::vec4 kLinkColour{0.95f, 0.75f, 0.20f, 1};
-constexpr glm::vec4 kAttachmentColour{0.25f, 0.55f, 0.80f, 1};
-constexpr glm::vec4 kSkeletonColour{0.10f, 0.11f, 0.13f, 1};
-constexpr glm::vec4 kAxisColours[3] = {{0.85f, 0.15f, 0.12f, 1}, {0.15f, 0.65f, 0.15f, 1}, {0.15f, 0.30f, 0.90f, 1}};
-constexpr glm::vec4 kProxyColour{0.15f, 0.75f, 0.25f, 0.9f};
-constexpr glm::vec4 kDeviceColour{0.95f, 0.20f, 0.85f, 0.9f};
 
 SurfaceShape shapeOf(const TriangleMesh& mesh, const Eigen::Isometry3d& worldFromMesh, const std::string& look) {
   SurfaceShape shape;
@@ -44,63 +35,7 @@ SurfaceShape shapeOf(const RenderSurface& surface, const std::vector<Eigen::Vect
   return shape;
 }
 
-Eigen::Vector3d anchorOf(const SoftBodyModel& model, const BodyFrame& frame, const Attachment& attachment) {
-  if (!attachment.onLink) return frame.spheres[attachment.host].position;
-  const ElasticLink& link = model.links[attachment.host];
-  return blendPoint(frame.spheres[link.sphere0].position, frame.spheres[link.sphere1].position, attachment.along);
-}
-
-// The raw skeleton is not simulated: each of its nodes rides on the sphere nearest to it at rest.
-Eigen::Vector3d carriedBySphere(const SoftBodyModel& model, const BodyFrame& frame, const Eigen::Vector3d& rest) {
-  std::size_t nearest = 0;
-  for (std::size_t i = 1; i < model.spheres.size(); ++i) {
-    const double distance = (model.spheres[i].restFrame - rest).squaredNorm();
-    if (distance < (model.spheres[nearest].restFrame - rest).squaredNorm()) nearest = i;
-  }
-  const SpherePose& pose = frame.spheres[nearest];
-  return pose.position + pose.worldFromSphere * (rest - model.spheres[nearest].restFrame);
-}
-
-void addSkeleton(const SoftBodyModel& model, const BodyFrame& frame, Picture& picture) {
-  std::vector<glm::vec3> nodes;
-  for (const Eigen::Vector3d& rest : model.skeleton.nodes) {
-    nodes.push_back(toGlm(carriedBySphere(model, frame, rest)));
-    picture.balls.push_back({nodes.back(), 0.0010f, kSkeletonColour});
-  }
-  for (const auto& [a, b] : model.skeleton.links)
-    picture.segments.push_back({nodes[a], nodes[b], 0.0004f, kSkeletonColour});
-}
-
-// Spheres with their frames, links and attachments: the paper's figures 2, 10 and 11.
-void addModel(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame, Picture& picture) {
-  for (std::size_t i = 0; i < model.spheres.size(); ++i) {
-    const FillingSphere& sphere = model.spheres[i];
-    const SpherePose& pose = frame.spheres[i];
-    const Eigen::Matrix3d worldFromSphere = pose.worldFromSphere.toRotationMatrix();
-    const Eigen::Vector3d centre = pose.position + worldFromSphere * (sphere.restBallCentre - sphere.restFrame);
-    const bool fixed = std::any_of(body.fixed.begin(), body.fixed.end(),
-                                   [&](const FixedSphere& f) { return f.sphere == static_cast<int>(i); });
-    picture.balls.push_back({toGlm(centre), float(sphere.radius), fixed ? kFixedBallColour : kBallColour});
-    const float axis = 0.6f * float(sphere.radius), thin = 0.035f * float(sphere.radius);
-    for (int a = 0; a < 3; ++a)
-      picture.segments.push_back(
-          {toGlm(pose.position), toGlm(pose.position) + axis * toGlm(worldFromSphere.col(a)), thin, kAxisColours[a]});
-  }
-  for (const ElasticLink& link : model.links) {
-    const float radius =
-        0.08f * float(std::min(model.spheres[link.sphere0].radius, model.spheres[link.sphere1].radius));
-    picture.segments.push_back({toGlm(frame.spheres[link.sphere0].position),
-                                toGlm(frame.spheres[link.sphere1].position), std::max(radius, 0.0004f), kLinkColour});
-  }
-  for (std::size_t n = 0; n < model.attachments.size(); ++n) {
-    picture.segments.push_back(
-        {toGlm(anchorOf(model, frame, model.attachments[n])), toGlm(frame.nodes[n]), 0.00010f, kAttachmentColour});
-    picture.balls.push_back({toGlm(frame.nodes[n]), 0.0005f, kAttachmentColour});
-  }
-}
-
-void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& state, const ViewOptions& options,
-             Picture& picture) {
+void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& state, Picture& picture) {
   Instrument instrument;
   // The picture shows the proxy: an instrument never enters the tissue, its device may. The proxy is a sphere, the jaws
   // reach to its far side along the shaft.
@@ -112,10 +47,6 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   instrument.touching = state.inContact || state.holding;
   instrument.holding = state.holding;
   picture.instruments.push_back(instrument);
-  if (!options.showProxy) return;
-  picture.balls.push_back({toGlm(state.proxy), float(tool.settings.radius), kProxyColour});
-  picture.balls.push_back({toGlm(state.device), 0.6f * float(tool.settings.radius), kDeviceColour});
-  picture.segments.push_back({toGlm(state.device), toGlm(state.proxy), 0.0004f, kDeviceColour});
 }
 
 Light lightOf(const Scene& scene) {
@@ -170,6 +101,10 @@ Camera cameraAt(const std::vector<CameraKey>& keys, double time) {
   return camera;
 }
 
+float heightAtTarget(const Camera& camera) {
+  return 2 * glm::length(camera.target - camera.position) * std::tan(0.5f * glm::radians(camera.fovDegrees));
+}
+
 SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Renderer& renderer) : loaded_(&loaded) {
   const Scene& scene = loaded.scene;
   const auto add = [&](int line, SurfaceShape shape) {
@@ -189,26 +124,28 @@ SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Rende
   }
 }
 
-void SceneView::compose(const PictureState& state, const ViewOptions& options, Picture& picture) const {
+void SceneView::compose(const PictureState& state, ViewKind view, const Shown& shown, Picture& picture) const {
   const Scene& scene = loaded_->scene;
-  picture.view = options.view;
+  picture.view = view;
   picture.camera = cameraAt(scene.camera, state.time);
   picture.light = lightOf(scene);
   picture.endoscopeMask = scene.endoscope;
   picture.time = float(state.time);
   picture.instruments.clear();
-  picture.balls.clear();
-  picture.segments.clear();
+  picture.model.clear();
+  picture.overlay.clear();
   picture.surfaces.resize(scene.bodies.size() + drawnStatics_);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyFrame& frame = state.frame.bodies[b];
-    evaluateRenderSurface(loaded_->models[b]->renderSurface, frame.nodes, picture.surfaces[b].positions);
-    if (options.view == ViewKind::tissue) continue;
-    addModel(scene.bodies[b], *loaded_->models[b], frame, picture);
-    addSkeleton(*loaded_->models[b], frame, picture);
+    const SoftBodyModel& model = *loaded_->models[b];
+    evaluateRenderSurface(model.renderSurface, frame.nodes, picture.surfaces[b].positions);
+    if (view != ViewKind::tissue)
+      drawBodyModel(scene.bodies[b], model, frame, shown, heightAtTarget(picture.camera), picture.model);
   }
-  for (std::size_t k = 0; k < scene.tools.size(); ++k)
-    addTool(scene.tools[k], state.inputs[k], state.tools[k], options, picture);
+  for (std::size_t k = 0; k < scene.tools.size(); ++k) {
+    addTool(scene.tools[k], state.inputs[k], state.tools[k], picture);
+    if (shown.proxy) drawProxy(scene.tools[k].settings, state.tools[k], picture.overlay);
+  }
 }
 
 }  // namespace medulla

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "app/shown_parts.h"
 #include "app/simulation.h"
 #include "render/renderer.h"
 
@@ -13,9 +14,8 @@ glm::vec3 toGlm(const Eigen::Vector3d& v);
 glm::quat toGlm(const Eigen::Quaterniond& q);
 
 struct ViewOptions {
-  ViewKind view = ViewKind::tissue;
-  bool showProxy = false;  // proxy sphere, device and the spring between them
-  bool showForce = false;  // ForceView's arrow and strip chart
+  std::vector<ViewKind> panels = {ViewKind::tissue};  // at least one; side by side, from the left
+  Shown shown;
 };
 
 class SceneView {
@@ -25,7 +25,7 @@ class SceneView {
   SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Renderer& renderer);
 
   // Fills `picture` (reused) from a state.
-  void compose(const PictureState& state, const ViewOptions& options, Picture& picture) const;
+  void compose(const PictureState& state, ViewKind view, const Shown& shown, Picture& picture) const;
 
  private:
   const LoadedScene* loaded_;
@@ -39,5 +39,6 @@ void evaluateRenderSurface(const RenderSurface& surface, const std::vector<Eigen
 
 // Camera at a time: through the keys without a step of velocity, still before the first and after the last.
 Camera cameraAt(const std::vector<CameraKey>& keys, double time);
+float heightAtTarget(const Camera& camera);  // m, of what the picture shows there
 
 }  // namespace medulla

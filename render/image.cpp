@@ -22,6 +22,19 @@ void assertSameSize([[maybe_unused]] const Image& a, [[maybe_unused]] const Imag
 
 }  // namespace
 
+Image blackImage(int width, int height) {
+  Image image{width, height, std::vector<std::uint8_t>(4ul * width * height, 0)};
+  for (std::size_t i = 3; i < image.pixels.size(); i += 4) image.pixels[i] = 255;
+  return image;
+}
+
+void copyInto(const Image& part, int x, Image& whole) {
+  assert(part.height == whole.height && x >= 0 && x + part.width <= whole.width);
+  const std::size_t row = 4ul * part.width;
+  for (int y = 0; y < part.height; ++y)
+    std::copy_n(&part.pixels[row * y], row, &whole.pixels[4 * (std::size_t(whole.width) * y + x)]);
+}
+
 ImageDifference compareImages(const Image& a, const Image& b) {
   assertSameSize(a, b);
   ImageDifference d;

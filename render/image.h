@@ -12,6 +12,10 @@ struct Image {
   std::vector<std::uint8_t> pixels;  // 4 * width * height
 };
 
+Image blackImage(int width, int height);  // opaque
+// Every row of `part` over that of `whole`, from column `x` on; as high, and no wider than what is left.
+void copyInto(const Image& part, int x, Image& whole);
+
 // PNG with the text chunks given (keyword, text). Written beside `path` and renamed when whole.
 // Throws std::runtime_error with the path and the reason.
 struct PngText {

@@ -16,6 +16,8 @@ namespace {
 constexpr float kTau = 6.2831853f;
 constexpr std::array<int, 3> kRings = {8, 20, 48};
 constexpr std::array<float, 2> kFinerAbove = {0.012f, 0.06f};  // projected radius, picture heights
+constexpr glm::vec3 kBackdropColour{0.78f, 0.80f, 0.84f};      // linear RGB, of the shaders' backdrop
+constexpr float kFarthestFaded = 0.45f;
 
 void attribute(unsigned slot, int components, std::size_t stride, std::size_t offset, unsigned divisor) {
   glEnableVertexAttribArray(slot);
@@ -104,7 +106,7 @@ ModelView::UnitMesh ModelView::makeCone(int sides) {
   return makeUnitMesh(p, n, index);
 }
 
-ModelView::ModelView() {
+ModelView::ModelView(int pictureHeight) : pixel_(1 / float(pictureHeight)) {
   program_ = buildProgram("", kModelVertexShader, kModelFragmentShader);
   backdropProgram_ = buildProgram("", kBackdropVertexShader, kBackdropFragmentShader);
   glGenVertexArrays(1, &emptyArray_);
@@ -162,65 +164,94 @@ ModelView::Instance ModelView::rodInstance(glm::vec3 a, glm::vec3 b, float radiu
   return {{rowOf(0, x, y, along, a), rowOf(1, x, y, along, a), rowOf(2, x, y, along, a)}, colour};
 }
 
-void ModelView::draw(const Viewpoint& view, const std::vector<DrawnBall>& balls, const std::vector<Segment>& segments) {
-  std::array<std::vector<Instance>, 3> opaque;
-  struct SeenThrough {
-    float depth;
-    std::size_t level;
-    Instance instance;
-  };
-  std::vector<SeenThrough> seenThrough;
-  for (const DrawnBall& ball : balls) {
-    const float depth = pictureFromWorld(view, ball.centre).z;
-    const float size = 0.5f * ball.radius / (std::max(depth, kNearPlane) * view.tangent);
-    const std::size_t level = std::size_t(size > kFinerAbove[0]) + std::size_t(size > kFinerAbove[1]);
-    const glm::mat3 r(ball.radius);
-    const auto row = [&](int k) { return rowOf(k, r[0], r[1], r[2], ball.centre); };
-    const Instance i{{row(0), row(1), row(2)}, ball.colour};
-    if (ball.colour.a >= 1)
-      opaque[level].push_back(i);
-    else
-      seenThrough.push_back({depth, level, i});
-  }
-  std::vector<Instance> rods;
-  for (const Segment& s : segments)
-    if (s.a != s.b) rods.push_back(rodInstance(s.a, s.b, s.radius, s.colour));
-
-  setCamera(view);
-  glEnable(GL_CULL_FACE);
-  glFrontFace(GL_CW);  // the picture is drawn upside down: see Viewpoint::clipFromWorld
-  for (std::size_t k = 0; k < opaque.size(); ++k) drawInstances(spheres_[k], opaque[k]);
-  drawInstances(cylinder_, rods);
-
-  // Farthest first, each over what is behind it.
-  std::stable_sort(seenThrough.begin(), seenThrough.end(),
-                   [](const SeenThrough& a, const SeenThrough& b) { return a.depth > b.depth; });
-  glEnable(GL_BLEND);
-  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
-  for (const SeenThrough& s : seenThrough) drawInstances(spheres_[s.level], {s.instance});
-  glDisable(GL_BLEND);
-  glDisable(GL_CULL_FACE);
+// What is thinner than a pixel breaks into dots.
+float ModelView::atLeast(const Viewpoint& v, float depth, float radius) const {
+  return std::max(radius, 0.6f * pixel_ * 2 * std::max(depth, kNearPlane) * v.tangent);
 }
 
-void ModelView::drawArrows(const Viewpoint& view, const std::vector<Arrow>& arrows) {
-  std::vector<Instance> shafts, heads;
-  for (const Arrow& arrow : arrows) {
+glm::vec4 DepthFade::operator()(glm::vec4 colour, float depth) const {
+  if (far <= near) return colour;
+  const float share = kFarthestFaded * glm::clamp((depth - near) / (far - near), 0.f, 1.f);
+  return {glm::mix(glm::vec3(colour), kBackdropColour, share), colour.a};
+}
+
+static DepthFade fadeOf(const Viewpoint& v, const Drawing& drawing) {
+  DepthFade fade{1e30f, -1e30f};
+  const auto add = [&](glm::vec3 p, float radius) {
+    const float depth = pictureFromWorld(v, p).z;
+    fade.near = std::min(fade.near, depth - radius);
+    fade.far = std::max(fade.far, depth + radius);
+  };
+  for (const DrawnBall& b : drawing.balls) add(b.centre, b.radius);
+  for (const Segment& s : drawing.segments) {
+    add(s.a, s.radius);
+    add(s.b, s.radius);
+  }
+  return fade;
+}
+
+void ModelView::sortBalls(const Viewpoint& view, const std::vector<DrawnBall>& balls, const DepthFade& fade) {
+  for (auto& level : opaque_) level.clear();
+  seenThrough_.clear();
+  for (const DrawnBall& ball : balls) {
+    const float depth = pictureFromWorld(view, ball.centre).z, radius = atLeast(view, depth, ball.radius);
+    const float size = 0.5f * radius / (std::max(depth, kNearPlane) * view.tangent);
+    const std::size_t level = std::size_t(size > kFinerAbove[0]) + std::size_t(size > kFinerAbove[1]);
+    const glm::mat3 r(radius);
+    const auto row = [&](int k) { return rowOf(k, r[0], r[1], r[2], ball.centre); };
+    const Instance i{{row(0), row(1), row(2)}, fade(ball.colour, depth)};
+    if (ball.colour.a >= 1)
+      opaque_[level].push_back(i);
+    else
+      seenThrough_.push_back({depth, level, i});
+  }
+  // Farthest first, each over what is behind it.
+  std::stable_sort(seenThrough_.begin(), seenThrough_.end(),
+                   [](const SeenThrough& a, const SeenThrough& b) { return a.depth > b.depth; });
+}
+
+void ModelView::placeRods(const Viewpoint& view, const Drawing& drawing, const DepthFade& fade) {
+  rods_.clear();
+  shafts_.clear();
+  heads_.clear();
+  const auto depthOf = [&view](glm::vec3 a, glm::vec3 b) { return pictureFromWorld(view, 0.5f * (a + b)).z; };
+  for (const Segment& s : drawing.segments) {
+    if (s.a == s.b) continue;
+    const float depth = depthOf(s.a, s.b);
+    rods_.push_back(rodInstance(s.a, s.b, atLeast(view, depth, s.radius), fade(s.colour, depth)));
+  }
+  for (const Arrow& arrow : drawing.arrows) {
     const glm::vec3 along = arrow.to - arrow.from;
     const float length = glm::length(along);
     if (length <= 0) continue;
     // A short arrow is a small one: its head takes no more than its half.
     const float head = std::min(8 * arrow.radius, 0.5f * length), radius = head / 8;
     const glm::vec3 neck = arrow.to - head / length * along;
-    shafts.push_back(rodInstance(arrow.from, neck, radius, arrow.colour));
-    heads.push_back(rodInstance(neck, arrow.to, 3 * radius, arrow.colour));
+    const float depth = depthOf(arrow.from, arrow.to);
+    const glm::vec4 colour = fade(arrow.colour, depth);
+    shafts_.push_back(rodInstance(arrow.from, neck, atLeast(view, depth, radius), colour));
+    heads_.push_back(rodInstance(neck, arrow.to, 3 * radius, colour));
   }
-  if (heads.empty()) return;
-  glClear(GL_DEPTH_BUFFER_BIT);
+}
+
+void ModelView::draw(const Viewpoint& view, const Drawing& drawing, bool fade) {
+  if (drawing.empty()) return;
+  const DepthFade depthFade = fade ? fadeOf(view, drawing) : DepthFade{};
+  sortBalls(view, drawing.balls, depthFade);
+  placeRods(view, drawing, depthFade);
   setCamera(view);
   glEnable(GL_CULL_FACE);
-  glFrontFace(GL_CW);
-  drawInstances(shaft_, shafts);
-  drawInstances(cone_, heads);
+  glFrontFace(GL_CW);  // the picture is drawn upside down: see Viewpoint::clipFromWorld
+  for (std::size_t k = 0; k < opaque_.size(); ++k) drawInstances(spheres_[k], opaque_[k]);
+  drawInstances(cylinder_, rods_);
+  drawInstances(shaft_, shafts_);
+  drawInstances(cone_, heads_);
+  glEnable(GL_BLEND);
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
+  glDepthMask(GL_FALSE);  // of two, one within the other, both are seen
+  for (const SeenThrough& s : seenThrough_) drawInstances(spheres_[s.level], {s.instance});
+  glDepthMask(GL_TRUE);
+  glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
 }
 

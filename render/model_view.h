@@ -8,17 +8,24 @@
 
 namespace medulla {
 
-// Draws balls and segments of the model (paper, figures 2 and 11) with instanced unit meshes. Needs a current context.
+// Draws what is shown of the model (paper, figures 1, 2, 8, 10 and 11) with instanced unit meshes. Needs a current
+// context.
+// Takes colours towards the backdrop's with depth, from the nearest of a drawing to its farthest.
+struct DepthFade {
+  float near = 0, far = 0;  // m
+  glm::vec4 operator()(glm::vec4 colour, float depth) const;
+};
+
 class ModelView {
  public:
-  ModelView();
+  explicit ModelView(int pictureHeight);  // px
   ~ModelView();
   ModelView(const ModelView&) = delete;
   ModelView& operator=(const ModelView&) = delete;
 
   void drawBackdrop() const;
-  void draw(const Viewpoint& viewpoint, const std::vector<DrawnBall>& balls, const std::vector<Segment>& segments);
-  void drawArrows(const Viewpoint& viewpoint, const std::vector<Arrow>& arrows);  // before all that was drawn so far
+  // `fade`: what is far takes the backdrop's colour.
+  void draw(const Viewpoint& viewpoint, const Drawing& drawing, bool fade);
 
  private:
   // Rows of the 3x4 matrix that places the unit mesh, and a colour.
@@ -30,18 +37,30 @@ class ModelView {
     unsigned vertexArray = 0, vertices = 0, indices = 0, instances = 0;
     int indexCount = 0;
   };
+  struct SeenThrough {
+    float depth;
+    std::size_t level;
+    Instance instance;
+  };
   static UnitMesh makeUnitMesh(const std::vector<glm::vec3>& positions, const std::vector<glm::vec3>& normals,
                                const std::vector<unsigned>& indices);
   static UnitMesh makeSphere(int rings);
   static UnitMesh makeCylinder(int sides);
   static UnitMesh makeCone(int sides);
   static Instance rodInstance(glm::vec3 a, glm::vec3 b, float radius, glm::vec4 colour);
+  void sortBalls(const Viewpoint& viewpoint, const std::vector<DrawnBall>& balls, const DepthFade& fade);
+  void placeRods(const Viewpoint& viewpoint, const Drawing& drawing, const DepthFade& fade);
+  float atLeast(const Viewpoint& viewpoint, float depth, float radius) const;
   void drawInstances(const UnitMesh& mesh, const std::vector<Instance>& instances) const;
   void setCamera(const Viewpoint& viewpoint) const;
 
+  float pixel_;  // of the picture's height
   unsigned program_ = 0, backdropProgram_ = 0, emptyArray_ = 0;
   std::array<UnitMesh, 3> spheres_;   // coarse to fine: the silhouette's error stays below a third of a pixel
   UnitMesh cylinder_, shaft_, cone_;  // shaft_: a cylinder for arrows, round from near
+  std::array<std::vector<Instance>, 3> opaque_;
+  std::vector<SeenThrough> seenThrough_;
+  std::vector<Instance> rods_, shafts_, heads_;
 };
 
 }  // namespace medulla

@@ -119,6 +119,7 @@ struct Renderer::Data {
         fineWidth(s.width * s.supersample),
         fineHeight(s.height * s.supersample),
         framebuffer(fineWidth, fineHeight),
+        model(s.height),
         post(s.width, s.height),
         seen(fineHeight) {
     if (s.supersample > 1) finePost.emplace(fineWidth, fineHeight);
@@ -218,9 +219,10 @@ void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
   }
   tissue.draw(mesh, lists, opaque, view, lightView, 1);
   if (haze) background.draw(view, *haze);
-  if (!picture.balls.empty() || !picture.segments.empty()) model.draw(view, picture.balls, picture.segments);
+  model.draw(view, picture.model, picture.view == ViewKind::model);
   if (picture.view == ViewKind::both) tissue.draw(mesh, lists, seenThrough, view, lightView, kSeenThroughOpacity);
-  model.drawArrows(view, picture.arrows);
+  if (!picture.overlay.empty()) glClear(GL_DEPTH_BUFFER_BIT);
+  model.draw(view, picture.overlay, false);
 }
 
 void Renderer::Data::readBack(Image& out) const {
@@ -294,7 +296,6 @@ void Renderer::render(const Picture& picture, Image& out, StageTimes* times) {
   d.readBack(d.settings.supersample > 1 ? d.fine : out);
   stage("finish");
   d.finish(round, out);
-  if (picture.chart) drawStripChart(*picture.chart, out);
   if (times) times->stop();
 }
 

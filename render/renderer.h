@@ -11,7 +11,6 @@
 
 #include "render/image.h"
 #include "render/stage_times.h"
-#include "render/strip_chart.h"
 
 // Draws one picture from plain arrays. Knows looks, light and pixels; knows nothing of bodies and physics.
 namespace medulla {
@@ -62,7 +61,6 @@ struct Instrument {
   bool holding = false;                 // it rises between the jaws instead
 };
 
-// Model view, after the paper's figures 2 and 11, and proxy and device.
 struct DrawnBall {  // not Ball: the model has one of its own
   glm::vec3 centre{0};
   float radius = 0;
@@ -74,14 +72,27 @@ struct Segment {
   glm::vec4 colour{1};
 };
 
-// Drawn over everything else: something said about the picture rather than in it.
 struct Arrow {
   glm::vec3 from{0}, to{0};
   float radius = 0.001f;  // m, of the shaft; the head is thrice as wide
   glm::vec4 colour{1};    // linear RGB
 };
 
-// tissue: skins. model: balls, segments and instruments before a light backdrop, never round. both: surfaces that have
+// Shapes in colours of their own, lit as in a studio. None is drawn thinner than a pixel and a fifth.
+struct Drawing {
+  std::vector<DrawnBall> balls;
+  std::vector<Segment> segments;
+  std::vector<Arrow> arrows;
+
+  bool empty() const { return balls.empty() && segments.empty() && arrows.empty(); }
+  void clear() {
+    balls.clear();
+    segments.clear();
+    arrows.clear();
+  }
+};
+
+// tissue: skins. model: the model and instruments before a light backdrop, never round. both: surfaces that have
 // positions in this picture are seen through over the model, the others stay opaque.
 enum class ViewKind { tissue, model, both };
 
@@ -93,10 +104,8 @@ struct Picture {
   bool endoscopeMask = true;           // round picture with a soft rim
   std::vector<SurfaceState> surfaces;  // index: order of addSurface
   std::vector<Instrument> instruments;
-  std::vector<DrawnBall> balls;
-  std::vector<Segment> segments;
-  std::vector<Arrow> arrows;
-  std::optional<StripChart> chart;
+  Drawing model;    // after the paper's figures; hidden behind skins
+  Drawing overlay;  // over everything else: something said about the picture rather than in it
 };
 
 struct RendererSettings {

@@ -16,6 +16,10 @@ double processCpuSeconds() {
   return secondsOf(CLOCK_PROCESS_CPUTIME_ID);
 }
 
+double threadCpuSeconds() {
+  return secondsOf(CLOCK_THREAD_CPUTIME_ID);
+}
+
 double wallSeconds() {
   return secondsOf(CLOCK_MONOTONIC);
 }
@@ -26,13 +30,13 @@ void StageTimes::start(const std::string& name) {
   running_ = static_cast<int>(known - stages_.begin());
   if (known == stages_.end()) stages_.push_back({name, 0, 0});
   wall_ = wallSeconds();
-  cpu_ = processCpuSeconds();
+  cpu_ = cpuClock_();
 }
 
 void StageTimes::stop() {
   if (running_ < 0) return;
   stages_[running_].wall += wallSeconds() - wall_;
-  stages_[running_].cpu += processCpuSeconds() - cpu_;
+  stages_[running_].cpu += cpuClock_() - cpu_;
   running_ = -1;
 }
 

@@ -14,8 +14,7 @@ struct StripCurve {
   std::string label;          // stands in the curve's colour above the chart
 };
 
-// Values of the last seconds, in the lower left corner of a picture. Labels: digits, blank, full stop, minus, N and s;
-// other characters leave a gap. Pictures of less than 120 rows have none.
+// Values of the last seconds, in the lower left corner of a picture. Pictures of less than 120 rows have no labels.
 struct StripChart {
   float range = 1;             // of the values, > 0; beyond it they run along the edge
   float seconds = 5, now = 0;  // s: width of the window, and its right end; lines stand at whole seconds
@@ -23,7 +22,7 @@ struct StripChart {
   std::vector<StripCurve> curves;
 };
 
-// Over a finished picture, on the CPU: the same values give the same bytes in every OpenGL.
+// Over a finished picture.
 void drawStripChart(const StripChart& chart, Image& image);
 
 }  // namespace medulla

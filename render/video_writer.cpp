@@ -7,7 +7,6 @@
 #include <cassert>
 #include <cerrno>
 #include <condition_variable>
-#include <csignal>
 #include <cstring>
 #include <deque>
 #include <filesystem>
@@ -15,13 +14,13 @@
 #include <stdexcept>
 #include <thread>
 
-#include "render/encoder_process.h"
+#include "render/video_encoder.h"
 #include "render/yuv.h"
 
 namespace medulla {
 namespace {
 
-// Enough that neither side waits for the other's jitter; more only costs memory (3.7 MB each at 720p).
+// Enough that neither side waits for the other's jitter; more only costs memory (1.4 MB each at 720p).
 constexpr std::size_t kQueuedPictures = 3;
 
 struct FormatName {
@@ -61,17 +60,41 @@ std::string checkedPartialPath(const std::string& path) {
   return path + ".partial-" + std::to_string(getpid());
 }
 
+// What the encoder complains of, if it does.
+template <class F>
+std::string reasonOf(const F& encode) {
+  try {
+    encode();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+VideoEncoder openEncoder(const std::string& path, const std::string& partial, int width, int height, double fps) {
+  const VideoFormat format = checkedFormat(path, width, height, fps);
+  try {
+    return {format, partial, width, height, fps};
+  } catch (const std::runtime_error& error) {
+    std::error_code ignored;
+    std::filesystem::remove(partial, ignored);
+    throw std::runtime_error(path + ": cannot be written: " + error.what());
+  }
+}
+
 }  // namespace
 
-// The caller queues pictures; one thread converts and feeds them to the encoder, so that encoding overlaps drawing.
+// The caller queues pictures; one thread encodes them, so that encoding overlaps drawing.
 struct VideoWriter::Data {
   std::string path, partial;
   int width, height;
-  EncoderProcess encoder;
+  VideoEncoder encoder;
   std::mutex mutex;
   std::condition_variable changed;
-  std::deque<Image> waiting, spare;
-  bool ended = false, failed = false;
+  std::deque<std::vector<std::uint8_t>> waiting, spare;  // 4:2:0 planes
+  bool ended = false, abandoned = false;
+  std::string failure;                         // why it stopped; empty: it has not
+  StageTimes::Stage encoding{"encode", 0, 0};  // up to the last picture
   std::thread feeder;
 
   Data(const std::string& p, int w, int h, double fps)
@@ -79,7 +102,7 @@ struct VideoWriter::Data {
         partial(checkedPartialPath(p)),
         width(w),
         height(h),
-        encoder(checkedFormat(p, w, h, fps), partial, w, h, fps),
+        encoder(openEncoder(p, partial, w, h, fps)),
         spare(kQueuedPictures) {
     feeder = std::thread([this] { feed(); });
   }
@@ -87,7 +110,7 @@ struct VideoWriter::Data {
   ~Data() {
     {
       const std::lock_guard lock(mutex);
-      failed = true;  // an abandoned film is not encoded to its end
+      abandoned = true;  // such a film is not encoded to its end
     }
     end();
     std::error_code ignored;
@@ -104,33 +127,27 @@ struct VideoWriter::Data {
   }
 
   void feed() {
-    sigset_t pipeSignal;
-    sigemptyset(&pipeSignal);
-    sigaddset(&pipeSignal, SIGPIPE);
-    pthread_sigmask(SIG_BLOCK, &pipeSignal, nullptr);  // a dead encoder is a failed write, not the end of the program
-    std::vector<std::uint8_t> planes;
     for (;;) {
       std::unique_lock lock(mutex);
       changed.wait(lock, [this] { return ended || !waiting.empty(); });
-      if (waiting.empty() || failed) return;
-      Image image = std::move(waiting.front());
+      if (waiting.empty() || abandoned || !failure.empty()) return;
+      std::vector<std::uint8_t> planes = std::move(waiting.front());
       waiting.pop_front();
       lock.unlock();
-      rgbaToI420(image, planes);
-      const bool written = encoder.write(planes);
+      const double start = wallSeconds();
+      const std::string reason = reasonOf([&] { encoder.write(planes); });
       lock.lock();
-      spare.push_back(std::move(image));
-      failed = failed || !written;
+      encoding.wall += wallSeconds() - start;
+      encoding.cpu = threadCpuSeconds();
+      spare.push_back(std::move(planes));
+      failure = reason;
       lock.unlock();
       changed.notify_all();
     }
   }
 
-  [[noreturn]] void fail() {
-    end();
-    encoder.finish();
-    const std::string words = encoder.complaint();
-    throw std::runtime_error(path + ": ffmpeg failed: " + (words.empty() ? "it gave no reason" : words));
+  [[noreturn]] void fail(const std::string& reason) const {
+    throw std::runtime_error(path + ": cannot be written: " + reason);
   }
 };
 
@@ -148,24 +165,34 @@ void VideoWriter::write(const Image& image) {
   assert(image.width == data_->width && image.height == data_->height);
   std::unique_lock lock(data_->mutex);
   assert(!data_->ended);
-  data_->changed.wait(lock, [this] { return data_->failed || !data_->spare.empty(); });
-  if (data_->failed) {
-    lock.unlock();
-    data_->fail();
-  }
-  Image copy = std::move(data_->spare.front());
+  data_->changed.wait(lock, [this] { return !data_->failure.empty() || !data_->spare.empty(); });
+  if (!data_->failure.empty()) data_->fail(data_->failure);
+  std::vector<std::uint8_t> planes = std::move(data_->spare.front());
   data_->spare.pop_front();
   lock.unlock();
-  copy = image;
+  rgbaToI420(image, planes);
   lock.lock();
-  data_->waiting.push_back(std::move(copy));
+  data_->waiting.push_back(std::move(planes));
   lock.unlock();
   data_->changed.notify_all();
 }
 
+StageTimes::Stage VideoWriter::encoding() const {
+  const std::lock_guard lock(data_->mutex);
+  StageTimes::Stage out = data_->encoding;
+  clockid_t clock{};
+  timespec now{};
+  // Of the picture that is at work, too.
+  const bool running = data_->feeder.joinable() && pthread_getcpuclockid(data_->feeder.native_handle(), &clock) == 0;
+  if (running && clock_gettime(clock, &now) == 0)
+    out.cpu = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  return out;
+}
+
 void VideoWriter::finish() {
   data_->end();
-  if (data_->failed || !data_->encoder.finish()) data_->fail();
+  if (data_->failure.empty()) data_->failure = reasonOf([this] { data_->encoder.finish(); });
+  if (!data_->failure.empty()) data_->fail(data_->failure);
   std::error_code error;
   std::filesystem::rename(data_->partial, data_->path, error);
   if (error) throw std::runtime_error(data_->path + ": cannot be written: " + error.message());

@@ -4,24 +4,26 @@
 #include <string>
 
 #include "render/image.h"
+#include "render/stage_times.h"
 
 namespace medulla {
 
 // Whether a file of this name is a video: .mp4 (H.264), .webm (VP9), .gif or .webp (animated, repeating for ever).
 bool isVideoName(const std::string& path);
 
-// A video through the ffmpeg program, of the kind that its name says. The file grows beside its target under a name of
+// A video through FFmpeg's libraries, of the kind that its name says. The file grows beside its target under a name of
 // its own and is renamed by finish(); a writer destroyed before that leaves nothing.
 class VideoWriter {
  public:
-  // Throws std::runtime_error when ffmpeg is not installed, the folder cannot be written, the size is odd (colours are
+  // Throws std::runtime_error when the file cannot be written, the size is odd (colours are
   // stored for 2x2 pixels at once), or a GIF is to show more than 50 pictures per second (its times are hundredths of a
   // second, and players take the shortest for a tenth).
   VideoWriter(const std::string& path, int width, int height, double fps);
   ~VideoWriter();
   VideoWriter(VideoWriter&&) noexcept;
-  void write(const Image& image);  // throws when ffmpeg died, with what it said
+  void write(const Image& image);  // throws, with the reason, when an earlier one could not be written
   void finish();
+  StageTimes::Stage encoding() const;  // what its thread has taken so far
 
  private:
   struct Data;

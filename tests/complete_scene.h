@@ -32,7 +32,7 @@ inline constexpr const char* completeScene = R"(<?xml version="1.0"?>
     <key t="6" target="0.1 0 0" fov="40"/>
   </camera>
   <light position="0.01 0 0.01" intensity="1.5" reference_distance="0.2" haze="0.1 0.2 0.3" haze_distance="4" caustics="0.5"/>
-  <output size="640 480" fps="25" golden="0.5 3 7"/>
+  <output size="640 480" fps="25" golden="0.5 3 7"><caption from="0.5" to="2" text="pressed &amp; held"/><caption from="2" to="3" text="let go"/></output>
 </scene>
 )";
 

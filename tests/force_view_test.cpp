@@ -86,7 +86,7 @@ TEST(Renderer, AnArrowIsSeenThroughWhatLiesBeforeIt) {
   picture.camera.position = {0, 0, 0.3f};
   Image without, with;
   renderer.render(picture, without);
-  picture.arrows.push_back({{0, -0.08f, -0.1f}, {0, 0.08f, -0.1f}, 0.005f, {0.9f, 0.9f, 0, 1}});
+  picture.overlay.arrows.push_back({{0, -0.08f, -0.1f}, {0, 0.08f, -0.1f}, 0.005f, {0.9f, 0.9f, 0, 1}});
   renderer.render(picture, with);
   EXPECT_FALSE(isYellow(pixelAt(without, 200, 100)));
   EXPECT_TRUE(isYellow(pixelAt(with, 200, 100)));
@@ -118,23 +118,23 @@ TEST(ForceView, ArrowAndChartShareARange) {
     const ServoRecord& record = simulation.record();
     for (const auto& tools : record.tools) largest = std::max(largest, tools[0].force.norm());
     stateAt(record, record.start + record.duration, state);
-    view.compose(state, picture);
-    ASSERT_TRUE(picture.chart);
-    const StripChart& chart = *picture.chart;
+    const StripChart chart = view.chart(state);
+    picture.overlay.clear();
+    view.addArrows(state, picture);
     ASSERT_GE(chart.range, largest);
     ASSERT_GE(chart.range, lastRange);
     lastRange = chart.range;
     ASSERT_EQ(chart.curves.size(), 1u);
     ASSERT_EQ(chart.curves[0].values.back(), float(state.tools[0].force.norm()));
-    if (picture.arrows.empty()) continue;
-    const Arrow& arrow = picture.arrows[0];
+    if (picture.overlay.arrows.empty()) continue;
+    const Arrow& arrow = picture.overlay.arrows[0];
     const glm::vec3 along = arrow.to - arrow.from;
     const float height = 2 * glm::length(picture.camera.target - picture.camera.position) *
                          std::tan(0.5f * glm::radians(picture.camera.fovDegrees));
     ASSERT_NEAR(glm::length(along) / (0.2 * height), state.tools[0].force.norm() / chart.range, 1e-4);
   }
   EXPECT_GT(largest, 0.2);
-  EXPECT_FALSE(picture.arrows.empty());
+  EXPECT_FALSE(picture.overlay.arrows.empty());
 }
 
 TEST(ForceView, IsDrawnOnlyWhenAskedForAndLeavesTheHashAlone) {

@@ -153,7 +153,7 @@ class Gate : public testing::Test {
     Image draw(const PictureState& state) {
       Picture picture;
       Image image;
-      view.compose(state, {}, picture);
+      view.compose(state, ViewKind::tissue, {}, picture);
       renderer.render(picture, image);
       return image;
     }

@@ -280,6 +280,9 @@ TEST(ProgramRefuses, WrongUsageWithCodeTwo) {
   expectRefusal(runProgram({"rneder", kScene}), 2, {"rneder"});
   expectRefusal(runProgram({"render", kScene, "--size", "10x"}), 2, {"--size"});
   expectRefusal(runProgram({"render", kScene, "--view", "skin"}), 2, {"skin"});
+  expectRefusal(runProgram({"render", kScene, "--view", "tissue,skin"}), 2, {"skin"});
+  expectRefusal(runProgram({"render", kScene, "--show", "proxy,sphere"}), 2, {"did you mean \"spheres\"?"});
+  expectRefusal(runProgram({"render", kScene, "--show", "spheres"}), 2, {"--view model"});
   expectRefusal(runProgram({"replay", kScene, "--set", "nonsense"}), 2, {"--set"});
   expectRefusal(runProgram({"replay", kScene, "--surface-at", "soon", "/tmp/x.obj"}), 2, {"soon"});
   for (const char* embree : {"isa=mmx", "threads=0", "threads=two", "avx2", "isa=sse2,,"})
@@ -373,15 +376,6 @@ TEST(Program, PicturesMoveIntoTheirFolderWhenAllAreThere) {
   EXPECT_EQ(done.exitCode, 0) << done.err;
   EXPECT_NE(readFile(folder / "frames/00000.png"), "earlier");
   EXPECT_EQ(folder.contents().size(), 1u);
-}
-
-TEST(ProgramRefuses, VideoWithoutFfmpeg) {
-  const TemporaryFolder folder;
-  ProgramOptions options;
-  options.path = folder.path();
-  expectRefusal(runProgram(command({"render", kScene, "-o", folder / "video.mp4", "--size", "64x48"}), options), 1,
-                {"ffmpeg"});
-  EXPECT_TRUE(folder.contents().empty());
 }
 
 TEST(ProgramRefuses, AStateThatStopsBeingFinite) {

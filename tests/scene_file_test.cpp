@@ -145,6 +145,11 @@ TEST_F(SceneFile, EveryValueOfScenerysToolsAndPictureArrives) {
   EXPECT_EQ(s.height, 480);
   EXPECT_EQ(s.fps, 25);
   EXPECT_EQ(s.goldenTimes, (std::vector<double>{0.5, 3, 7}));
+  ASSERT_EQ(s.captions.size(), 2u);
+  EXPECT_EQ(s.captions[0].from, 0.5);
+  EXPECT_EQ(s.captions[0].to, 2);
+  EXPECT_EQ(s.captions[0].text, "pressed & held");
+  EXPECT_EQ(s.captions[1].text, "let go");
 }
 
 TEST_F(SceneFile, DefaultsStandWhereNothingIsSaid) {

@@ -136,7 +136,7 @@ std::vector<Moment> renderMoments(const std::string& path, const std::string& co
     checkInterrupt();
     simulation.advanceFrame();
     pictures.afterFrame(simulation, [&](int k, const PictureState& state) {
-      view.compose(state, {}, picture);
+      view.compose(state, ViewKind::tissue, {}, picture);
       renderer.render(picture, moments[k].image);
       moments[k].state = fmt::format("{:016x}", simulation.world().stateHash());
     });

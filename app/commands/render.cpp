@@ -5,14 +5,10 @@
 #include <tuple>
 #include <utility>
 
-#include "app/commands/commands.h"
-#include "app/files/content_hash.h"
+#include "app/commands/artist.h"
 #include "app/files/input_error.h"
 #include "app/files/output_file.h"
-#include "app/force_view.h"
 #include "app/interrupt.h"
-#include "app/picture_outputs.h"
-#include "app/progress.h"
 
 namespace medulla {
 
@@ -33,7 +29,7 @@ void applyOverrides(const RenderOptions& options, Scene& scene) {
 struct Wanted {
   std::vector<double> times;  // s, increasing
   int first = 0;
-  int last() const { return first + static_cast<int>(times.size()); }
+  int count() const { return static_cast<int>(times.size()); }
 };
 
 Wanted wantedOf(const RenderOptions& options, const Scene& scene) {
@@ -51,80 +47,23 @@ Wanted wantedOf(const RenderOptions& options, const Scene& scene) {
   return {pictureTimes(scene, first, last), first};
 }
 
-// Draws states and hands the pictures on.
-class Artist {
- public:
-  Artist(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, const DynamicsFrame& rest,
-         StageTimes& times)
-      : options_(&options),
-        times_(&times),
-        renderer_(rendererSettings(loaded.scene.width, loaded.scene.height, options.context, options.quality)),
-        view_(loaded, rest, renderer_),
-        outputs_(options.outputs, outputSettings(loaded, options, wanted, renderer_.description())),
-        progress_("render", static_cast<double>(wanted.times.size()), "pictures") {}
-
-  void draw(int number, const PictureState& state, ForceView* forces) {
-    if (!outputs_.has(number)) {
-      times_->start("compose");
-      view_.compose(state, options_->view, picture_);
-      if (forces != nullptr) forces->compose(state, picture_);
-      renderer_.render(picture_, image_, times_);
-      times_->start("hand over");
-      outputs_.write(number, image_);
-      ++drawn_;
-    }
-    progress_.update(++done_);
-    times_->stop();
-  }
-  void finish() {
-    times_->start("end files");
-    outputs_.finish();
-    times_->stop();
-  }
-  int drawn() const { return drawn_; }
-
- private:
-  static PictureOutputs::Settings outputSettings(const LoadedScene& loaded, const RenderOptions& options,
-                                                 const Wanted& wanted, const std::string& renderer) {
-    const Scene& scene = loaded.scene;
-    const std::string drawing = fmt::format("{}x{} {} {} {} {} {} {}", scene.width, scene.height, scene.fps,
-                                            static_cast<int>(options.view.view), options.view.showProxy,
-                                            options.view.showForce, static_cast<int>(options.quality), renderer);
-    const std::uint64_t run = contentHash(drawing, runHash(loaded, true));
-    return {scene.width,
-            scene.height,
-            scene.fps,
-            options.still.has_value(),
-            {wanted.first, wanted.last(), run, options.resume}};
-  }
-
-  const RenderOptions* options_;
-  StageTimes* times_;
-  Renderer renderer_;
-  SceneView view_;
-  PictureOutputs outputs_;
-  Progress progress_;
-  Picture picture_;
-  Image image_;
-  int drawn_ = 0, done_ = 0;
-};
-
-// Wall time goes on while stages overlap with the encoder; CPU is that of all threads then.
-void printTimings(const StageTimes& times, int pictures) {
-  fmt::print(stderr, "{:<12}{:>12}{:>12}{:>18}{:>18}\n", "stage", "wall [s]", "cpu [s]", "wall [ms/picture]",
-             "cpu [ms/picture]");
+// Simulation, drawing and encoding overlap: their times add up to more than the run takes by the clock.
+void printTimings(const StageTimes& run, const Artist& artist, int pictures) {
+  std::vector<StageTimes::Stage> rows = run.stages();
+  rows.insert(rows.end(), artist.times().stages().begin(), artist.times().stages().end());
+  rows.push_back(artist.encoding());
   StageTimes::Stage sum{"sum", 0, 0};
-  const auto print = [pictures](const StageTimes::Stage& s) {
-    const double each = 1e3 / std::max(pictures, 1);
-    fmt::print(stderr, "{:<12}{:>12.3f}{:>12.3f}{:>18.2f}{:>18.2f}\n", s.name, s.wall, s.cpu, each * s.wall,
-               each * s.cpu);
-  };
-  for (const StageTimes::Stage& s : times.stages()) {
-    print(s);
+  for (const StageTimes::Stage& s : rows) {
     sum.wall += s.wall;
     sum.cpu += s.cpu;
   }
-  print(sum);
+  rows.push_back(sum);
+  fmt::print(stderr, "{:<14}{:>12}{:>12}{:>18}{:>18}\n", "stage", "wall [s]", "cpu [s]", "wall [ms/picture]",
+             "cpu [ms/picture]");
+  const double each = 1e3 / std::max(pictures, 1);
+  for (const StageTimes::Stage& s : rows)
+    fmt::print(stderr, "{:<14}{:>12.3f}{:>12.3f}{:>18.2f}{:>18.2f}\n", s.name, s.wall, s.cpu, each * s.wall,
+               each * s.cpu);
 }
 
 void printFiles(const RenderOptions& options, const Artist& artist, double wall) {
@@ -170,36 +109,45 @@ void renderCache(const LoadedScene& loaded, const RenderOptions& options, const 
   const std::vector<int> numbers = cachedNumbers(cache, wanted, options);
   PictureState state;
   cache.read(0, state);  // the first picture is the scene at rest
-  Artist artist(loaded, options, wanted, state.frame, times);
+  const DynamicsFrame rest = state.frame;
+  Artist artist(loaded, options, wanted.first, wanted.count(), rest);
   const double start = wallSeconds();
   for (std::size_t k = 0; k < numbers.size(); ++k) {
     checkInterrupt();
     times.start("read cache");
     cache.read(numbers[k], state);
-    artist.draw(wanted.first + static_cast<int>(k), state, nullptr);
+    artist.draw(wanted.first + static_cast<int>(k), state, nullptr, times);
   }
+  times.start("wait");
   artist.finish();
+  times.stop();
+  if (options.timings) printTimings(times, artist, wanted.count());
   printFiles(options, artist, wallSeconds() - start);
   fmt::print("hash {:016x}\n", cache.finalHash());
 }
 
 void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, StageTimes& times) {
   Simulation simulation(loaded, options.run.embree);
-  Artist artist(loaded, options, wanted, simulation.current(), times);
+  Artist artist(loaded, options, wanted.first, wanted.count(), simulation.current());
   ForceView forceView(loaded);
   PictureTimes pictures(wanted.times, wanted.first);
   const double cpuStart = processCpuSeconds();
   const double start = wallSeconds();
   times.start("simulate");
   const auto afterFrame = [&] {
-    if (options.view.showForce) forceView.afterFrame(simulation);
+    if (options.view.shown.force) forceView.afterFrame(simulation);
     pictures.afterFrame(simulation, [&](int number, const PictureState& state) {
-      artist.draw(number, state, options.view.showForce ? &forceView : nullptr);
+      artist.draw(number, state, options.view.shown.force ? &forceView : nullptr, times);
     });
     times.start("simulate");
   };
-  const std::vector<Result> forces = runToEnd(loaded, options.run, simulation, afterFrame, [&] { artist.finish(); });
+  const std::vector<Result> forces = runToEnd(loaded, options.run, simulation, afterFrame, [&] {
+    times.start("wait");
+    artist.finish();
+    times.stop();
+  });
   const double wall = wallSeconds() - start;
+  if (options.timings) printTimings(times, artist, wanted.count());
   printFiles(options, artist, wall);
   printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));
   printResults(forces);
@@ -208,7 +156,7 @@ void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wa
 }  // namespace
 
 int runRender(const RenderOptions& options) {
-  StageTimes times;
+  StageTimes times(threadCpuSeconds);
   times.start("start");
   LoadedScene loaded = loadRun(options.run);
   applyOverrides(options, loaded.scene);
@@ -220,7 +168,6 @@ int runRender(const RenderOptions& options) {
     renderRun(loaded, options, wanted, times);
   else
     renderCache(loaded, options, wanted, times);
-  if (options.timings) printTimings(times, static_cast<int>(wanted.times.size()));
   return 0;
 }
 

@@ -372,6 +372,18 @@ void readLight(const XmlElement& light, Scene& scene) {
   if (!scene.lightPosition && scene.caustics > 0) refuse(light, "caustics", "expected a light with a position");
 }
 
+void readCaptions(const XmlElement& output, Scene& scene) {
+  for (const XmlElement* e : childrenOf(output, "caption")) {
+    SceneCaption caption{readNumber(*e, "from", 0, notNegative), readNumber(*e, "to", 0, notNegative),
+                         readText(*e, "text")};
+    if (caption.text.empty()) refuse(*e, "text", "expected words");
+    if (caption.to <= caption.from) refuse(*e, "to", "expected a later time than from");
+    if (!scene.captions.empty() && caption.from < scene.captions.back().to)
+      refuse(*e, "from", "expected no earlier time than the end of the caption before it");
+    scene.captions.push_back(std::move(caption));
+  }
+}
+
 void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene) {
   const std::vector<int> size = readIntegers(output, "size", 2, {16, 8192});
   if (!size.empty()) {
@@ -391,6 +403,7 @@ void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene)
   if (!scene.goldenTimes.empty() && scene.goldenTimes.back() > scene.duration) {
     refuse(output, "golden", "a time beyond the scene's duration");
   }
+  readCaptions(output, scene);
 }
 
 // Each name, value and text ends in a zero, each element in two: so no two trees have the same bytes.

@@ -40,7 +40,8 @@ const XmlRules& sceneRules() {
       {"camera", {"position", "target"}, {"fov", "endoscope"}, {{"key", 0, many}}},
       {"key", {"t"}, {"position", "target", "fov"}, {}},
       {"light", {}, {"offset", "position", "intensity", "reference_distance", "haze", "haze_distance", "caustics"}, {}},
-      {"output", {}, {"size", "fps", "golden"}, {}},
+      {"output", {}, {"size", "fps", "golden"}, {{"caption", 0, many}}},
+      {"caption", {"from", "to", "text"}, {}, {}},
   };
   return rules;
 }

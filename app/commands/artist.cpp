@@ -1,0 +1,210 @@
+#include "app/commands/artist.h"
+
+#include <fmt/format.h>
+#include <pthread.h>
+
+#include <ctime>
+#include <utility>
+
+#include "app/files/content_hash.h"
+#include "app/progress.h"
+#include "render/caption.h"
+
+namespace medulla {
+
+namespace {
+
+// One that is drawn, one that waits: more only costs memory.
+constexpr int kSheets = 3;  // and one that is composed
+
+// Even, as videos need it; what that leaves over stays black between the panels.
+int panelWidth(const Scene& scene, const ViewOptions& view) {
+  const int count = static_cast<int>(view.panels.size()), width = scene.width / count / 2 * 2;
+  if (width < 16)
+    throw std::runtime_error(fmt::format("{} pictures side by side: expected a width of {} at least, not {}", count,
+                                         16 * count, scene.width));
+  return width;
+}
+
+std::string captionAt(const Scene& scene, double time) {
+  std::string text = fmt::format("{}   {:.2f} s", scene.name, time);
+  for (const SceneCaption& caption : scene.captions)
+    if (caption.from <= time && time < caption.to) text += "   " + caption.text;
+  return text;
+}
+
+PictureOutputs::Settings outputSettings(const LoadedScene& loaded, const RenderOptions& options, int first, int count,
+                                        const std::string& renderer) {
+  const Scene& scene = loaded.scene;
+  std::string drawing = fmt::format("{}x{} {} {} {} {}", scene.width, scene.height, scene.fps,
+                                    namesOf(options.view.shown), static_cast<int>(options.quality), renderer);
+  for (const ViewKind panel : options.view.panels) drawing += fmt::format(" {}", static_cast<int>(panel));
+  const std::uint64_t run = contentHash(drawing, runHash(loaded, true));
+  return {scene.width, scene.height, scene.fps, options.still.has_value(), {first, first + count, run, options.resume}};
+}
+
+}  // namespace
+
+// All that touches OpenGL or files: made and ended in the thread that draws.
+struct Artist::Desk {
+  Renderer renderer;
+  SceneView view;
+  PictureOutputs outputs;
+  Image panel, image;
+  Progress progress;
+  int done = 0;
+
+  Desk(const LoadedScene& loaded, const RenderOptions& options, int first, int count, int width,
+       const DynamicsFrame& rest)
+      : renderer(rendererSettings(width, loaded.scene.height, options.context, options.quality)),
+        view(loaded, rest, renderer),
+        outputs(options.outputs, outputSettings(loaded, options, first, count, renderer.description())),
+        image(blackImage(loaded.scene.width, loaded.scene.height)),
+        progress("render", static_cast<double>(count), "pictures") {}
+};
+
+Artist::Artist(const LoadedScene& loaded, const RenderOptions& options, int first, int count, const DynamicsFrame& rest)
+    : loaded_(&loaded),
+      options_(&options),
+      first_(first),
+      count_(count),
+      panelWidth_(panelWidth(loaded.scene, options.view)),
+      caller_(pthread_self()),
+      times_([this] { return ownCpuSeconds(); }) {
+  for (int k = 0; k < kSheets; ++k) spare_.push_back(std::make_unique<Sheet>());
+  thread_ = std::thread([this, &rest] { work(rest); });
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return ready_ || failure_; });
+  if (!failure_) return;
+  lock.unlock();
+  thread_.join();
+  std::rethrow_exception(failure_);
+}
+
+Artist::~Artist() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = abandoned_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+// Of drawing and its raster threads: all but the caller's and the encoders', which have rows of their own.
+double Artist::ownCpuSeconds() const {
+  clockid_t clock{};
+  timespec caller{};
+  if (pthread_getcpuclockid(caller_, &clock) == 0) clock_gettime(clock, &caller);
+  const double others = desk_ ? desk_->outputs.encoding().cpu : 0;
+  return processCpuSeconds() - static_cast<double>(caller.tv_sec) - 1e-9 * static_cast<double>(caller.tv_nsec) - others;
+}
+
+void Artist::work(const DynamicsFrame& rest) {
+  try {
+    times_.start("start drawing");
+    desk_ = std::make_unique<Desk>(*loaded_, *options_, first_, count_, panelWidth_, rest);
+    {
+      const std::lock_guard lock(mutex_);
+      ready_ = true;
+    }
+    changed_.notify_all();
+    drawAll();
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failure_ = std::current_exception();
+  }
+  changed_.notify_all();
+  // The caller may be composing with what is on the desk.
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return ended_ || !ready_; });
+  desk_.reset();
+}
+
+void Artist::drawAll() {
+  for (;;) {
+    times_.start("idle");
+    std::unique_ptr<Sheet> sheet = next();
+    if (!sheet) break;
+    if (sheet->needed) drawSheet(*sheet);
+    desk_->progress.update(++desk_->done);
+    {
+      const std::lock_guard lock(mutex_);
+      spare_.push_back(std::move(sheet));
+    }
+    changed_.notify_all();
+  }
+  if (abandoned_) return;
+  times_.start("end files");
+  desk_->outputs.finish();
+  times_.stop();
+  encoding_ = desk_->outputs.encoding();
+}
+
+// nullptr: there are no more.
+std::unique_ptr<Artist::Sheet> Artist::next() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return ended_ || !waiting_.empty(); });
+  if (abandoned_ || waiting_.empty()) return nullptr;
+  std::unique_ptr<Sheet> sheet = std::move(waiting_.front());
+  waiting_.pop_front();
+  return sheet;
+}
+
+void Artist::drawSheet(const Sheet& sheet) {
+  Desk& desk = *desk_;
+  const int count = static_cast<int>(sheet.panels.size()), room = loaded_->scene.width - panelWidth_;
+  for (int k = 0; k < count; ++k) {
+    desk.renderer.render(sheet.panels[k], count == 1 ? desk.image : desk.panel, &times_);
+    if (count > 1) copyInto(desk.panel, k * room / (count - 1), desk.image);
+  }
+  times_.start("letters");
+  if (sheet.chart) drawStripChart(*sheet.chart, desk.image);
+  if (!sheet.caption.empty()) drawCaption(sheet.caption, desk.image);
+  times_.start("hand over");
+  desk.outputs.write(sheet.number, desk.image);
+  ++drawn_;
+}
+
+void Artist::rethrow() {
+  if (failure_) std::rethrow_exception(failure_);
+}
+
+void Artist::draw(int number, const PictureState& state, ForceView* forces, StageTimes& times) {
+  times.start("wait");
+  std::unique_ptr<Sheet> sheet;
+  {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return failure_ || !spare_.empty(); });
+    rethrow();
+    sheet = std::move(spare_.front());
+    spare_.pop_front();
+  }
+  times.start("compose");
+  sheet->number = number;
+  sheet->needed = !desk_->outputs.has(number);
+  if (forces != nullptr) sheet->chart = forces->chart(state);
+  if (options_->view.shown.caption) sheet->caption = captionAt(loaded_->scene, state.time);
+  sheet->panels.resize(options_->view.panels.size());
+  for (std::size_t k = 0; sheet->needed && k < sheet->panels.size(); ++k) {
+    desk_->view.compose(state, options_->view.panels[k], options_->view.shown, sheet->panels[k]);
+    if (forces != nullptr) forces->addArrows(state, sheet->panels[k]);
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    waiting_.push_back(std::move(sheet));
+  }
+  changed_.notify_all();
+  times.stop();
+}
+
+void Artist::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+  rethrow();
+}
+
+}  // namespace medulla

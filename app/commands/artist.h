@@ -1,0 +1,73 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "app/commands/commands.h"
+#include "app/force_view.h"
+#include "app/picture_outputs.h"
+#include "render/stage_times.h"
+
+namespace medulla {
+
+// Draws states in a thread of its own and hands the pictures on: while one picture is drawn, the next is simulated by
+// the caller and the last encoded by its video. What is drawn does not depend on when.
+class Artist {
+ public:
+  // Pictures [first, first + count); `rest`: the scene at its start. Returns when drawing can begin; throws what
+  // renderer and outputs do.
+  Artist(const LoadedScene& loaded, const RenderOptions& options, int first, int count, const DynamicsFrame& rest);
+  ~Artist();  // of an unfinished one: drops what waits, and with it the unfinished files
+  Artist(const Artist&) = delete;
+  Artist& operator=(const Artist&) = delete;
+
+  // Composes the picture of a state and queues it; waits while two are ahead. Throws what went wrong with earlier ones.
+  // `forces`: to be shown; may be nullptr.
+  void draw(int number, const PictureState& state, ForceView* forces, StageTimes& times);
+  void finish();  // waits for the last, and closes the files
+
+  // After finish().
+  int drawn() const { return drawn_; }  // without those taken over from an earlier run
+  const StageTimes& times() const { return times_; }
+  const StageTimes::Stage& encoding() const { return encoding_; }  // of all videos, in threads of their own
+
+ private:
+  // What one picture needs: as composed, no longer tied to the simulation.
+  struct Sheet {
+    int number = 0;
+    bool needed = true;
+    std::vector<Picture> panels;
+    std::optional<StripChart> chart;
+    std::string caption;
+  };
+  struct Desk;
+
+  void work(const DynamicsFrame& rest);
+  std::unique_ptr<Sheet> next();
+  void drawAll();
+  void drawSheet(const Sheet& sheet);
+  double ownCpuSeconds() const;
+  void rethrow();
+
+  const LoadedScene* loaded_;
+  const RenderOptions* options_;
+  int first_, count_, panelWidth_;  // panelWidth_: px
+  pthread_t caller_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::unique_ptr<Sheet>> waiting_, spare_;
+  bool ready_ = false, ended_ = false, abandoned_ = false;
+  std::exception_ptr failure_;
+  std::unique_ptr<Desk> desk_;  // the thread's; the caller composes with it
+  int drawn_ = 0;
+  StageTimes::Stage encoding_;
+  StageTimes times_;
+  std::thread thread_;
+};
+
+}  // namespace medulla

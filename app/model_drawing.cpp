@@ -1,0 +1,182 @@
+#include "app/model_drawing.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/scene_view.h"
+
+namespace medulla {
+
+namespace {
+
+using Eigen::Vector3d;
+
+// Linear RGB: told apart by brightness too.
+constexpr glm::vec4 kMeshColour{0.42f, 0.45f, 0.50f, 1};
+constexpr glm::vec4 kSkeletonColour{0.10f, 0.11f, 0.13f, 1};
+constexpr glm::vec4 kSphereColour{0.80f, 0.30f, 0.22f, 0.50f};
+constexpr glm::vec4 kFixedSphereColour{0.30f, 0.32f, 0.36f, 0.65f};
+constexpr glm::vec4 kBucketColour{0.45f, 0.30f, 0.80f, 0.10f};
+constexpr glm::vec4 kLinkColour{1.00f, 0.60f, 0.02f, 1};
+constexpr glm::vec4 kAttachmentColour{0.16f, 0.45f, 0.75f, 1};
+constexpr glm::vec4 kFrameColours[3] = {
+    {0.80f, 0.08f, 0.06f, 1}, {0.08f, 0.55f, 0.10f, 1}, {0.10f, 0.22f, 0.90f, 1}};  // t, u, v
+constexpr glm::vec4 kProxyColour{0.15f, 0.75f, 0.25f, 0.35f};
+constexpr glm::vec4 kDeviceColour{0.95f, 0.20f, 0.85f, 1};
+
+// Of the picture's height.
+constexpr float kThin = 0.0008f, kNode = 0.0024f, kBone = 0.0016f, kJoint = 0.0045f, kLink = 0.0050f;
+
+// A link's ends as its spheres carry them, and the frames there (paper, figure 3): columns t, u, v.
+struct CarriedLink {
+  Vector3d end[2];
+  Eigen::Matrix3d worldFromLink[2];
+  Vector3d bow = Vector3d::Zero();  // m, of beams: across the chord
+
+  // A beam is bent by the slopes of its ends, as the dynamics carries what hangs on it.
+  Vector3d at(double along) const { return blendPoint(end[0], end[1], along) + 0.5 * along * (1 - along) * bow; }
+};
+
+CarriedLink carriedLink(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame,
+                        const ElasticLink& link) {
+  const FillingSphere* spheres[] = {&model.spheres[link.sphere0], &model.spheres[link.sphere1]};
+  const SpherePose* poses[] = {&frame.spheres[link.sphere0], &frame.spheres[link.sphere1]};
+  Eigen::Matrix3d rest;
+  rest.col(0) = (spheres[1]->restLinkEnd - spheres[0]->restLinkEnd).normalized();
+  rest.col(1) = link.restU;
+  rest.col(2) = rest.col(0).cross(rest.col(1));
+  CarriedLink out;
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::Matrix3d worldFromSphere = poses[k]->worldFromSphere.toRotationMatrix();
+    out.end[k] = poses[k]->position + worldFromSphere * (spheres[k]->restLinkEnd - spheres[k]->restFrame);
+    out.worldFromLink[k] = worldFromSphere * rest;
+  }
+  if (body.links != LinkModel::beam) return out;
+  const Vector3d line = out.end[1] - out.end[0];
+  const Vector3d slopes = out.worldFromLink[0].col(0) - out.worldFromLink[1].col(0);
+  out.bow = line.norm() * slopes - slopes.dot(line) / line.norm() * line;
+  return out;
+}
+
+// The raw skeleton is not simulated: each of its nodes rides on the sphere nearest to it at rest.
+Vector3d carriedBySphere(const SoftBodyModel& model, const BodyFrame& frame, const Vector3d& rest) {
+  std::size_t nearest = 0;
+  for (std::size_t i = 1; i < model.spheres.size(); ++i) {
+    const double distance = (model.spheres[i].restFrame - rest).squaredNorm();
+    if (distance < (model.spheres[nearest].restFrame - rest).squaredNorm()) nearest = i;
+  }
+  const SpherePose& pose = frame.spheres[nearest];
+  return pose.position + pose.worldFromSphere * (rest - model.spheres[nearest].restFrame);
+}
+
+void drawSkeleton(const SoftBodyModel& model, const BodyFrame& frame, float height, Drawing& out) {
+  std::vector<glm::vec3> nodes;
+  for (const Vector3d& rest : model.skeleton.nodes) {
+    nodes.push_back(toGlm(carriedBySphere(model, frame, rest)));
+    out.balls.push_back({nodes.back(), kJoint * height, kSkeletonColour});
+  }
+  for (const auto& [a, b] : model.skeleton.links)
+    out.segments.push_back({nodes[a], nodes[b], kBone * height, kSkeletonColour});
+}
+
+void drawMesh(const SoftBodyModel& model, const BodyFrame& frame, float height, Drawing& out) {
+  for (const auto& [a, b] : model.edges)
+    out.segments.push_back({toGlm(frame.nodes[a]), toGlm(frame.nodes[b]), 0.5f * kThin * height, kMeshColour});
+}
+
+void drawSpheres(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame, Drawing& out) {
+  for (std::size_t i = 0; i < model.spheres.size(); ++i) {
+    const FillingSphere& sphere = model.spheres[i];
+    const SpherePose& pose = frame.spheres[i];
+    const Vector3d centre = pose.position + pose.worldFromSphere * (sphere.restBallCentre - sphere.restFrame);
+    const bool fixed = std::any_of(body.fixed.begin(), body.fixed.end(),
+                                   [&](const FixedSphere& f) { return f.sphere == static_cast<int>(i); });
+    out.balls.push_back({toGlm(centre), float(sphere.radius), fixed ? kFixedSphereColour : kSphereColour});
+  }
+}
+
+// The second radius as haptics has it: around the middle of the box around a bucket's triangles.
+void drawBuckets(const SoftBodyModel& model, const BodyFrame& frame, Drawing& out) {
+  for (const std::vector<int>& bucket : model.buckets) {
+    Eigen::AlignedBox3d box;
+    for (const int t : bucket)
+      for (const int n : model.triangles[t]) box.extend(frame.nodes[n]);
+    if (box.isEmpty()) continue;
+    double radius2 = 0;
+    for (const int t : bucket)
+      for (const int n : model.triangles[t]) radius2 = std::max(radius2, (frame.nodes[n] - box.center()).squaredNorm());
+    out.balls.push_back({toGlm(Vector3d(box.center())), float(std::sqrt(radius2)), kBucketColour});
+  }
+}
+
+void drawLink(const CarriedLink& link, bool bent, float radius, Drawing& out) {
+  const int pieces = bent ? 8 : 1;
+  for (int k = 0; k < pieces; ++k)
+    out.segments.push_back(
+        {toGlm(link.at(double(k) / pieces)), toGlm(link.at(double(k + 1) / pieces)), radius, kLinkColour});
+  for (const Vector3d& end : link.end) out.balls.push_back({toGlm(end), 1.8f * radius, kLinkColour});
+}
+
+void drawFrames(const CarriedLink& link, float length, Drawing& out) {
+  for (int end = 0; end < 2; ++end)
+    for (int axis = 0; axis < 3; ++axis) {
+      const glm::vec3 from = toGlm(link.end[end]), along = toGlm(Vector3d(link.worldFromLink[end].col(axis)));
+      out.arrows.push_back({from, from + length * along, 0.045f * length, kFrameColours[axis]});
+    }
+}
+
+}  // namespace
+
+void drawBodyModel(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame, const Shown& shown,
+                   float height, Drawing& out) {
+  if (shown.mesh) drawMesh(model, frame, height, out);
+  if (shown.skeleton) drawSkeleton(model, frame, height, out);
+  if (shown.spheres) drawSpheres(body, model, frame, out);
+  if (shown.buckets) drawBuckets(model, frame, out);
+  std::vector<CarriedLink> links;
+  for (const ElasticLink& link : model.links) {
+    links.push_back(carriedLink(body, model, frame, link));
+    const double thinner = std::min(model.spheres[link.sphere0].radius, model.spheres[link.sphere1].radius);
+    if (shown.links)
+      drawLink(links.back(), body.links == LinkModel::beam, std::min(kLink * height, 0.2f * float(thinner)), out);
+    if (shown.frames) drawFrames(links.back(), 0.7f * float(thinner), out);
+  }
+  if (!shown.attachments) return;
+  for (std::size_t n = 0; n < model.attachments.size(); ++n) {
+    const Attachment& a = model.attachments[n];
+    const Vector3d host = a.onLink ? links[a.host].at(a.along) : frame.spheres[a.host].position;
+    out.segments.push_back({toGlm(host), toGlm(frame.nodes[n]), kThin * height, kAttachmentColour});
+    out.balls.push_back({toGlm(frame.nodes[n]), kNode * height, kAttachmentColour});
+  }
+}
+
+std::vector<Segment> coil(glm::vec3 a, glm::vec3 b, float radius, float wire, glm::vec4 colour) {
+  constexpr int kTurns = 7, kPiecesPerTurn = 16, kPieces = kTurns * kPiecesPerTurn;
+  constexpr float kLead = 0.12f;  // share of the length in which the coil widens at either end
+  std::vector<Segment> out;
+  if (a == b) return out;
+  const glm::vec3 along = b - a, w = glm::normalize(along);
+  const glm::vec3 aside = std::abs(w.x) < 0.7f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+  const glm::vec3 u = glm::normalize(glm::cross(aside, w)), v = glm::cross(w, u);
+  glm::vec3 before = a;
+  for (int k = 1; k <= kPieces; ++k) {
+    const float s = float(k) / kPieces, angle = 6.2831853f * float(k) / kPiecesPerTurn;
+    const float wide = radius * glm::smoothstep(0.f, kLead, std::min(s, 1 - s));
+    const glm::vec3 at = k == kPieces ? b : a + s * along + wide * (std::cos(angle) * u + std::sin(angle) * v);
+    out.push_back({before, at, wire, colour});
+    before = at;
+  }
+  return out;
+}
+
+void drawProxy(const ToolSettings& tool, const ToolState& state, Drawing& out) {
+  const glm::vec3 proxy = toGlm(state.proxy), device = toGlm(state.device);
+  const float radius = float(tool.radius);
+  out.balls.push_back({proxy, radius, kProxyColour});
+  out.balls.push_back({device, 0.3f * radius, kDeviceColour});
+  const float width = std::min(0.45f * radius, glm::distance(proxy, device));
+  const std::vector<Segment> spring = coil(device, proxy, width, 0.12f * width, kDeviceColour);
+  out.segments.insert(out.segments.end(), spring.begin(), spring.end());
+}
+
+}  // namespace medulla

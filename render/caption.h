@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "render/image.h"
+
+namespace medulla {
+
+// A line of text in the upper left corner of a finished picture, on dark paper. A line that is too long for the picture
+// is written smaller; where no letter could be read (less than 5 rows high) nothing is.
+void drawCaption(const std::string& text, Image& image);
+
+}  // namespace medulla

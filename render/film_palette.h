@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+struct AVFrame;
+
+namespace medulla {
+
+// The 256 colours of a film and its pictures in them: FFmpeg's filters palettegen and paletteuse, one after the other.
+class FilmPalette {
+ public:
+  // `frame`: what the pictures are like. `scratch`: a name for a file where they wait; it is unlinked at once.
+  FilmPalette(const AVFrame& frame, const std::string& scratch);
+  ~FilmPalette();
+  void add(AVFrame& frame);  // of 4:2:0 planes without gaps
+  // Hands on each picture in its turn, as palette and indices.
+  void finish(const std::function<void(AVFrame&)>& take);
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
+
+// Throws std::runtime_error with FFmpeg's words for a negative code; else returns it.
+int checkedAv(int code);
+
+}  // namespace medulla

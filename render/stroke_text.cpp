@@ -1,0 +1,180 @@
+#include "render/stroke_text.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace medulla {
+
+using glm::vec2;
+
+Ink::Ink(Image& image) : image_(image), cover_(std::size_t(image.width) * image.height, 0.f) {}
+
+void Ink::stroke(vec2 a, vec2 b, float radius) {
+  const vec2 low = glm::min(a, b) - radius - 1.f, high = glm::max(a, b) + radius + 1.f;
+  const vec2 along = b - a;
+  const float length2 = glm::dot(along, along);
+  const int x0 = std::max(0, int(low.x)), x1 = std::min(image_.width - 1, int(high.x));
+  const int y0 = std::max(0, int(low.y)), y1 = std::min(image_.height - 1, int(high.y));
+  for (int y = y0; y <= y1; ++y)
+    for (int x = x0; x <= x1; ++x) {
+      const vec2 p = vec2(float(x) + 0.5f, float(y) + 0.5f) - a;
+      const float u = length2 > 0 ? glm::clamp(glm::dot(p, along) / length2, 0.f, 1.f) : 0.f;
+      add(x, y, glm::clamp(radius + 0.5f - glm::length(p - u * along), 0.f, 1.f));
+    }
+}
+
+void Ink::fill(vec2 low, vec2 high) {
+  for (int y = std::max(0, int(low.y)); y < std::min(image_.height, int(high.y)); ++y)
+    for (int x = std::max(0, int(low.x)); x < std::min(image_.width, int(high.x)); ++x) add(x, y, 1);
+}
+
+void Ink::apply(glm::vec3 colour, float opacity) {
+  glm::vec3 shown;
+  for (int c = 0; c < 3; ++c) shown[c] = 255 * float(srgbFromLight(colour[c]));
+  for (const std::size_t i : touched_) {
+    const float share = opacity * cover_[i];
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::uint8_t& pixel = image_.pixels[4 * i + c];
+      pixel = std::uint8_t(std::lround(float(pixel) + share * (shown[int(c)] - float(pixel))));
+    }
+    cover_[i] = 0;
+  }
+  touched_.clear();
+}
+
+void Ink::add(int x, int y, float share) {
+  if (share <= 0) return;
+  float& cover = cover_[std::size_t(y) * image_.width + x];
+  if (cover == 0) touched_.push_back(std::size_t(y) * image_.width + x);
+  cover = std::max(cover, share);
+}
+
+namespace {
+
+// Strokes between points of a grid, x 0..4 to the right and y 0..8 downwards: capitals from 0 to 6, small letters from
+// 2 to 6, tails to 8. A blank lifts the pen.
+struct Glyph {
+  char character;
+  float advance;
+  const char* strokes;
+};
+constexpr Glyph kGlyphs[] = {
+    {' ', 3, ""},
+    {'!', 3, "0004 0606"},
+    {'"', 4, "0001 2021"},
+    {'%', 6, "0640 0010110100 3545463635"},
+    {'\'', 2, "0001"},
+    {'(', 3, "10010516"},
+    {')', 3, "00111506"},
+    {'+', 6, "0343 2125"},
+    {',', 3, "0607"},
+    {'-', 6, "1333"},
+    {'.', 3, "0606"},
+    {'/', 5, "0630"},
+    {'0', 6, "103041453616050110"},
+    {'1', 5, "112026"},
+    {'2', 6, "01103041420646"},
+    {'3', 6, "004022324345361605"},
+    {'4', 6, "36300444"},
+    {'5', 6, "400002324345361605"},
+    {'6', 6, "30110305163645443303"},
+    {'7', 6, "004016"},
+    {'8', 6, "103041423313020110 1304051636454433"},
+    {'9', 6, "16354341301001021343"},
+    {':', 3, "0303 0606"},
+    {';', 3, "0303 0607"},
+    {'<', 6, "410345"},
+    {'=', 6, "0242 0444"},
+    {'>', 6, "014305"},
+    {'?', 6, "01103041422324 2626"},
+    {'A', 6, "062046 1434"},
+    {'B', 6, "06003041423303 3344453606"},
+    {'C', 6, "4130100105163645"},
+    {'D', 6, "06002042442606"},
+    {'E', 6, "40000646 0333"},
+    {'F', 6, "400006 0333"},
+    {'G', 6, "41301001051636454323"},
+    {'H', 6, "0006 4046 0343"},
+    {'I', 4, "1016"},
+    {'J', 6, "4045361605"},
+    {'K', 6, "0006 400346"},
+    {'L', 6, "000646"},
+    {'M', 6, "0600234046"},
+    {'N', 6, "06004640"},
+    {'O', 6, "20414526050120"},
+    {'P', 6, "06003041423303"},
+    {'Q', 6, "20414526050120 2446"},
+    {'R', 6, "06003041423303 2346"},
+    {'S', 6, "413010010213334445361605"},
+    {'T', 6, "0040 2026"},
+    {'U', 6, "000516364540"},
+    {'V', 6, "002640"},
+    {'W', 6, "0016223640"},
+    {'X', 6, "0046 4006"},
+    {'Y', 6, "002340 2326"},
+    {'Z', 6, "00400646"},
+    {'_', 6, "0747"},
+    {'a', 5, "3322120305162635 3236"},
+    {'b', 5, "0006 0312223335261605"},
+    {'c', 5, "3322120305162635"},
+    {'d', 5, "3036 3322120305162635"},
+    {'e', 5, "04343322120305162635"},
+    {'f', 4, "30201116 0222"},
+    {'g', 5, "3322120305162635 3237281807"},
+    {'h', 5, "0006 0312223336"},
+    {'i', 2, "0206 0000"},
+    {'j', 3, "121708 1010"},
+    {'k', 5, "0006 320436"},
+    {'l', 2, "0006"},
+    {'m', 6, "0206 03122326 23324346"},
+    {'n', 5, "0206 0312223336"},
+    {'o', 5, "122233352616050312"},
+    {'p', 5, "0208 0312223335261605"},
+    {'q', 5, "3238 3322120305162635"},
+    {'r', 4, "0206 031222"},
+    {'s', 5, "3212031424352606"},
+    {'t', 4, "101526 0222"},
+    {'u', 5, "0205162635 3236"},
+    {'v', 6, "022642"},
+    {'w', 6, "0216243642"},
+    {'x', 5, "0236 3206"},
+    {'y', 6, "0226 4218"},
+    {'z', 5, "02320636"},
+};
+constexpr Glyph kBox{'\0', 6, "0040460600"};
+
+const Glyph& glyphOf(char character) {
+  const auto* found = std::lower_bound(std::begin(kGlyphs), std::end(kGlyphs), character,
+                                       [](const Glyph& g, char c) { return g.character < c; });
+  return found != std::end(kGlyphs) && found->character == character ? *found : kBox;
+}
+
+// Of UTF-8: the bytes that carry a character on have no place of their own.
+bool continues(char c) {
+  return (static_cast<unsigned char>(c) & 0xC0) == 0x80;
+}
+
+}  // namespace
+
+float textWidth(const std::string& text, float height) {
+  float width = 0;
+  for (const char c : text)
+    if (!continues(c)) width += glyphOf(c).advance;
+  return width * height / 6;
+}
+
+void writeText(const std::string& text, vec2 corner, float height, Ink& ink) {
+  const float unit = height / 6;
+  for (const char c : text) {
+    if (continues(c)) continue;
+    const Glyph& glyph = glyphOf(c);
+    const auto point = [&](const char* at) { return corner + unit * vec2(float(at[0] - '0'), float(at[1] - '0')); };
+    for (const char* at = glyph.strokes; *at; at += 2) {
+      if (*at == ' ') ++at;
+      if (at[2] && at[2] != ' ') ink.stroke(point(at), point(at + 2), 0.085f * height);
+    }
+    corner.x += glyph.advance * unit;
+  }
+}
+
+}  // namespace medulla

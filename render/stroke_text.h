@@ -1,0 +1,33 @@
+#pragma once
+
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "render/image.h"
+
+// Lines and letters over a finished picture, on the CPU: the same values give the same bytes in every OpenGL.
+namespace medulla {
+
+// What is drawn with one colour: how much of each pixel it covers. Strokes that cross cover a pixel once.
+class Ink {
+ public:
+  explicit Ink(Image& image);
+  void stroke(glm::vec2 a, glm::vec2 b, float radius);  // px; with round ends, a dot where both ends are one
+  void fill(glm::vec2 low, glm::vec2 high);             // px
+  void apply(glm::vec3 colour, float opacity);          // linear RGB; puts it on the picture and starts anew
+
+ private:
+  void add(int x, int y, float share);
+
+  Image& image_;
+  std::vector<float> cover_;  // 0..1 per pixel
+  std::vector<std::size_t> touched_;
+};
+
+// Letters of strokes, `height` px high from the line that they stand on to the top of capitals; a third of it more
+// below. Characters beyond ASCII and those that have no strokes are empty boxes.
+float textWidth(const std::string& text, float height);                             // px
+void writeText(const std::string& text, glm::vec2 corner, float height, Ink& ink);  // corner: upper left
+
+}  // namespace medulla

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace medulla {
+
+enum class VideoFormat { mp4, webm, gif, webp };
+
+// One video file, by FFmpeg's libraries. A GIF has one palette for the whole film (with one per picture it is ten times
+// as large), so that its pictures wait in a file beside it, which nobody sees, until the last has come.
+class VideoEncoder {
+ public:
+  // Width and height even, fps > 0. All functions throw std::runtime_error with the reason alone.
+  VideoEncoder(VideoFormat format, const std::string& path, int width, int height, double fps);
+  VideoEncoder(VideoEncoder&&) noexcept;
+  ~VideoEncoder();
+  void write(std::vector<std::uint8_t>& planes);  // as rgbaToI420() makes them; not changed
+  void finish();
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
+
+}  // namespace medulla
