@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "physics/dynamics/identified_layout.h"
 #include "physics/dynamics/stages.h"
 
 namespace medulla {
@@ -109,7 +110,8 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
                     b,
                     (onLink ? mechanics.linkBulk : mechanics.sphereBulk)[host],
                     mechanics.largestPressure,
-                    -1};
+                    -1,
+                    d.bodies[b].links == LinkModel::identified};
     for (; k < sorted.size() && mechanics.attachments[sorted[k]].host == host; ++k) {
       order.body.push_back(b);
       order.node.push_back(sorted[k]);
@@ -267,20 +269,21 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.firstSphere = d.spheres.count;
     r.sphereCount = static_cast<int>(m.spheres.size());
     r.firstLink = d.links.count;
-    r.linkCount = static_cast<int>(m.links.size());
+    r.linkCount = d.bodies[b].links == LinkModel::identified ? 0 : static_cast<int>(m.links.size());
     r.node.resize(m.restNodes.size());
     r.restVolume = enclosedVolume(m);
     r.massDamping = mechanics[b].massDamping;
     r.held = !d.bodies[b].fixed.empty() || !d.bodies[b].fixedNodes.empty();
     d.ranges.push_back(r);
     addSpheres(d, d.bodies[b], mechanics[b]);
-    addLinks(d, d.bodies[b], mechanics[b], r.firstSphere);
+    if (r.linkCount > 0) addLinks(d, d.bodies[b], mechanics[b], r.firstSphere);
   }
   d.links.frames.resize(d.links.groups.size());
   d.links.loads.resize(4 * d.links.groups.size());
   d.links.unwoundTwist.resize(d.links.groups.size());
   d.links.slots.resize(8 * d.links.groups.size());
   addNodes(d, mechanics);
+  layOutIdentified(d, mechanics);
   addSprings(d, mechanics);
   for (std::size_t b = 0; b < d.bodies.size(); ++b) addDrives(d, d.bodies[b], d.ranges[b]);
   listSlots(d);

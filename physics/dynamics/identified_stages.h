@@ -1,0 +1,22 @@
+#pragma once
+
+#include "physics/dynamics/point_spring.h"
+#include "physics/dynamics/world_data.h"
+
+// The stages of a substep on bodies with LinkModel::identified; each is called by its counterpart in stages.h.
+namespace medulla {
+
+// identified_link.cpp
+void evaluateIdentifiedLinks(WorldData&);  // frames from spheres; links' forces on frames
+void returnFrameForces(WorldData&);        // from frames to spheres, added
+double identifiedLinkEnergy(const WorldData&);
+
+// identified_surface.cpp: the nodes of a range that hangs on frames.
+void pullOnFrames(WorldData&, const HostRange&);
+void returnToFrames(WorldData&, const HostRange&, Lanes pressure);
+void placeOnFrames(WorldData&, const HostRange&);
+double normalEnergy(const WorldData&, int node);  // J, of what the attachment is stiffer along the normal
+Eigen::Vector3d placeOnFrames(const WorldData&, int node);
+HostPoint hostPointOnFrames(const WorldData&, int node);
+
+}  // namespace medulla
