@@ -35,34 +35,46 @@ struct IdentifiedLinkGroup {
   Lanes relaxation;                     // s, Rayleigh's beta
 };
 
-// One of the frames that four nodes hang on. A node that hangs on fewer has some with weight and map 0.
-struct SkinTerm {
+// ---- Nodes: those of one sphere are seen from its frame, their home, and so are the other frames that any of them
+// hangs on.
+
+struct SkinTerms {  // four of those frames; a host's last are filled up with its home
   std::uint32_t frame[4];
-  Lanes weight;
-  Lanes3 restPlace;  // m, of the frame from the mean of all the node's
-  // Rows on the frame's way and on the vector part of its turn (half of a small rotation), m: six numbers for x, y, z
-  // each. Single precision: a rigid motion asks nothing of them, and they are most of what a substep reads.
-  alignas(16) float map[18][4];
+  Lanes3 restPlace;  // m, from the home's
 };
 
-// A frame as it stands against the blended one, in that: left by the pass that places nodes for the one that returns
-// loads.
+// The frames as they are seen from home; four at a time, so that number i of the one in a lane is 4 i + lane doubles
+// from the beginning.
 struct SkinTermState {
-  Lanes3 place, turn;  // m from the mean; vector part of the quaternion, of which `cosine` is the rest
-  Lanes cosine;
+  Lanes3 way, turn;          // m, how far they are from where they are at rest; twice their quaternion's vector part
+  Lanes3 wayRate, turnRate;  // m/s, 1/s
+  Lanes3 place;              // m, from home
+  Lanes cosine;              // of half the angle
 };
 
-struct SkinGroup {
-  int firstTerm, endTerm;
-  Lanes3 restOffset;   // m, from the mean of the frames
+struct SkinHost {
+  int home;  // a frame
+  int firstTerms, endTerms;
+};
+
+// What one frame's way and turn do to four nodes' places, and its share of how far their own frames are turned.
+// Single precision: a rigid motion asks nothing of these, and they are most of what a substep reads.
+struct alignas(16) SkinShare {
+  std::int32_t state, load;  // offsets in doubles of the frame's first number in SkinTermState, and in SkinTermLoad
+  float map[18][4];          // 1 and m: on way and turn, six numbers for x, y and z each
+  float weight[4];
+};
+
+struct SkinGroup {  // four nodes
+  int host;
+  int firstShare, endShare;
+  Lanes3 restOffset;   // m, from home
+  Lanes3 lever;        // m: what turns with the nodes' own frames to second order
   Lanes normalExcess;  // N/m5: what the attachment is stiffer along the node's area, over that area's square
 };
 
-// Where four nodes' frames blend to.
-struct SkinGroupState {
-  Rotation rotation;
-  Lanes3 offset;      // m, from the mean of the frames to the nodes' places, in the blended frame
-  Lanes inverseNorm;  // of the weighted sum of quaternions
+struct SkinTermLoad {  // of one frame, per node in each lane: on way and turn
+  Lanes onWay[3], onTurn[3];
 };
 
 struct IdentifiedBody {
@@ -78,10 +90,13 @@ struct Identified {
   std::vector<CarriedFrame> carried;  // per frame
   std::vector<IdentifiedLinkGroup> links;
   int linkCount = 0;
-  std::vector<SkinTerm> terms;
-  std::vector<SkinTermState> termStates;
+  std::vector<SkinHost> hosts;
+  std::vector<SkinTerms> terms;
+  std::vector<SkinTermState> termStates;  // of the current substep
+  std::vector<SkinTermLoad> termLoads;    // of one host, while its nodes return theirs
+  std::vector<SkinShare> shares;
   std::vector<SkinGroup> skin;
-  std::vector<SkinGroupState> skinStates;
+  std::vector<Lanes3> turns;     // per SkinGroup: of its nodes' own frames against home; of the current substep
   std::vector<int> ofNodeGroup;  // per group of nodes: in `skin`, -1 of others
 };
 

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "physics/dynamics/identified_measures.h"
+#include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/skin_map.h"
 
@@ -9,8 +10,6 @@
 namespace medulla {
 
 namespace {
-
-using Eigen::Matrix3d;
 
 // Rates of the six measures for one motion of the two frames, in the order of the stiffness: the neo-Hookean measure's
 // for that along.
@@ -103,28 +102,24 @@ void setFrameRates(WorldData& d, const Motion& motion) {
   }
 }
 
-void carryOnFrames(const WorldData& d, const HostRange& range, std::vector<Quad>& carried) {
-  const Identified& s = d.identified;
+void carryOnFrames(WorldData& d, const HostRange& range, std::vector<Quad>& carried) {
+  Identified& s = d.identified;
+  const SkinHost& host = s.hosts[s.skin[s.ofNodeGroup[range.firstGroup]].host];
+  const HomeFrame home = homeFrame(s, host);
+  SkinTermState* states = &s.termStates[host.firstTerms];
+  seeFrames(s, host, home, states);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
-    const int skin = s.ofNodeGroup[g];
-    const SkinGroup& group = s.skin[skin];
-    storeFour(skinRates(s, group, &s.termStates[group.firstTerm], s.skinStates[skin]).velocity, carried, 4 * g);
+    const SkinPlace place = placeSkin<true>(s, s.skin[s.ofNodeGroup[g]], states);
+    const Lanes3 along = cross(home.omega, rotate(home.rotation, place.offset));
+    storeFour(home.velocity + along + rotate(home.rotation, place.offsetRate), carried, 4 * g);
   }
 }
 
 void returnImpulsesToFrames(WorldData& d, const HostRange& range, const std::vector<Quad>& impulses) {
-  Identified& s = d.identified;
   const Lanes zero = splat(0);
-  for (int g = range.firstGroup; g < range.endGroup; ++g) {
-    const int skin = s.ofNodeGroup[g];
-    const SkinGroup& group = s.skin[skin];
-    returnSkinLoads(s, group, &s.termStates[group.firstTerm], s.skinStates[skin], gatherFour(impulses, 4 * g),
-                    {zero, zero, zero}, [&](int k, const Lanes3& force, const Lanes3& torque) {
-                      const std::uint32_t* frames = s.terms[group.firstTerm + k].frame;
-                      addFour(force, s.loads.data(), frames, &FrameLoad::force);
-                      addFour(torque, s.loads.data(), frames, &FrameLoad::torque);
-                    });
-  }
+  FrameReturn back(d, range);
+  for (int g = range.firstGroup; g < range.endGroup; ++g) back.add(g, gatherFour(impulses, 4 * g), {zero, zero, zero});
+  back.finish();
 }
 
 void returnFrameImpulses(const WorldData& d, Motion& motion) {
@@ -140,40 +135,20 @@ void returnFrameImpulses(const WorldData& d, Motion& motion) {
 }
 
 // Nodes on frames without a link between them have no block to be added to. What bounds the whole from above stands for
-// it: |sum J_k x_k|^2 <= (sum a_j) sum |J_k x_k|^2 / a_k for any a, here the share that each frame has of the node.
+// it: |sum J_k x_k|^2 <= (sum a_j) sum |J_k x_k|^2 / a_k for any a, here the share that each sphere has of the node.
 void addCarriedMassOnFrames(const WorldData& d, const HostRange& range, const std::vector<double>& mass,
                             std::vector<Block6>& diagonal) {
-  const Identified& s = d.identified;
-  const Lanes zero = splat(0), one = splat(1);
-  for (int g = range.firstGroup; g < range.endGroup; ++g) {
-    const int skin = s.ofNodeGroup[g];
-    const SkinGroup& group = s.skin[skin];
-    Lanes3 force[6][3], torque[6][3];
-    for (int axis = 0; axis < 3; ++axis)
-      returnSkinLoads(s, group, &s.termStates[group.firstTerm], s.skinStates[skin],
-                      {axis == 0 ? one : zero, axis == 1 ? one : zero, axis == 2 ? one : zero}, {zero, zero, zero},
-                      [&](int k, const Lanes3& f, const Lanes3& t) {
-                        put(f, force[k][axis]);
-                        put(t, torque[k][axis]);
-                      });
-    const int count = group.endTerm - group.firstTerm;
-    for (int lane = 0; lane < 4; ++lane) {
-      Eigen::Matrix<double, 6, 3> rows[6];
-      double share[6], whole = 0;
-      for (int k = 0; k < count; ++k) {
-        const CarriedFrame& c = s.carried[s.terms[group.firstTerm + k].frame[lane]];
-        for (int axis = 0; axis < 3; ++axis) {
-          const Eigen::Vector3d f = vectorOf(force[k][axis], lane);
-          rows[k].block<3, 1>(0, axis) = f;
-          rows[k].block<3, 1>(3, axis) = vectorOf(torque[k][axis], lane) + vectorOf(c.worldArm).cross(f);
-        }
-        share[k] = c.sphere < 0 ? 0 : rows[k].topRows<3>().norm();
-        whole += share[k];
-      }
-      for (int k = 0; k < count; ++k)
-        if (share[k] > 0)
-          diagonal[s.carried[s.terms[group.firstTerm + k].frame[lane]].sphere] +=
-              mass[4 * g + lane] * whole / share[k] * rows[k] * rows[k].transpose();
+  for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
+    if (mass[i] == 0) continue;
+    const HostPoint p = hostPointOnFrames(d, i);
+    double whole = 0;
+    for (int k = 0; k < p.count; ++k) whole += p.force[k].norm();
+    for (int k = 0; k < p.count; ++k) {
+      if (p.force[k].isZero(0)) continue;
+      Eigen::Matrix<double, 6, 3> rows;
+      rows.topRows<3>() = p.force[k];
+      rows.bottomRows<3>() = p.torque[k];
+      diagonal[p.spheres[k]] += mass[i] * whole / p.force[k].norm() * rows * rows.transpose();
     }
   }
 }

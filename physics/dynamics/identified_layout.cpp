@@ -6,6 +6,7 @@
 #include <map>
 
 #include "physics/dynamics/identified_measures.h"
+#include "physics/dynamics/identified_mechanics.h"
 
 namespace medulla {
 
@@ -88,51 +89,99 @@ void addLinks(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
   }
 }
 
-void setTerm(SkinTerm& term, int lane, const SkinFrame& f, int frame, const Vector3d& place, double lengthScale) {
-  term.frame[lane] = static_cast<std::uint32_t>(frame);
-  term.weight[lane] = f.weight;
-  setLane(term.restPlace, lane, place);
+// The host of a range of nodes, its frames numbered as the nodes ask for them.
+class HostTerms {
+ public:
+  HostTerms(Identified& s, int home, const Vector3d& homePlace) : s_(&s), homePlace_(homePlace) {
+    host_ = static_cast<int>(s.hosts.size());
+    s.hosts.push_back({home, static_cast<int>(s.terms.size()), static_cast<int>(s.terms.size())});
+  }
+  int host() const { return host_; }
+  const Vector3d& homePlace() const { return homePlace_; }
+  int of(int frame, const Vector3d& restPlace) {
+    const auto [found, isNew] = number_.try_emplace(frame, static_cast<int>(number_.size()));
+    if (!isNew) return found->second;
+    SkinHost& host = s_->hosts[host_];
+    const int lane = found->second % 4;
+    if (lane == 0) {
+      SkinTerms terms{};
+      std::fill_n(terms.frame, 4, static_cast<std::uint32_t>(host.home));
+      s_->terms.push_back(terms);
+      ++host.endTerms;
+    }
+    s_->terms.back().frame[lane] = static_cast<std::uint32_t>(frame);
+    setLane(s_->terms.back().restPlace, lane, restPlace - homePlace_);
+    return found->second;
+  }
+
+ private:
+  Identified* s_;
+  Vector3d homePlace_;
+  int host_;
+  std::map<int, int> number_;
+};
+
+void setMap(SkinShare& share, int lane, const SkinRow& row, double weight) {
+  share.weight[lane] = static_cast<float>(weight);
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      term.map[6 * i + j][lane] = static_cast<float>(f.map(i, j));
-      // A small rotation is twice its quaternion's vector part.
-      term.map[6 * i + 3 + j][lane] = static_cast<float>(2 * lengthScale * f.map(i, 3 + j));
+      share.map[6 * i + j][lane] = static_cast<float>(row.onWay(i, j));
+      share.map[6 * i + 3 + j][lane] = static_cast<float>(row.onTurn(i, j));
     }
   }
 }
 
-SkinTerm emptyTerm(int frame) {
-  SkinTerm term{};
-  std::fill_n(term.frame, 4, static_cast<std::uint32_t>(frame));
-  return term;
-}
-
-// The four nodes of group g, -1 on pads.
-void addSkin(WorldData& d, int body, const BodyMechanics& mechanics, const std::array<int, 4>& nodes, int g,
+// Four nodes, -1 on pads.
+void addSkin(WorldData& d, int body, const BodyMechanics& mechanics, const std::array<int, 4>& nodes, HostTerms& terms,
              FrameNumbers& frames) {
   Identified& s = d.identified;
   const SoftBodyModel& m = *d.bodies[body].model;
   SkinGroup group{};
-  group.firstTerm = static_cast<int>(s.terms.size());
-  std::size_t most = 0;
-  for (const int node : nodes)
-    if (node >= 0) most = std::max(most, mechanics.skin[node].size());
-  group.endTerm = group.firstTerm + static_cast<int>(most);
-  s.terms.resize(group.endTerm, emptyTerm(frames.first()));
+  group.host = terms.host();
+  group.firstShare = static_cast<int>(s.shares.size());
+  std::map<int, SkinShare> shares;  // by the frame's number in the host
   for (int l = 0; l < 4; ++l) {
     if (nodes[l] < 0) continue;
     const std::vector<SkinFrame>& skin = mechanics.skin[nodes[l]];
-    Vector3d mean = Vector3d::Zero();
-    for (const SkinFrame& f : skin) mean += f.weight * frames.restPoint(f.frame, f.restPoint);
-    for (std::size_t k = 0; k < skin.size(); ++k)
-      setTerm(s.terms[group.firstTerm + k], l, skin[k], frames.of(skin[k].frame, skin[k].restPoint),
-              frames.restPoint(skin[k].frame, skin[k].restPoint) - mean, m.identified->lengthScale);
-    setLane(group.restOffset, l, m.restNodes[nodes[l]] - mean);
+    const std::vector<SkinRow> rows = skinRows(m, skin, nodes[l]);
+    for (std::size_t k = 0; k < skin.size() && mechanics.nodeMoves[nodes[l]]; ++k) {
+      const int frame = frames.of(skin[k].frame, skin[k].restPoint);
+      if (frame == s.hosts[terms.host()].home) continue;
+      const int term = terms.of(frame, frames.restPoint(skin[k].frame, skin[k].restPoint));
+      SkinShare& share = shares[term];
+      constexpr int kDoubles = sizeof(SkinTermState) / sizeof(double);
+      share.load = term;
+      share.state = kDoubles * (term / 4) + term % 4;
+      setMap(share, l, rows[k], skin[k].weight);
+    }
+    setLane(group.restOffset, l, m.restNodes[nodes[l]] - terms.homePlace());
+    setLane(group.lever, l, skinLever(m, skin, nodes[l]));
     const double area = mechanics.attachments[nodes[l]].area;
     if (area > 0) group.normalExcess[l] = mechanics.normalExcess[nodes[l]] / (area * area);
   }
-  s.ofNodeGroup[g] = static_cast<int>(s.skin.size());
+  for (const auto& [term, share] : shares) s.shares.push_back(share);
+  group.endShare = static_cast<int>(s.shares.size());
   s.skin.push_back(group);
+}
+
+void addSkins(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbers& frames) {
+  std::vector<int> nodeAt(d.nodes.count, -1);
+  for (std::size_t i = 0; i < d.ranges[body].node.size(); ++i) nodeAt[d.ranges[body].node[i]] = static_cast<int>(i);
+  for (const std::vector<HostRange>* ranges : {&d.nodes.onSpheres, &d.nodes.skinOnSpheres}) {
+    for (const HostRange& range : *ranges) {
+      if (range.body != body) continue;
+      const int node = nodeAt[4 * range.firstGroup];
+      const SkinFrame& first = mechanics.skin[node].front();
+      // Held nodes all hang on patches, which do not move against each other.
+      const int home = mechanics.nodeMoves[node] ? range.host - d.ranges[body].firstSphere : first.frame;
+      HostTerms terms(d.identified, frames.of(home, first.restPoint), frames.restPoint(home, first.restPoint));
+      for (int g = range.firstGroup; g < range.endGroup; ++g) {
+        d.identified.ofNodeGroup[g] = static_cast<int>(d.identified.skin.size());
+        addSkin(d, body, mechanics, {nodeAt[4 * g], nodeAt[4 * g + 1], nodeAt[4 * g + 2], nodeAt[4 * g + 3]}, terms,
+                frames);
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -146,17 +195,15 @@ void layOutIdentified(WorldData& d, const std::vector<BodyMechanics>& mechanics)
     FrameNumbers frames(d, body);
     const int firstLinkGroup = static_cast<int>(s.links.size());
     addLinks(d, body, mechanics[b], frames);
-    std::map<int, std::array<int, 4>> groups;
-    for (std::size_t i = 0; i < d.ranges[b].node.size(); ++i) {
-      const int place = d.ranges[b].node[i];
-      groups.try_emplace(place / 4, std::array<int, 4>{-1, -1, -1, -1}).first->second[place % 4] = static_cast<int>(i);
-    }
-    for (const auto& [g, nodes] : groups) addSkin(d, body, mechanics[b], nodes, g, frames);
+    addSkins(d, body, mechanics[b], frames);
     s.bodies.push_back({body, frames.first(), frames.end(), firstLinkGroup, static_cast<int>(s.links.size())});
   }
   s.loads.resize(s.frames.size());
   s.termStates.resize(s.terms.size());
-  s.skinStates.resize(s.skin.size());
+  int most = 0;
+  for (const SkinHost& host : s.hosts) most = std::max(most, host.endTerms - host.firstTerms);
+  s.termLoads.resize(4 * most);
+  s.turns.resize(s.skin.size());
 }
 
 }  // namespace medulla

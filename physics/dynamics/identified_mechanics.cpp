@@ -137,25 +137,42 @@ SphereCell sphereCell(const BodyDescription& body, int sphere) {
   return {f.volume, f.secondMoment + f.volume * arm * arm.transpose()};
 }
 
-std::vector<HostRate> hostRates(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node) {
-  const double scale = model.identified->lengthScale;
+static Vector3d meanOf(const std::vector<SkinFrame>& frames) {
   Vector3d mean = Vector3d::Zero();
   for (const SkinFrame& f : frames) mean += f.weight * f.restPoint;
-  // Of the blended frame: its velocity, and its turning with what it carries.
+  return mean;
+}
+
+std::vector<SkinRow> skinRows(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node) {
+  const double scale = model.identified->lengthScale;
+  const Vector3d mean = meanOf(frames);
+  // Of the blended frame: its way, and its turn with what it carries.
   Matrix3d ofMean = Matrix3d::Identity(), ofTurn = -crossMatrix(model.restNodes[node] - mean);
   for (const SkinFrame& f : frames) {
     const Matrix3d way = f.map.leftCols<3>(), turn = scale * f.map.rightCols<3>();
     ofMean -= way;
     ofTurn += way * crossMatrix(f.restPoint - mean) - turn;
   }
+  std::vector<SkinRow> out;
+  for (const SkinFrame& f : frames)
+    out.push_back({f.weight * ofMean + f.map.leftCols<3>(), f.weight * ofTurn + scale * f.map.rightCols<3>()});
+  return out;
+}
+
+Vector3d skinLever(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node) {
+  const Vector3d mean = meanOf(frames);
+  Vector3d lever = model.restNodes[node] - mean;
+  for (const SkinFrame& f : frames) lever -= f.map.leftCols<3>().trace() / 3 * (f.restPoint - mean);
+  return lever;
+}
+
+std::vector<HostRate> hostRates(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node) {
+  const std::vector<SkinRow> rows = skinRows(model, frames, node);
   std::vector<HostRate> out;
-  for (const SkinFrame& f : frames) {
-    if (f.frame >= static_cast<int>(model.spheres.size())) continue;
-    HostRate rate;
-    rate.sphere = f.frame;
-    rate.linear = f.weight * ofMean + f.map.leftCols<3>();
-    rate.angular = f.weight * ofTurn + scale * f.map.rightCols<3>() - rate.linear * crossMatrix(armOf(model, f.frame));
-    out.push_back(rate);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const int frame = frames[k].frame;
+    if (frame >= static_cast<int>(model.spheres.size())) continue;
+    out.push_back({frame, rows[k].onWay, rows[k].onTurn - rows[k].onWay * crossMatrix(armOf(model, frame))});
   }
   return out;
 }

@@ -31,7 +31,16 @@ struct SphereCell {
 };
 SphereCell sphereCell(const BodyDescription& body, int sphere);
 
-// The body at rest: how a node's velocity follows its spheres', sum of linear v + angular omega.
+// At rest a node follows the ways and turns (small rotations) of the frames it hangs on, each seen from anywhere: sum
+// of onWay way + onTurn turn.
+struct SkinRow {
+  Eigen::Matrix3d onWay, onTurn;  // 1, m
+};
+std::vector<SkinRow> skinRows(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node);
+// m: what the frames' mean turn s adds to second order is s x (s x lever) / 2. Its maps are taken for isotropic there.
+Eigen::Vector3d skinLever(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node);
+
+// The same of its spheres alone: velocity = sum linear v + angular omega.
 struct HostRate {
   int sphere = 0;
   Eigen::Matrix3d linear, angular;  // 1, m

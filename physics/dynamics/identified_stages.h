@@ -16,6 +16,23 @@ void pullOnFrames(WorldData&, const HostRange&);
 void returnToFrames(WorldData&, const HostRange&, Lanes pressure);
 void placeOnFrames(WorldData&, const HostRange&);
 double normalEnergy(const WorldData&, int node);  // J, of what the attachment is stiffer along the normal
+
+// What acts at the places of a range's nodes (N, N m, world) goes to their frames; at the state of the last
+// pullOnFrames().
+class FrameReturn {
+ public:
+  FrameReturn(WorldData&, const HostRange&);
+  void add(int group, const Lanes3& force, const Lanes3& moment);  // the moment to what carries the nodes' surface
+  void finish();
+
+ private:
+  WorldData* d_;
+  const SkinHost* host_;
+  Rotation rotation_;
+  Lanes3 force_, moment_;  // in the home frame
+};
+
+// identified_node.cpp
 Eigen::Vector3d placeOnFrames(const WorldData&, int node);
 HostPoint hostPointOnFrames(const WorldData&, int node);
 

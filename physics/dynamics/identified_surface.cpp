@@ -1,4 +1,5 @@
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "physics/dynamics/edge_springs.h"
 #include "physics/dynamics/identified_stages.h"
@@ -9,80 +10,109 @@ namespace medulla {
 
 namespace {
 
-struct SkinPlace {
-  Lanes3 mean, offset, area;  // m, world: of the frames; from there to the nodes' places; m2, carried along
-};
-
-MEDULLA_INLINE SkinPlace placeGroup(Identified& s, const NodeGroup& group, int skin) {
-  const SkinGroup& g = s.skin[skin];
-  SkinGroupState& state = s.skinStates[skin];
-  const Lanes3 mean = placeSkin(s, g, &s.termStates[g.firstTerm], state);
-  return {mean, rotate(state.rotation, state.offset), rotate(state.rotation, group.restArea)};
+int hostOf(const WorldData& d, int group) {
+  return d.identified.skin[d.identified.ofNodeGroup[group]].host;
 }
 
-MEDULLA_INLINE SkinRates ratesOf(const Identified& s, int skin) {
-  return skinRates(s, s.skin[skin], &s.termStates[s.skin[skin].firstTerm], s.skinStates[skin]);
+SkinTermState* statesOf(Identified& s, const SkinHost& host) {
+  return s.termStates.data() + host.firstTerms;
 }
 
-MEDULLA_INLINE void returnGroup(const Identified& s, int skin, const Lanes3& force, const Lanes3& moment,
-                                FrameLoad* loads) {
-  const SkinGroup& g = s.skin[skin];
-  returnSkinLoads(s, g, &s.termStates[g.firstTerm], s.skinStates[skin], force, moment,
-                  [&](int k, const Lanes3& f, const Lanes3& torque) {
-                    const std::uint32_t* frames = s.terms[g.firstTerm + k].frame;
-                    addFour(f, loads, frames, &FrameLoad::force);
-                    addFour(torque, loads, frames, &FrameLoad::torque);
-                  });
+// The host's frames, seen from its home.
+MEDULLA_INLINE HomeFrame seeHost(Identified& s, const SkinHost& host) {
+  const HomeFrame home = homeFrame(s, host);
+  seeFrames(s, host, home, statesOf(s, host));
+  return home;
 }
 
 }  // namespace
 
 void pullOnFrames(WorldData& d, const HostRange& range) {
   Nodes& n = d.nodes;
+  Identified& s = d.identified;
+  const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
+  const HomeFrame home = seeHost(s, host);
   const Lanes relaxation = splat(range.relaxation);
   Lanes volume = splat(0);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
-    const int skin = d.identified.ofNodeGroup[g];
-    const SkinPlace place = placeGroup(d.identified, n.groups[g], skin);
-    const SkinRates rates = ratesOf(d.identified, skin);
-    const Lanes3 displaced = n.position[g] - place.mean - place.offset;
-    const Lanes3 rate = rates.velocity + cross(rates.spin, displaced) - n.velocity[g];
-    const Lanes lifted = dot(displaced, place.area), lifting = dot(rate, place.area);
-    const Lanes stiffness = n.groups[g].stiffness, excess = d.identified.skin[skin].normalExcess;
+    const int skin = s.ofNodeGroup[g];
+    const SkinPlace place = placeSkin<true>(s, s.skin[skin], statesOf(s, host));
+    put(place.turn, s.turns[skin]);
+    const NodeGroup& group = n.groups[g];
+    const Lanes3 offset = rotate(home.rotation, place.offset), area = rotate(home.rotation, group.restArea);
+    const Lanes3 lever = n.position[g] - home.position, displaced = lever - offset;
+    const Lanes3 rate =
+        home.velocity + cross(home.omega, lever) + rotate(home.rotation, place.offsetRate) - n.velocity[g];
+    const Lanes lifted = dot(displaced, area), lifting = dot(rate, area), excess = s.skin[skin].normalExcess;
     volume = volume + lifted;
-    const Lanes3 pull = fnma(stiffness, displaced, (stiffness * relaxation) * rate);
-    put(fma(excess * fma(relaxation, lifting, splat(0) - lifted), place.area, pull), n.force[g]);
-    put(place.offset, n.offset[g]);
-    put(place.area, n.area[g]);
+    const Lanes3 pull = fnma(group.stiffness, displaced, (group.stiffness * relaxation) * rate);
+    put(fma(excess * fma(relaxation, lifting, splat(0) - lifted), area, pull), n.force[g]);
+    put(offset, n.offset[g]);
+    put(area, n.area[g]);
     storeFour(displaced, n.displaced, 4 * g);
   }
-  d.nodes.swollen[range.part] = sumOfLanes(volume);
+  n.swollen[range.part] = sumOfLanes(volume);
 }
 
-// Springs along what nodes are displaced by turn nothing; all others act at the nodes, and the blended frame bears the
-// difference.
+// Springs pull along what nodes are displaced by, edges act at the nodes' places; all else acts at the nodes, and home
+// bears the difference.
 void returnToFrames(WorldData& d, const HostRange& range, Lanes pressure) {
   Nodes& n = d.nodes;
+  FrameReturn back(d, range);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const Lanes3 displaced = gatherFour(n.displaced, 4 * g);
     const Lanes3 edges = pullOfEdges(d.springs, n.displaced.data(), displaced, n.groups[g].edges, g);
     const Lanes3 own = fnma(pressure, n.area[g], n.force[g]), force = own + edges;
     put(force, n.force[g]);
     const Lanes minus = splat(-1);
-    returnGroup(d.identified, d.identified.ofNodeGroup[g], minus * force, minus * cross(displaced, own),
-                d.identified.loads.data());
+    back.add(g, minus * force, minus * cross(displaced, own));
   }
+  back.finish();
 }
 
 void placeOnFrames(WorldData& d, const HostRange& range) {
   Nodes& n = d.nodes;
+  Identified& s = d.identified;
+  const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
+  const HomeFrame home = seeHost(s, host);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
-    const int skin = d.identified.ofNodeGroup[g];
-    const SkinPlace place = placeGroup(d.identified, n.groups[g], skin);
-    put(place.mean + place.offset + gatherFour(n.displaced, 4 * g), n.position[g]);
-    put(ratesOf(d.identified, skin).velocity, n.velocity[g]);
-    put(place.area, n.area[g]);
+    const SkinPlace place = placeSkin<true>(s, s.skin[s.ofNodeGroup[g]], statesOf(s, host));
+    const Lanes3 offset = rotate(home.rotation, place.offset);
+    put(home.position + offset + gatherFour(n.displaced, 4 * g), n.position[g]);
+    put(home.velocity + cross(home.omega, offset) + rotate(home.rotation, place.offsetRate), n.velocity[g]);
+    put(rotate(home.rotation, n.groups[g].restArea), n.area[g]);
   }
+}
+
+FrameReturn::FrameReturn(WorldData& d, const HostRange& range)
+    : d_(&d), host_(&d.identified.hosts[hostOf(d, range.firstGroup)]) {
+  const Identified& s = d.identified;
+  const FrameState& home = s.frames[host_->home];
+  rotation_ = rotationOf(splat(home.orientation), splat(home.orientation.v[3]));
+  const Lanes zero = splat(0);
+  force_ = moment_ = {zero, zero, zero};
+  std::fill_n(d.identified.termLoads.begin(), 4 * (host_->endTerms - host_->firstTerms), SkinTermLoad{});
+}
+
+void FrameReturn::add(int g, const Lanes3& force, const Lanes3& moment) {
+  Identified& s = d_->identified;
+  const int skin = s.ofNodeGroup[g];
+  const Lanes3 f = rotateBack(rotation_, force);
+  put(force_ + f, force_);
+  put(moment_ + rotateBack(rotation_, moment + cross(d_->nodes.offset[g], force)), moment_);
+  giveToTerms(s, s.skin[skin], s.turns[skin], f, s.termLoads.data());
+}
+
+void FrameReturn::finish() {
+  Identified& s = d_->identified;
+  const HomeLoad own = giveToFrames(s, *host_, rotation_, statesOf(s, *host_), s.termLoads.data(), force_, moment_,
+                                    [&](const std::uint32_t* frames, const Lanes3& force, const Lanes3& torque) {
+                                      addFour(force, s.loads.data(), frames, &FrameLoad::force);
+                                      addFour(torque, s.loads.data(), frames, &FrameLoad::torque);
+                                    });
+  FrameLoad& home = s.loads[host_->home];
+  store(home.force, load(home.force) + own.force);
+  store(home.torque, load(home.torque) + own.moment);
 }
 
 double normalEnergy(const WorldData& d, int node) {
@@ -90,39 +120,6 @@ double normalEnergy(const WorldData& d, int node) {
   if (skin < 0) return 0;
   const double lifted = vectorAt(d.nodes.area, node).dot(vectorOf(d.nodes.displaced[node]));
   return 0.5 * d.identified.skin[skin].normalExcess[node % 4] * lifted * lifted;
-}
-
-Eigen::Vector3d placeOnFrames(const WorldData& d, int node) {
-  const Identified& s = d.identified;
-  SkinTermState states[6];
-  SkinGroupState at;
-  const Lanes3 mean = placeSkin(s, s.skin[s.ofNodeGroup[node / 4]], states, at);
-  return vectorOf(mean + rotate(at.rotation, at.offset), node % 4);
-}
-
-HostPoint hostPointOnFrames(const WorldData& d, int node) {
-  const Identified& s = d.identified;
-  const SkinGroup& g = s.skin[s.ofNodeGroup[node / 4]];
-  SkinTermState states[6];
-  SkinGroupState at;
-  placeSkin(s, g, states, at);
-  HostPoint p;
-  const int lane = node % 4;
-  const Lanes zero = splat(0), one = splat(1);
-  for (int axis = 0; axis < 3; ++axis) {
-    const Lanes3 unit{axis == 0 ? one : zero, axis == 1 ? one : zero, axis == 2 ? one : zero};
-    p.count = 0;
-    returnSkinLoads(s, g, states, at, unit, {zero, zero, zero}, [&](int k, const Lanes3& force, const Lanes3& torque) {
-      const CarriedFrame& c = s.carried[s.terms[g.firstTerm + k].frame[lane]];
-      if (c.sphere < 0) return;
-      const Eigen::Vector3d f = vectorOf(force, lane);
-      p.spheres[p.count] = c.sphere;
-      p.force[p.count].col(axis) = f;
-      p.torque[p.count].col(axis) = vectorOf(torque, lane) + vectorOf(c.worldArm).cross(f);
-      ++p.count;
-    });
-  }
-  return p;
 }
 
 }  // namespace medulla

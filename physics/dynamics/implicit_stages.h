@@ -35,7 +35,7 @@ void addLinkMatrix(const LinkMatrix& m, ImplicitData& s, std::size_t pair);
 void addIdentifiedStiffness(const WorldData& d, ImplicitData& s);
 void listIdentifiedPairs(const WorldData& d, std::vector<std::array<int, 2>>& pairs);
 void setFrameRates(WorldData& d, const Motion& motion);
-void carryOnFrames(const WorldData& d, const HostRange& range, std::vector<Quad>& carried);
+void carryOnFrames(WorldData& d, const HostRange& range, std::vector<Quad>& carried);
 void returnImpulsesToFrames(WorldData& d, const HostRange& range, const std::vector<Quad>& impulses);
 void returnFrameImpulses(const WorldData& d, Motion& motion);
 void addCarriedMassOnFrames(const WorldData& d, const HostRange& range, const std::vector<double>& mass,

@@ -98,11 +98,15 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
   std::vector<int> sorted;
   for (std::size_t i = 0; i < mechanics.attachments.size(); ++i)
     if (mechanics.attachments[i].onLink == onLink) sorted.push_back(static_cast<int>(i));
-  std::stable_sort(sorted.begin(), sorted.end(), [&](int i, int j) {
-    return std::pair(mechanics.attachments[i].host, -edges[i]) < std::pair(mechanics.attachments[j].host, -edges[j]);
-  });
+  // On frames what is held hangs on its patch, and stands apart.
+  const bool onFrames = d.bodies[b].links == LinkModel::identified;
+  const auto hostOf = [&](int i) {
+    return std::pair(mechanics.attachments[i].host, onFrames && !mechanics.nodeMoves[i]);
+  };
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [&](int i, int j) { return std::pair(hostOf(i), -edges[i]) < std::pair(hostOf(j), -edges[j]); });
   for (std::size_t k = 0; k < sorted.size();) {
-    const int host = mechanics.attachments[sorted[k]].host;
+    const auto [host, held] = hostOf(sorted[k]);
     HostRange range{firstHost + host,
                     static_cast<int>(order.node.size()) / 4,
                     0,
@@ -111,8 +115,8 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
                     (onLink ? mechanics.linkBulk : mechanics.sphereBulk)[host],
                     mechanics.largestPressure,
                     -1,
-                    d.bodies[b].links == LinkModel::identified};
-    for (; k < sorted.size() && mechanics.attachments[sorted[k]].host == host; ++k) {
+                    onFrames};
+    for (; k < sorted.size() && hostOf(sorted[k]) == std::pair(host, held); ++k) {
       order.body.push_back(b);
       order.node.push_back(sorted[k]);
     }
