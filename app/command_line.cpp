@@ -334,7 +334,7 @@ Verb addInfo(CLI::App& app) {
 
 struct BuildArguments {
   BuildOptions options;
-  std::string method = "cover", linkForm = "diagonal";
+  std::string method = "cover", linkForm = "full";
 };
 
 BuildOptions buildOptions(const BuildArguments& a) {

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "app/commands/commands.h"
-#include "app/files/held_region.h"
+#include "app/files/fix_text.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/output_file.h"

@@ -5,17 +5,17 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <stdexcept>
 
+#include "physics/model/identify/layer_fit.h"
 #include "physics/model/identify/skin_fit.h"
-#include "physics/model/surface_queries.h"
 
 namespace medulla {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
+using Eigen::VectorXd;
 using Progress = std::function<void(double)>;
 
 namespace {
@@ -23,51 +23,6 @@ namespace {
 void checkSettings(const IdentifySettings& s) {
   if (!(s.poisson >= 0 && s.poisson < 0.5))
     throw std::runtime_error(fmt::format("a Poisson's ratio of {}; expected 0 or more and less than 0.5", s.poisson));
-}
-
-std::vector<int> wholeTriangles(const TriangleMesh& mesh, const HeldRegion& region) {
-  if (region.nodes.empty()) throw std::runtime_error(fmt::format("{} holds no node of the surface", region.text));
-  std::vector<bool> held(mesh.vertices.size(), false);
-  for (const int n : region.nodes) held[n] = true;
-  std::vector<int> out;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    if (held[a] && held[b] && held[c]) out.push_back(static_cast<int>(t));
-  }
-  if (out.empty()) {
-    throw std::runtime_error(
-        fmt::format("{} holds {} nodes but no whole triangle of the surface; expected one at least", region.text,
-                    region.nodes.size()));
-  }
-  return out;
-}
-
-// The material in a region that is nearer to the triangles held there than to all others: what lies behind them, where
-// a region ends within a triangle, too.
-std::function<bool(const Vector3d&)> heldSpaceOf(const TriangleMesh& mesh, const std::vector<HeldRegion>& regions,
-                                                 const std::vector<std::vector<int>>& patchTriangles) {
-  struct Space {
-    std::function<bool(const Vector3d&)> contains;
-    SurfaceTree held, others;
-  };
-  const auto spaces = std::make_shared<std::vector<Space>>();
-  for (std::size_t r = 0; r < regions.size(); ++r) {
-    if (!regions[r].contains) continue;
-    TriangleMesh held{mesh.vertices, {}}, others{mesh.vertices, {}};
-    for (std::size_t t = 0, next = 0; t < mesh.triangles.size(); ++t) {
-      const bool isHeld = next < patchTriangles[r].size() && patchTriangles[r][next] == static_cast<int>(t);
-      (isHeld ? held : others).triangles.push_back(mesh.triangles[t]);
-      next += isHeld ? 1 : 0;
-    }
-    if (others.triangles.empty()) throw std::runtime_error(regions[r].text + " holds the whole surface");
-    spaces->push_back({regions[r].contains, makeSurfaceTree(held), makeSurfaceTree(others)});
-  }
-  if (spaces->empty()) return {};
-  return [spaces](const Vector3d& x) {
-    return std::any_of(spaces->begin(), spaces->end(), [&](const Space& s) {
-      return s.contains(x) && closestPoint(s.held, x).distance < closestPoint(s.others, x).distance;
-    });
-  };
 }
 
 double chosenSize(const CellFrames*, const SoftBodyModel& model) {
@@ -97,6 +52,55 @@ Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const Pr
   return out;
 }
 
+// What the network makes of forces on nodes: the frames' part and the layer's.
+MatrixXd framesResponse(const IdentifiedNetwork& n, const RowMatrix& forces) {
+  const int frames = static_cast<int>(n.frames.size());
+  const RowSparse skin = skinMatrix(n.skin, frames);
+  const MatrixXd loads = skin.transpose() * forces;
+  return skin * MatrixXd(networkStiffness(n.links, n.lengthScale, frames).llt().solve(loads));
+}
+
+VectorXd largestOf(const MatrixXd& displacements) {
+  VectorXd out = VectorXd::Zero(displacements.cols());
+  for (Index load = 0; load < out.size(); ++load) {
+    for (Index n = 0; 3 * n < displacements.rows(); ++n)
+      out[load] = std::max(out[load], displacements.block<3, 1>(3 * n, load).norm());
+  }
+  return out;
+}
+
+// Fits the layer to loads of its own, and measures the network on others and on bulk loads, which nothing was fitted
+// to; then solves those again in cells a third larger.
+void fitLayerAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const SolidSettings& settings,
+                        IdentifiedNetwork& out, const Progress& progress) {
+  constexpr int fitted = 16, checked = 16;
+  const NodeSurface surface = measureNodes(mesh, out.patches);
+  const auto exact = [&](const VoxelSolid& s, const RowMatrix& forces) -> MatrixXd {
+    return s.surface * displacementsUnder(s, forces);
+  };
+  RowMatrix teaching(3 * static_cast<Index>(mesh.vertices.size()), 2 * fitted);
+  teaching << randomLoads(mesh, surface, LoadKind::bulk, out.lengthScale, fitted, 1),
+      randomLoads(mesh, surface, LoadKind::poke, out.lengthScale, fitted, 1);
+  const MatrixXd under = exact(solid, teaching);
+  out.layer =
+      fitLayer(mesh, surface, teaching, under - framesResponse(out, teaching), largestOf(under), out.lengthScale);
+  progress(0.4);
+  SolidSettings coarse = settings;
+  const VoxelSolid other = makeVoxelSolid(mesh, 4. / 3 * solid.grid.size, coarse);
+  progress(0.8);
+  IdentifiedError ofGrids;
+  for (const LoadKind kind : {LoadKind::bulk, LoadKind::poke}) {
+    const RowMatrix forces = randomLoads(mesh, surface, kind, out.lengthScale, checked, 2);
+    const MatrixXd expected = exact(solid, forces);
+    const MatrixXd found = framesResponse(out, forces) + layerResponse(mesh, surface, out.layer, forces);
+    (kind == LoadKind::bulk ? out.bulk : out.poke) = errorOf(found, expected);
+    const IdentifiedError grids = errorOf(exact(other, forces), expected);
+    ofGrids = {std::max(ofGrids.maximum, grids.maximum), std::max(ofGrids.rms, grids.rms)};
+  }
+  out.ofFiniteElements = ofGrids;
+  progress(1);
+}
+
 }  // namespace
 
 IdentifiedNetwork identifyNetwork(const SoftBodyModel& model, const std::vector<HeldRegion>& held,
@@ -113,7 +117,7 @@ IdentifiedNetwork identifyNetwork(const SoftBodyModel& model, const std::vector<
     solidSettings.heldTriangles.insert(solidSettings.heldTriangles.end(), patchTriangles.back().begin(),
                                        patchTriangles.back().end());
   }
-  solidSettings.heldSpace = heldSpaceOf(mesh, held, patchTriangles);
+  solidSettings.heldSpace = heldMaterial(mesh, held, patchTriangles);
   const auto stage = [&](double from, double to) -> Progress {
     return [&progress, from, to](double part) {
       if (progress) progress(std::lerp(from, to, part));
@@ -128,11 +132,10 @@ IdentifiedNetwork identifyNetwork(const SoftBodyModel& model, const std::vector<
   out.voxel = solid.grid.size;
   out.lengthScale = cells.lengthScale;
   out.links = layOutLinks(mesh, cells, out.patches, patchTriangles);
-  fitLinks(responses.frames, {}, out.lengthScale, settings.links, out.links, stage(0.4, 0.9));
+  fitLinks(responses.frames, {}, out.lengthScale, settings.links, out.links, stage(0.4, 0.85));
   out.skin = fitSkin(mesh, cells, out.patches, responses.frames, responses.nodes);
   out.frames = std::move(cells.frames);
-  out.layer = {1 / (0.3 * out.lengthScale), 1 / (0.5 * out.lengthScale), 0.01 * out.lengthScale};
-  if (progress) progress(1);
+  fitLayerAndMeasure(mesh, solid, solidSettings, out, stage(0.85, 1));
   return out;
 }
 

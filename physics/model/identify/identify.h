@@ -4,21 +4,15 @@
 #include <string>
 #include <vector>
 
+#include "physics/model/identify/held_region.h"
 #include "physics/model/identify/link_fit.h"
 #include "physics/model/soft_body_model.h"
 
 namespace medulla {
 
-// A part of the surface that is to be held.
-struct HeldRegion {
-  std::string text;                                      // FixedPatch::region
-  std::vector<int> nodes;                                // of the model, ascending
-  std::function<bool(const Eigen::Vector3d&)> contains;  // a part of space: the material there is held, too; or empty
-};
-
 struct IdentifySettings {
   double poisson = 0.45;  // 0 <= poisson < 0.5
-  LinkForm links = LinkForm::diagonal;
+  LinkForm links = LinkForm::full;
   double memoryMax = 3e9;  // bytes of the finite elements' factors
   double cellSize = 0;     // m; 0: chosen from the spheres' cells and the links' sections
 };

@@ -21,6 +21,7 @@ struct VoxelSolid {
   DissectionPlan plan;
   FrontFactors factors;
   RowSparse surface;  // 3 mesh nodes x 3 grid nodes: displacement of the mesh's nodes
+  RowSparse loading;  // 3 grid nodes x 3 mesh nodes: a node's force as a traction that falls to 0 on its neighbours
 };
 
 struct SolidSettings {

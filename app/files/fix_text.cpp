@@ -1,4 +1,4 @@
-#include "app/files/held_region.h"
+#include "app/files/fix_text.h"
 
 #include <fmt/core.h>
 
