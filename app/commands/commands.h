@@ -7,6 +7,7 @@
 #include "app/commands/run.h"
 #include "app/scene_view.h"
 #include "physics/model/build.h"
+#include "physics/model/identify/identify.h"
 
 // One function per verb of the command line; each returns the exit code and throws std::runtime_error for bad input.
 namespace medulla {
@@ -16,6 +17,9 @@ struct BuildOptions {
   std::vector<std::string> fine;               // none, or one per mesh
   std::string unit = "m", output, reportPath;  // output: the model, of several meshes a folder for NAME.model.xml each
   BuildSettings settings;                      // spheres: of all meshes together
+  bool identify = false;                       // of one mesh only
+  std::vector<std::string> fix;                // as parseHeldRegion() reads them
+  IdentifySettings identification;
 };
 int runBuild(const BuildOptions& options);
 
