@@ -60,7 +60,7 @@ void disturb(WorldData& d, const std::function<Vector3d(const Vector3d&)>& move,
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i)
     if (d.nodes.inverseMass[i] > 0) setVector(d.nodes.position, i, move(vectorAt(d.nodes.position, i)));
-  evaluateLinks(d);
+  runStage(d, evaluateLinks);
 }
 
 Quaterniond asItWas(const Vector3d&) {

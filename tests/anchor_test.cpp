@@ -60,7 +60,7 @@ void moveSpheres(WorldData& d, const Motion& motion, double time) {
     d.spheres.position[i] = quadOf(vectorOf(d.spheres.position[i]) + time * vectorOf(motion[2 * i]));
     turnBy(d, i, time * vectorOf(motion[2 * i + 1]));
   }
-  evaluateLinks(d);
+  runStage(d, evaluateLinks);
 }
 
 // Of `read(d)`, vectors, along a motion of the spheres.
@@ -77,7 +77,7 @@ std::vector<Vector3d> differences(WorldData& d, const Motion& motion, const Read
   }
   d.spheres.position = position;
   d.spheres.orientation = orientation;
-  evaluateLinks(d);
+  runStage(d, evaluateLinks);
   for (std::size_t i = 0; i < out[0].size(); ++i) out[0][i] = (out[1][i] - out[0][i]) / (2 * kStep);
   return out[0];
 }
@@ -147,7 +147,7 @@ TEST_P(BentAnchors, TheImplicitStepsMapIsTheAnchorsDerivativeAndReturnsItsTransp
   World world = chainsOfAllLinks(SurfaceMode::full);
   WorldData& d = world.data();
   shake(d, 5, GetParam(), 0.003, 0.5);
-  evaluateForces(d);
+  runStage(d, evaluateForces);
   const std::size_t nodes = d.nodes.dynamicEnd, quads = 2 * static_cast<std::size_t>(d.spheres.count);
   Random random(9);
   Motion motion(quads + nodes), returned(quads + nodes);
@@ -163,7 +163,7 @@ TEST_P(BentAnchors, TheImplicitStepsMapIsTheAnchorsDerivativeAndReturnsItsTransp
 
   // Nodes stand still here, so that what they are displaced by falls as the anchors move.
   const std::vector<Vector3d> falling = differences(d, motion, [](WorldData& of) {
-    evaluateAttachments(of);
+    runStage(of, evaluateAttachments);
     std::vector<Vector3d> out(of.nodes.dynamicEnd);
     for (int i = 0; i < of.nodes.dynamicEnd; ++i) out[i] = vectorOf(of.nodes.displaced[i]);
     return out;

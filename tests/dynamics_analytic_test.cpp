@@ -164,7 +164,7 @@ TEST(Analytic, ACoupleTwistsLinearlyThroughWholeTurns) {
     const double angle = step * std::numbers::pi / 12;  // up to four turns over the bar
     for (int i = 1; i <= links; ++i)
       setOrientation(d, i, Quaterniond(Eigen::AngleAxisd(angle * i / links, Vector3d::UnitX())));
-    evaluateForces(d);
+    runStage(d, evaluateForces);
     EXPECT_NEAR(d.spheres.torque[links].v[0], -perAngle * angle, 1e-9 * perAngle * angle);
     EXPECT_NEAR(d.spheres.torque[1].v[0], 0, 1e-9 * perAngle * angle);
     EXPECT_LT(vectorOf(d.spheres.force[links]).norm(), 1e-9 * perAngle * angle / kLength);
@@ -267,7 +267,7 @@ TEST(Analytic, AFixedPointSwingsLikeAPendulum) {
     d.spheres.position[i] = quadOf(lean * Vector3d(x, 0, 0));
     setOrientation(d, i, lean);
   }
-  evaluateLinks(d);
+  runStage(d, evaluateLinks);
   const double expected = std::sqrt(weightMoment / inertiaSum) / (2 * std::numbers::pi);
   EXPECT_NEAR(measuredFrequency(world, 1, 0, 6), expected, 0.01 * expected);
 }

@@ -73,7 +73,7 @@ inline void shake(WorldData& d, std::uint64_t seed, double angle, double shift, 
       setVector(d.nodes.velocity, i, thrown);
     }
   }
-  evaluateLinks(d);
+  runStage(d, evaluateLinks);
 }
 
 struct Momentum {
@@ -98,14 +98,14 @@ inline Momentum momentum(const WorldData& d) {
 }
 
 inline double elastic(WorldData& d) {
-  evaluateLinks(d);
-  evaluateAttachments(d);
+  runStage(d, evaluateLinks);
+  runStage(d, evaluateAttachments);
   return linkEnergy(d) + surfaceEnergy(d);
 }
 
 // Central differences of the elastic energy along every freedom, against the forces.
 inline void expectForcesAreMinusGradient(WorldData& d, double tolerance) {
-  evaluateForces(d);
+  runStage(d, evaluateForces);
   const std::vector<Quad> force = d.spheres.force, torque = d.spheres.torque;
   const std::vector<Lanes3> nodeForce = d.nodes.force;
   double forceScale = 0, torqueScale = 0;

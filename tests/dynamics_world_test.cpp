@@ -76,18 +76,33 @@ TEST(World, BodiesOfOneModelMoveAsEachAlone) {
   EXPECT_EQ(all.bodies[6].nodes, all.bodies[0].nodes);
 }
 
+// So many that they are stepped in batches; five spheres and four links fill no group of four.
 TEST(World, BodiesDoNotDisturbEachOther) {
   WorldSettings settings;
   settings.substeps = 60;
-  World alone(settings, {tube(6e3, 0.1)}), together(settings, {tube(9e3, 0.2), tube(6e3, 0.1)});
-  for (int i = 0; i < 10; ++i) {
-    alone.advance({});
-    together.advance({});
+  settings.contact = ContactMode::balls;
+  std::vector<BodyDescription> bodies;
+  for (int k = 0; k < 40; ++k) {
+    bodies.push_back(tube(k % 2 == 0 ? 9e3 : 6e3, 0.1));
+    bodies.back().neighbours = std::vector<int>();
+    bodies.back().fixed.clear();
   }
+  World alone(settings, {bodies[1]}), together(settings, bodies);
+  ASSERT_GT(together.data().awake.batches.size(), 2U);
+  World odd(settings, {bodies[0]});
+  for (int i = 0; i < 10; ++i)
+    for (World* world : {&alone, &odd, &together}) world->advance({});
   DynamicsFrame a, b;
   alone.readFrame(a);
   together.readFrame(b);
-  for (std::size_t i = 0; i < a.bodies[0].nodes.size(); ++i) EXPECT_EQ(a.bodies[0].nodes[i], b.bodies[1].nodes[i]);
+  for (std::size_t k = 1; k < bodies.size(); k += 2) {
+    EXPECT_EQ(a.bodies[0].nodes, b.bodies[k].nodes) << k;
+    for (std::size_t i = 0; i < a.bodies[0].spheres.size(); ++i)
+      EXPECT_EQ(a.bodies[0].spheres[i].position, b.bodies[k].spheres[i].position) << k << ' ' << i;
+  }
+  const Energies of = together.energies(), ofOne = alone.energies(), ofOther = odd.energies();
+  EXPECT_NEAR(of.kinetic, 20 * (ofOne.kinetic + ofOther.kinetic), 1e-12 * of.kinetic);
+  EXPECT_NEAR(of.elastic, 20 * (ofOne.elastic + ofOther.elastic), 1e-12 * (of.kinetic + of.elastic));
 }
 
 TEST(World, RestIsRest) {

@@ -90,7 +90,7 @@ TEST(IdentifiedSurface, FollowsARigidMotionRigidly) {
       setOrientation(d, i, q);
     }
     for (const int i : d.ranges[0].node) setVector(d.nodes.position, i, q * vectorAt(d.nodes.position, i) + shift);
-    evaluateForces(d);
+    runStage(d, evaluateForces);
     placeCarriedNodes(d);
     for (std::size_t i = 0; i < m.restNodes.size(); ++i)
       EXPECT_LT((vectorAt(d.nodes.position, d.ranges[0].node[i]) - q * m.restNodes[i] - shift).norm(), 1e-15);

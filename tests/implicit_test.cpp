@@ -57,7 +57,7 @@ TEST(Implicit, TheMatrixIsTheForcesDerivativeAtRest) {
     world.advance({});  // lays everything out; nothing moves
     WorldData& d = world.data();
     ImplicitData& s = *d.implicit.at(0);
-    evaluateForces(d);
+    runStage(d, evaluateForces);
     assembleSystem(d, s);
     Random random(3);
     Motion x(s.freedom.size()), y(s.freedom.size());
@@ -78,7 +78,7 @@ TEST(Implicit, TheMatrixIsTheForcesDerivativeAtRest) {
       setVector(m.nodes.position, i, vectorAt(m.nodes.position, i) + duration * v);
       setVector(m.nodes.velocity, i, v);
     }
-    evaluateForces(m);
+    runStage(m, evaluateForces);
     double largest = 0, error = 0;
     const auto compare = [&](std::size_t quad, const Vector3d& inertial, const Vector3d& force) {
       const Vector3d expected = vectorOf(s.freedom[quad]).cwiseProduct(inertial - duration / tiny * force);

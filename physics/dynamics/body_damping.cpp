@@ -54,11 +54,11 @@ RigidMotion rigidMotionOf(const Spheres& s, const BodyRange& r) {
 }  // namespace
 
 // Implicit, so that no alpha is too much for a step. Spins and nodes follow through links and attachments.
-void dampBodies(WorldData& d) {
+void dampBodies(WorldData& d, const Batch& batch) {
   Spheres& s = d.spheres;
-  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
+  for (const int b : batch.bodies) {
     const BodyRange& r = d.ranges[b];
-    if (r.massDamping == 0 || d.rest[b].asleep) continue;
+    if (r.massDamping == 0) continue;
     const double lost = 1 - 1 / (1 + d.substep * r.massDamping);
     const Lanes zero = splat(0);
     const RigidMotion motion = r.held ? RigidMotion{zero, zero, zero} : rigidMotionOf(s, r);

@@ -24,6 +24,7 @@ void addBalls(WorldData& d) {
   c.restBall.resize(d.spheres.position.size());
   c.inverseCellMass.resize(d.spheres.position.size(), 0);
   double sum = 0;
+  int count = 0;
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     const BodyDescription& body = d.bodies[b];
     for (int i = 0; i < d.ranges[b].sphereCount; ++i) {
@@ -33,14 +34,16 @@ void addBalls(WorldData& d) {
       c.restBall[k].v[3] = s.radius;
       if (d.spheres.groups[k / 4].inverseMass[k % 4] > 0) c.inverseCellMass[k] = 1 / (body.tissue.density * s.volume);
       sum += s.radius;
+      ++count;
     }
   }
-  c.freeMove = 0.5 * kMarginOverRadius * sum / std::max(1, d.spheres.count);
+  c.freeMove = 0.5 * kMarginOverRadius * sum / std::max(1, count);
   c.margin = 2 * c.freeMove + kFastest * d.substep;
   c.ball = c.restBall;
   c.inertia.resize(d.spheres.position.size());
 }
 
+// Balls that are linked never meet.
 void addColliders(WorldData& d) {
   ContactData& c = d.contact;
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
@@ -53,10 +56,14 @@ void addColliders(WorldData& d) {
         linked[l.sphere0] = linked[l.sphere1] = true;
       }
     }
+    const auto firstBall = static_cast<std::uint32_t>(c.colliders.size());
     for (std::uint32_t i = 0; i < m.spheres.size(); ++i)
       if (!linked[i]) c.colliders.push_back({first + i, first + i, static_cast<int>(b)});
+    c.excluded.resize(c.colliders.size());
+    if (c.mode == ContactMode::swept) continue;
+    for (const ElasticLink& l : m.links)
+      c.excluded[firstBall + std::min(l.sphere0, l.sphere1)].push_back(firstBall + std::max(l.sphere0, l.sphere1));
   }
-  c.excluded.resize(c.colliders.size());
   c.boxes.resize(c.colliders.size());
 }
 
@@ -126,13 +133,6 @@ void forEachPair(const ContactData& c, const Visit& visit) {
 
 void excludeWhatOverlapsAtRest(WorldData& d) {
   ContactData& c = d.contact;
-  if (c.mode == ContactMode::balls) {
-    for (std::size_t b = 0; b < d.bodies.size(); ++b) {
-      for (const ElasticLink& l : d.bodies[b].model->links)
-        c.excluded[d.ranges[b].firstSphere + std::min(l.sphere0, l.sphere1)].push_back(
-            static_cast<std::uint32_t>(d.ranges[b].firstSphere + std::max(l.sphere0, l.sphere1)));
-    }
-  }
   forEachPair(c, [&](std::uint32_t i, std::uint32_t j, double gap, double smaller) {
     if (c.colliders[i].body == c.colliders[j].body && gap < kTouchingAtRest * smaller) c.excluded[i].push_back(j);
   });

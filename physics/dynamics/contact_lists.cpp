@@ -51,10 +51,9 @@ ConeContact closestOfPairs(const ContactData& c, const PairGroup& g) {
     return gatherBalls(c.ball.data(), c.colliders[k[0]].*end, c.colliders[k[1]].*end, c.colliders[k[2]].*end,
                        c.colliders[k[3]].*end);
   };
-  if (c.mode == ContactMode::balls) {  // collider i is sphere i
-    const auto balls = [&](const std::uint32_t* k) { return gatherBalls(c.ball.data(), k[0], k[1], k[2], k[3]); };
-    return {splat(0), splat(0), gapOfBalls(balls(g.collider0), balls(g.collider1))};
-  }
+  if (c.mode == ContactMode::balls)
+    return {splat(0), splat(0),
+            gapOfBalls(ends(g.collider0, &Collider::sphere0), ends(g.collider1, &Collider::sphere0))};
   return closestOnCones(ends(g.collider0, &Collider::sphere0), ends(g.collider0, &Collider::sphere1),
                         ends(g.collider1, &Collider::sphere0), ends(g.collider1, &Collider::sphere1));
 }

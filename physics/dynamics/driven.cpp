@@ -30,15 +30,14 @@ void driveSpheres(WorldData& d, double time) {
 
 // Linear drag per mass, solved implicitly, so that no drag is too much for a step. A driven sphere is dragged too, and
 // then led back to its path.
-void dragVelocities(WorldData& d) {
+void dragVelocities(WorldData& d, const Batch& batch) {
   if (d.settings.ambientDrag == 0) return;
   const Lanes kept = splat(1 / (1 + d.substep * d.settings.ambientDrag));
-  const auto drag = [kept](std::vector<Quad>& velocities, int count) {
-    for (int i = 0; i < count; ++i) store(velocities[i], kept * load(velocities[i]));
-  };
-  drag(d.spheres.velocity, d.spheres.count);
-  drag(d.spheres.angularMomentum, d.spheres.count);
-  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) d.nodes.velocity[g] = kept * d.nodes.velocity[g];
+  for (const int i : batch.spheres) {
+    store(d.spheres.velocity[i], kept * load(d.spheres.velocity[i]));
+    store(d.spheres.angularMomentum[i], kept * load(d.spheres.angularMomentum[i]));
+  }
+  for (const int g : batch.nodeGroups) d.nodes.velocity[g] = kept * d.nodes.velocity[g];
 }
 
 }  // namespace medulla

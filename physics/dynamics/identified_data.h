@@ -77,14 +77,13 @@ struct SkinTermLoad {  // of one frame, per node in each lane: on way and turn
   Lanes onWay[3], onTurn[3];
 };
 
-struct IdentifiedBody {
-  int body;
-  int firstFrame, endFrame;  // the spheres' first, in their order
-  int firstLinkGroup, endLinkGroup;
+struct IdentifiedBody {              // nothing of others
+  int firstFrame = 0, endFrame = 0;  // the spheres' first, in their order
+  int firstLinkGroup = 0, endLinkGroup = 0;
 };
 
 struct Identified {
-  std::vector<IdentifiedBody> bodies;
+  std::vector<IdentifiedBody> bodies;  // as the world's
   std::vector<FrameState> frames;
   std::vector<FrameLoad> loads;       // of the current substep
   std::vector<CarriedFrame> carried;  // per frame

@@ -189,6 +189,7 @@ void addSkins(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
 void layOutIdentified(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   Identified& s = d.identified;
   s.ofNodeGroup.assign(d.nodes.count / 4, -1);
+  s.bodies.resize(d.bodies.size());
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     if (d.bodies[b].links != LinkModel::identified) continue;
     const int body = static_cast<int>(b);
@@ -196,7 +197,7 @@ void layOutIdentified(WorldData& d, const std::vector<BodyMechanics>& mechanics)
     const int firstLinkGroup = static_cast<int>(s.links.size());
     addLinks(d, body, mechanics[b], frames);
     addSkins(d, body, mechanics[b], frames);
-    s.bodies.push_back({body, frames.first(), frames.end(), firstLinkGroup, static_cast<int>(s.links.size())});
+    s.bodies[b] = {frames.first(), frames.end(), firstLinkGroup, static_cast<int>(s.links.size())};
   }
   s.loads.resize(s.frames.size());
   s.termStates.resize(s.terms.size());

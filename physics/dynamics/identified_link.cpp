@@ -51,10 +51,10 @@ void evaluateGroup(const IdentifiedLinkGroup& link, const FrameState* frames, Fr
 
 }  // namespace
 
-void evaluateIdentifiedLinks(WorldData& d) {
+void evaluateIdentifiedLinks(WorldData& d, const Batch& batch) {
   Identified& s = d.identified;
-  for (const IdentifiedBody& body : s.bodies) {
-    if (d.rest[body.body].asleep) continue;
+  for (const int b : batch.bodies) {
+    const IdentifiedBody& body = s.bodies[b];
     placeFrames(d, body);
     for (int i = body.firstFrame; i < body.endFrame; ++i) s.loads[i] = {};
     for (int g = body.firstLinkGroup; g < body.endLinkGroup; ++g)
@@ -62,10 +62,10 @@ void evaluateIdentifiedLinks(WorldData& d) {
   }
 }
 
-void returnFrameForces(WorldData& d) {
+void returnFrameForces(WorldData& d, const Batch& batch) {
   const Identified& s = d.identified;
-  for (const IdentifiedBody& body : s.bodies) {
-    if (d.rest[body.body].asleep) continue;
+  for (const int b : batch.bodies) {
+    const IdentifiedBody& body = s.bodies[b];
     for (int i = body.firstFrame; i < body.endFrame; ++i) {
       const CarriedFrame& c = s.carried[i];
       if (c.sphere < 0) continue;

@@ -7,8 +7,8 @@
 namespace medulla {
 
 // identified_link.cpp
-void evaluateIdentifiedLinks(WorldData&);  // frames from spheres; links' forces on frames
-void returnFrameForces(WorldData&);        // from frames to spheres, added
+void evaluateIdentifiedLinks(WorldData&, const Batch&);  // frames from spheres; links' forces on frames
+void returnFrameForces(WorldData&, const Batch&);        // from frames to spheres, added
 double identifiedLinkEnergy(const WorldData&);
 
 // identified_surface.cpp: the nodes of a range that hangs on frames.

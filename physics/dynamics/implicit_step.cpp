@@ -78,7 +78,7 @@ void place(WorldData& d, const ImplicitData& s, double time) {
 
 // M u - p0 - T f at the placed state, without loads at points.
 void balanceForces(WorldData& d, const ImplicitData& s, Motion& out) {
-  evaluateForces(d);
+  runStage(d, evaluateForces);
   const double t = s.duration;
   for (int i = 0; i < d.spheres.count; ++i) {
     const double mass = d.spheres.groups[i / 4].mass[i % 4];
@@ -332,7 +332,7 @@ void advanceBy(WorldData& d, std::size_t level, const Loads& loads, const StepTi
   constexpr std::size_t kDeepest = 6;
   ImplicitData& s = implicitLevel(d, level);
   beginHere(d, s.before);
-  evaluateForces(d);
+  runStage(d, evaluateForces);
   const double energy = kineticEnergy(d, s) + elasticEnergy(d);
   d.mostEnergy = std::max(d.mostEnergy, energy);
   if (attempt(d, s, level, loads, time, energy)) {

@@ -57,7 +57,15 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
     g.hasArms = g.hasArms || !arm0.isZero(0) || !arm1.isZero(0);
     const double length = line.norm();
     const Vector3d t = line / length, u = (link.restU - t * t.dot(link.restU)).normalized();
-    // The rest of the group becomes copies, overwritten by the links that follow.
+    g.elongation[lane] = stiffness.elongation;
+    g.flexionU0[lane] = stiffness.flexionU.end0;
+    g.flexionV0[lane] = stiffness.flexionV.end0;
+    g.flexionU1[lane] = stiffness.flexionU.end1;
+    g.flexionV1[lane] = stiffness.flexionV.end1;
+    g.torsion[lane] = stiffness.torsion;
+    g.couple[lane] = 0.5 * (stiffness.flexionV.couple + stiffness.flexionU.couple);
+    g.coupleDifference[lane] = 0.5 * (stiffness.flexionV.couple - stiffness.flexionU.couple);
+    // The rest of the group becomes copies without stiffness, overwritten by the links that follow.
     for (int l = lane; l < 4; ++l) {
       g.sphere0[l] = static_cast<std::uint32_t>(firstSphere + link.sphere0);
       g.sphere1[l] = static_cast<std::uint32_t>(firstSphere + link.sphere1);
@@ -68,14 +76,6 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
       g.smallestLength[l] = kSmallestLength * length;
       setLane(g.restArm0, l, arm0);
       setLane(g.restArm1, l, arm1);
-      g.elongation[l] = stiffness.elongation;
-      g.flexionU0[l] = stiffness.flexionU.end0;
-      g.flexionV0[l] = stiffness.flexionV.end0;
-      g.flexionU1[l] = stiffness.flexionU.end1;
-      g.flexionV1[l] = stiffness.flexionV.end1;
-      g.torsion[l] = stiffness.torsion;
-      g.couple[l] = 0.5 * (stiffness.flexionV.couple + stiffness.flexionU.couple);
-      g.coupleDifference[l] = 0.5 * (stiffness.flexionV.couple - stiffness.flexionU.couple);
       g.beam[l] = beam ? 1 : 0;
       g.thinning[l] = beam ? 2 * body.tissue.poisson : 0;
       g.relaxation[l] = mechanics.linkRelaxation;
@@ -241,9 +241,11 @@ void addDrives(WorldData& d, const BodyDescription& body, const BodyRange& r) {
 
 void listSlots(WorldData& d) {
   std::vector<std::vector<int>> slots(d.spheres.count);
-  for (int k = 0; k < d.links.count; ++k) {
-    slots[d.links.groups[k / 4].sphere0[k % 4]].push_back(2 * k);
-    slots[d.links.groups[k / 4].sphere1[k % 4]].push_back(2 * k + 1);
+  for (const BodyRange& r : d.ranges) {
+    for (int k = r.firstLink; k < r.firstLink + r.linkCount; ++k) {
+      slots[d.links.groups[k / 4].sphere0[k % 4]].push_back(2 * k);
+      slots[d.links.groups[k / 4].sphere1[k % 4]].push_back(2 * k + 1);
+    }
   }
   d.spheres.firstSlot.push_back(0);
   for (const std::vector<int>& of : slots) {
@@ -251,6 +253,44 @@ void listSlots(WorldData& d) {
     d.spheres.firstSlot.push_back(static_cast<int>(d.spheres.slot.size()));
   }
 }
+
+// Batches are of whole bodies, a larger body is one of its own. On caches of 2 MB, 10 000 spheres without contacts took
+// a quarter less time so than in one batch, and with 1 MB a tenth less. The implicit step knows no batches, nor pads
+// between bodies.
+constexpr std::size_t kBatchBytes = 1 << 18;
+
+std::size_t bytesOf(const BodyDescription& body) {
+  const SoftBodyModel& m = *body.model;
+  constexpr std::size_t kPerSphere = 7 * sizeof(Quad) + sizeof(SphereGroup) / 4,
+                        kPerLink = (sizeof(LinkGroup) + sizeof(LinkFrame)) / 4 + sizeof(LinkLoads) + 2 * sizeof(Slot),
+                        kPerNode = (5 * sizeof(Lanes3) + sizeof(NodeGroup)) / 4 + sizeof(Quad) + 2 * sizeof(double),
+                        kPerEdge = 2 * sizeof(SpringGroup) / 4, kPerNodeOnFrames = 7 * sizeof(SkinShare) / 4;
+  const std::size_t perNode = kPerNode + (body.links == LinkModel::identified ? kPerNodeOnFrames : 0);
+  return kPerSphere * m.spheres.size() + kPerLink * m.links.size() + perNode * m.restNodes.size() +
+         kPerEdge * m.edges.size();
+}
+
+// Starts another batch where the one before would grow too large with `body`. Returns the body's batch.
+class Batches {
+ public:
+  int add(WorldData& d, const BodyDescription& body) {
+    const std::size_t bytes = bytesOf(body);
+    if (bytes_ > 0 && bytes_ + bytes > kBatchBytes && d.settings.integrator != Integrator::implicit) {
+      d.spheres.count = roundUp(d.spheres.count);
+      d.links.count = roundUp(d.links.count);
+      bytes_ = 0;
+      ++batch_;
+    }
+    bytes_ += bytes;
+    return batch_;
+  }
+
+ private:
+  static int roundUp(int count) { return (count + 3) / 4 * 4; }
+
+  std::size_t bytes_ = 0;
+  int batch_ = 0;
+};
 
 double enclosedVolume(const SoftBodyModel& m) {
   double sum = 0;
@@ -267,9 +307,11 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
   d.settings = settings;
   d.gravity = quadOf(settings.gravity);
   d.bodies = std::move(bodies);
+  Batches batches;
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     const SoftBodyModel& m = *d.bodies[b].model;
     BodyRange r;
+    r.batch = batches.add(d, d.bodies[b]);
     r.firstSphere = d.spheres.count;
     r.sphereCount = static_cast<int>(m.spheres.size());
     r.firstLink = d.links.count;
@@ -294,7 +336,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
   layOutRest(d);
   layOutSurfaceParts(d, mechanics);
   refreshAngularVelocities(d);
-  evaluateLinks(d);
+  runStage(d, evaluateLinks);
   placeCarriedNodes(d);
   return out;
 }

@@ -253,15 +253,15 @@ void storeVectors(const Lanes3& v, Quad& q0, Quad& q1, Quad& q2, Quad& q3) {
 
 }  // namespace
 
-void evaluateLinks(WorldData& d) {
-  for (const int g : d.awake.linkGroups)
+void evaluateLinks(WorldData& d, const Batch& batch) {
+  for (const int g : batch.linkGroups)
     evaluateGroup(d.links.groups[g], d.spheres, d.links.unwoundTwist[g], d.links.frames[g]);
-  evaluateIdentifiedLinks(d);
+  evaluateIdentifiedLinks(d, batch);
 }
 
 // Loads are minus the forces on the nodes; torsion turns the frame's two spins apart, as a load does.
-void returnLinkForces(WorldData& d) {
-  for (const int g : d.awake.linkGroups) {
+void returnLinkForces(WorldData& d, const Batch& batch) {
+  for (const int g : batch.linkGroups) {
     const LinkFrame& f = d.links.frames[g];
     const LinkGroup& link = d.links.groups[g];
     AnchorLoads loads = gatherLoads(&d.links.loads[4 * g], link.hasBeams);
@@ -281,7 +281,7 @@ void returnLinkForces(WorldData& d) {
     storeVectors(force1, s[1].force, s[3].force, s[5].force, s[7].force);
     storeVectors(torque1, s[1].torque, s[3].torque, s[5].torque, s[7].torque);
   }
-  returnFrameForces(d);
+  returnFrameForces(d, batch);
 }
 
 // J, of the link in one lane.

@@ -95,31 +95,34 @@ void moveImpulses(const WorldData& d, bool asleep, std::vector<CarriedImpulse>& 
 
 void listAwake(WorldData& d) {
   Awake& a = d.awake;
-  a = {};
+  a.bodies = 0;
+  a.batches.assign(d.ranges.empty() ? 0 : d.ranges.back().batch + 1, {});
+  const auto addGroup = [](std::vector<int>& groups, int index) {
+    if (groups.empty() || groups.back() != index / 4) groups.push_back(index / 4);
+  };
   for (std::size_t b = 0; b < d.ranges.size(); ++b) {
     const BodyRange& r = d.ranges[b];
     if (d.rest[b].asleep) continue;
     ++a.bodies;
-    for (int i = 0; i < r.sphereCount; ++i) {
-      a.spheres.push_back(r.firstSphere + i);
-      const int group = (r.firstSphere + i) / 4;
-      if (a.sphereGroups.empty() || a.sphereGroups.back() != group) a.sphereGroups.push_back(group);
+    Batch& batch = a.batches[r.batch];
+    batch.bodies.push_back(static_cast<int>(b));
+    for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+      batch.spheres.push_back(i);
+      addGroup(batch.sphereGroups, i);
     }
-    for (int k = 0; k < r.linkCount; ++k) {
-      const int group = (r.firstLink + k) / 4;
-      if (a.linkGroups.empty() || a.linkGroups.back() != group) a.linkGroups.push_back(group);
-    }
+    for (int k = r.firstLink; k < r.firstLink + r.linkCount; ++k) addGroup(batch.linkGroups, k);
   }
   std::size_t part = 0;
-  const auto list = [&](const std::vector<HostRange>& from, std::vector<HostRange>& to) {
+  const auto list = [&](const std::vector<HostRange>& from, std::vector<HostRange> Batch::*to) {
     for (const HostRange& range : from) {
       if (!d.surface.parts[part++].moves || d.rest[range.body].asleep) continue;
-      to.push_back(range);
-      for (int g = range.firstGroup; g < range.endGroup; ++g) a.nodeGroups.push_back(g);
+      Batch& batch = a.batches[d.ranges[range.body].batch];
+      (batch.*to).push_back(range);
+      for (int g = range.firstGroup; g < range.endGroup; ++g) batch.nodeGroups.push_back(g);
     }
   };
-  list(d.nodes.onLinks, a.onLinks);
-  list(d.nodes.onSpheres, a.onSpheres);
+  list(d.nodes.onLinks, &Batch::onLinks);
+  list(d.nodes.onSpheres, &Batch::onSpheres);
 }
 
 void layOutRest(WorldData& d) {
@@ -145,7 +148,7 @@ void fallAsleep(WorldData& d, const Loads& loads) {
   }
   if (!any) return;
   moveImpulses(d, true, d.contact.carried, d.contact.resting);
-  evaluateLinks(d);  // once more, for the nodes that hang on them: without speed
+  runStage(d, evaluateLinks);  // once more, for the nodes that hang on them: without speed
   listAwake(d);
   d.contact.listsAreOld = true;
 }

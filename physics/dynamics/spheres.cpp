@@ -73,10 +73,10 @@ void stepNodes(Nodes& n, const std::vector<int>& groups, const Quad& gravity, do
 
 }  // namespace
 
-void sumSphereForces(WorldData& d) {
+void sumSphereForces(WorldData& d, const Batch& batch) {
   Spheres& s = d.spheres;
   const Lanes gravity = load(d.gravity);
-  for (const int i : d.awake.spheres) {
+  for (const int i : batch.spheres) {
     Lanes force = fma(splat(s.groups[i / 4].mass[i % 4]), gravity, load(s.force[i]));
     Lanes torque = load(s.torque[i]);
     for (int k = s.firstSlot[i]; k < s.firstSlot[i + 1]; ++k) {
@@ -89,34 +89,34 @@ void sumSphereForces(WorldData& d) {
   }
 }
 
-void stepVelocities(WorldData& d) {
+void stepVelocities(WorldData& d, const Batch& batch) {
   Spheres& s = d.spheres;
   const Lanes h = splat(d.substep);
-  for (const int i : d.awake.spheres) {
+  for (const int i : batch.spheres) {
     const SphereGroup& g = s.groups[i / 4];
     store(s.velocity[i], fma(h * splat(g.inverseMass[i % 4]), load(s.force[i]), load(s.velocity[i])));
     store(s.angularMomentum[i], fma(h * splat(g.freeToTurn[i % 4]), load(s.torque[i]), load(s.angularMomentum[i])));
   }
-  stepNodes(d.nodes, d.awake.nodeGroups, d.gravity, d.substep);
+  stepNodes(d.nodes, batch.nodeGroups, d.gravity, d.substep);
 }
 
-void stepPositions(WorldData& d) {
+void stepPositions(WorldData& d, const Batch& batch) {
   Spheres& s = d.spheres;
   const Lanes h = splat(d.substep);
-  for (const int i : d.awake.spheres) store(s.position[i], fma(h, load(s.velocity[i]), load(s.position[i])));
-  for (const int g : d.awake.sphereGroups) {
+  for (const int i : batch.spheres) store(s.position[i], fma(h, load(s.velocity[i]), load(s.position[i])));
+  for (const int g : batch.sphereGroups) {
     Turning t = readTurning(s, 4 * g);
     turn(s.groups[g], t, h);
     storeQuads(t.q.x, t.q.y, t.q.z, t.w, &s.orientation[4 * g]);
     orient(t);
     storeAngularVelocity(s.groups[g], t, &s.angularVelocity[4 * g]);
   }
-  for (const int g : d.awake.nodeGroups) put(fma(h, d.nodes.velocity[g], d.nodes.position[g]), d.nodes.position[g]);
+  for (const int g : batch.nodeGroups) put(fma(h, d.nodes.velocity[g], d.nodes.position[g]), d.nodes.position[g]);
 }
 
 void refreshAngularVelocities(WorldData& d) {
   Spheres& s = d.spheres;
-  for (const int g : d.awake.sphereGroups)
+  for (std::size_t g = 0; g < s.groups.size(); ++g)
     storeAngularVelocity(s.groups[g], readTurning(s, 4 * g), &s.angularVelocity[4 * g]);
 }
 

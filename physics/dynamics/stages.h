@@ -7,15 +7,17 @@
 // substep's beginning; velocities follow, then loads from tools and contact, then positions (semi-implicit Euler).
 namespace medulla {
 
-void evaluateLinks(WorldData&);        // link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
-void evaluateAttachments(WorldData&);  // surface.cpp: where every node would be, and the pull on it
-void finishNodeForces(WorldData&);     // edge springs and pressure; from the anchors to their hosts
-void returnLinkForces(WorldData&);     // link_force.cpp: links and what hangs on them, to their two spheres
-void sumSphereForces(WorldData&);      // spheres.cpp
+// link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
+void evaluateLinks(WorldData&, const Batch&);
+void evaluateAttachments(WorldData&, const Batch&);  // surface.cpp: where every node would be, and the pull on it
+void finishNodeForces(WorldData&, const Batch&);     // edge springs and pressure; from the anchors to their hosts
+// link_force.cpp: links and what hangs on them, to their two spheres
+void returnLinkForces(WorldData&, const Batch&);
+void sumSphereForces(WorldData&, const Batch&);  // spheres.cpp
 // Before the forces' share of the velocities, which tools and contacts balance in a body at rest.
-void dampBodies(WorldData&);      // body_damping.cpp: Rayleigh's alpha
-void dragVelocities(WorldData&);  // driven.cpp: the medium's resistance
-void stepVelocities(WorldData&);  // spheres and nodes
+void dampBodies(WorldData&, const Batch&);      // body_damping.cpp: Rayleigh's alpha
+void dragVelocities(WorldData&, const Batch&);  // driven.cpp: the medium's resistance
+void stepVelocities(WorldData&, const Batch&);  // spheres and nodes
 // loads.cpp: dead loads as they are at `time`, the substep's end (s).
 void applyDeadLoads(WorldData&, double time);
 // driven.cpp: driven spheres get the velocity that takes them to their path at `time`, the substep's end (s).
@@ -26,7 +28,7 @@ void driveSpheres(WorldData&, double time);
 void applyLoads(WorldData&, const Loads& loads, double remaining, std::vector<Eigen::Vector3d>& toolImpulse);
 // contact_find.cpp: impulses between bodies, and on bodies from static shapes, against the velocities of this substep.
 void resolveContacts(WorldData&);
-void stepPositions(WorldData&);
+void stepPositions(WorldData&, const Batch&);
 
 // surface_parts.cpp: which hosts' nodes move by themselves (SurfaceMode::contact).
 void layOutSurfaceParts(WorldData&, const std::vector<BodyMechanics>& mechanics);
@@ -44,12 +46,18 @@ void wakeLoaded(WorldData&, const Loads& loads);  // the bodies that tools touch
 void wakeTouched(WorldData&);                     // those that bodies awake press on in this substep
 
 // All forces of the current state, left in Spheres::force, torque and Nodes::force.
-inline void evaluateForces(WorldData& d) {
-  evaluateLinks(d);
-  evaluateAttachments(d);
-  finishNodeForces(d);
-  returnLinkForces(d);
-  sumSphereForces(d);
+inline void evaluateForces(WorldData& d, const Batch& batch) {
+  evaluateLinks(d, batch);
+  evaluateAttachments(d, batch);
+  finishNodeForces(d, batch);
+  returnLinkForces(d, batch);
+  sumSphereForces(d, batch);
+}
+
+// A stage, or several, of all that is awake.
+using Stage = void (*)(WorldData&, const Batch&);
+inline void runStage(WorldData& d, Stage stage) {
+  for (const Batch& batch : d.awake.batches) stage(d, batch);
 }
 
 // loads.cpp: the bodies' dead loads into WorldData::deadLoads. Throws std::runtime_error naming the body where one is

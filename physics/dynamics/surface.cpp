@@ -114,19 +114,19 @@ void returnToSphere(WorldData& d, const HostRange& range) {
 
 }  // namespace
 
-void evaluateAttachments(WorldData& d) {
+void evaluateAttachments(WorldData& d, const Batch& batch) {
   const Lanes zero = splat(0);
-  for (std::size_t i = 0; i < d.spheres.force.size(); ++i) {
+  for (const int i : batch.spheres) {
     store(d.spheres.force[i], zero);
     store(d.spheres.torque[i], zero);
   }
-  for (const HostRange& range : d.awake.onLinks) pullOnLink(d, range);
-  for (const HostRange& range : d.awake.onSpheres) range.onFrames ? pullOnFrames(d, range) : pullOnSphere(d, range);
+  for (const HostRange& range : batch.onLinks) pullOnLink(d, range);
+  for (const HostRange& range : batch.onSpheres) range.onFrames ? pullOnFrames(d, range) : pullOnSphere(d, range);
 }
 
-void finishNodeForces(WorldData& d) {
-  for (const HostRange& range : d.awake.onLinks) returnToLink(d, range);
-  for (const HostRange& range : d.awake.onSpheres)
+void finishNodeForces(WorldData& d, const Batch& batch) {
+  for (const HostRange& range : batch.onLinks) returnToLink(d, range);
+  for (const HostRange& range : batch.onSpheres)
     range.onFrames ? returnToFrames(d, range, splat(pressureOf(d, range))) : returnToSphere(d, range);
 }
 

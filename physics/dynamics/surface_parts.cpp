@@ -213,8 +213,10 @@ void layOutSurfaceParts(WorldData& d, const std::vector<BodyMechanics>& mechanic
   for (std::size_t k = 0; k < s.parts.size(); ++k)
     for (int g = rangeOf(d, k).firstGroup; g < rangeOf(d, k).endGroup; ++g) s.ofGroup[g] = static_cast<int>(k);
   for (std::size_t k = 0; k < s.parts.size(); ++k) layOutPart(d, mechanics[rangeOf(d, k).body], k, s.parts[k]);
-  for (const BodyMechanics& m : mechanics)
-    for (std::size_t i = 0; i < m.sphereMass.size(); ++i) s.spheres.push_back({m.sphereMass[i], m.sphereInertia[i]});
+  s.spheres.resize(d.spheres.position.size());
+  for (std::size_t b = 0; b < mechanics.size(); ++b)
+    for (std::size_t i = 0; i < mechanics[b].sphereMass.size(); ++i)
+      s.spheres[d.ranges[b].firstSphere + i] = {mechanics[b].sphereMass[i], mechanics[b].sphereInertia[i]};
   listCarriedNodes(d, mechanics);
   for (std::size_t k = 0; k < s.parts.size(); ++k)
     if (!s.parts[k].moves) carry(d, k);

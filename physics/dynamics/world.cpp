@@ -46,23 +46,41 @@ void checkLoads(const WorldData& d, const Loads& loads) {
   for (const HeldNode& held : loads.heldNodes) checkNode(held.body, held.node);
 }
 
-void step(WorldData& d, const Loads& loads, double remaining, FrameReport& report) {
-  if (d.awake.bodies == 0) return;
-  if (d.settings.integrator == Integrator::implicit) {
-    dragVelocities(d);
-    stepImplicitly(d, loads, remaining, report.toolImpulse);
-    return;
-  }
-  evaluateForces(d);
-  dampBodies(d);
-  dragVelocities(d);
-  stepVelocities(d);
+// What a body does by itself.
+void applyForces(WorldData& d, const Batch& batch) {
+  evaluateForces(d, batch);
+  dampBodies(d, batch);
+  dragVelocities(d, batch);
+  stepVelocities(d, batch);
+}
+
+// What joins bodies to tools and to each other; `remaining` is the time (s) from the substep's end to the frame's.
+void applyLoadsAndContacts(WorldData& d, const Loads& loads, double remaining, FrameReport& report) {
   const double end = static_cast<double>(d.frame + 1) * d.settings.frameDuration - remaining;
   applyDeadLoads(d, end);
   driveSpheres(d, end);
   applyLoads(d, loads, remaining, report.toolImpulse);
   resolveContacts(d);
-  stepPositions(d);
+}
+
+void stepFrameExplicitly(WorldData& d, const Loads& loads, FrameReport& report) {
+  for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k) {
+    // Positions at the substep's end together with the next one's forces, while what a batch reads is in the cache.
+    runStage(
+        d, k == 1 ? applyForces : [](WorldData& world, const Batch& batch) {
+          stepPositions(world, batch);
+          applyForces(world, batch);
+        });
+    applyLoadsAndContacts(d, loads, (d.substeps - k) * d.substep, report);
+  }
+  runStage(d, stepPositions);
+}
+
+void stepFrameImplicitly(WorldData& d, const Loads& loads, FrameReport& report) {
+  for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k) {
+    runStage(d, dragVelocities);
+    stepImplicitly(d, loads, (d.substeps - k) * d.substep, report.toolImpulse);
+  }
 }
 
 // Beyond 1e4 (m, m/s) counts as infinite: a step that diverges passes there within one frame, and nothing downstream
@@ -224,12 +242,13 @@ FrameReport World::advance(const Loads& loads) {
   d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Eigen::Vector3d::Zero());
   wakeLoaded(d, loads);
   moveLoadedParts(d, loads);
-  for (int k = 1; k <= d.substeps; ++k) step(d, loads, (d.substeps - k) * d.substep, report);
+  const bool implicit = d.settings.integrator == Integrator::implicit;
+  (implicit ? stepFrameImplicitly : stepFrameExplicitly)(d, loads, report);
   ++d.frame;
   chooseSurfaceParts(d, loads);
   fallAsleep(d, loads);
   // The frames that readers hang nodes on are those of the state at the end.
-  evaluateLinks(d);
+  runStage(d, evaluateLinks);
   placeCarriedNodes(d);
   requireFinite(d, time());
   return report;
@@ -253,7 +272,7 @@ void World::readFrame(DynamicsFrame& out) const {
 }
 
 Energies World::energies() const {
-  evaluateAttachments(*data_);
+  runStage(*data_, evaluateAttachments);
   const WorldData& d = *data_;
   Energies e;
   e.elastic = linkEnergy(d) + surfaceEnergy(d);

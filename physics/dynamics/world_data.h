@@ -14,7 +14,7 @@
 // nodes at once. All bodies share one set of arrays, body after body. Every sum has a fixed order.
 namespace medulla {
 
-// ---- Spheres: padded to a multiple of four; pads have no mass and no links.
+// ---- Spheres: each batch of bodies padded to a multiple of four; pads have no mass and no links.
 
 struct SphereGroup {        // constants of four spheres
   Lanes mass, inverseMass;  // kg, 1/kg; inverse 0: translation fixed
@@ -42,7 +42,7 @@ inline Lanes3 timesInverseInertia(const SphereGroup& g, const Lanes3& l) {
 }
 
 struct Spheres {
-  int count = 0;                         // without pads
+  int count = 0;                         // without the pads at the end
   std::vector<Quad> position, velocity;  // m, m/s
   std::vector<Quad> orientation;         // worldFromSphere as x, y, z, w
   std::vector<Quad> angularMomentum;     // kg m2/s, world: conserved to rounding, so this is the state
@@ -52,7 +52,8 @@ struct Spheres {
   std::vector<int> firstSlot, slot;  // the link ends of each sphere: indices into Links::slots, link after link
 };
 
-// ---- Links: four at a time; the last group is filled up with copies whose slots nobody reads.
+// ---- Links: four at a time; a batch's last group is filled up with copies that have no stiffness and whose slots
+// nobody reads.
 
 // Stretch under which the neo-Hookean tension goes on straight.
 constexpr double kStraightBelow = 0.75;
@@ -192,6 +193,7 @@ struct BodyRange {
   double restVolume = 0;   // m3, enclosed by the rest nodes
   double massDamping = 0;  // 1/s, Rayleigh's alpha
   bool held = false;       // some sphere is fixed: deformation is motion against it rather than against a rigid motion
+  int batch = 0;           // bodies of different batches share no group of spheres or links
 };
 
 // ---- SurfaceMode::contact: the nodes of a host move by themselves, or they are carried and their mass is the
@@ -235,11 +237,17 @@ struct StillPlace {  // where a sphere was at the first frame of Rest::stillFram
   Quad position, orientation;
 };
 
-// What the stages of an explicit step run over: all that belongs to bodies awake, in the arrays' order.
+// What a stage runs over: all that belongs to some bodies awake, in the arrays' order. Up to the contacts, a substep
+// takes one batch after the other through all its stages: a world outgrows a core's own cache, and each stage would
+// fetch everything anew.
+struct Batch {
+  std::vector<int> bodies, spheres, sphereGroups, linkGroups, nodeGroups;  // groups: with anything awake in them
+  std::vector<HostRange> onLinks, onSpheres;
+};
+
 struct Awake {
   int bodies = 0;
-  std::vector<int> spheres, sphereGroups, linkGroups, nodeGroups;  // groups: with anything awake in them
-  std::vector<HostRange> onLinks, onSpheres;
+  std::vector<Batch> batches;
 };
 
 // A driven sphere; DrivenSphere with everything in world units.

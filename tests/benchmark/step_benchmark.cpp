@@ -72,18 +72,18 @@ static void implicitStep(benchmark::State& state, SurfaceMode surface) {
 BENCHMARK_CAPTURE(implicitStep, spheres, SurfaceMode::skin)->Iterations(60);
 BENCHMARK_CAPTURE(implicitStep, full, SurfaceMode::full)->Iterations(20);
 
-static void runStage(benchmark::State& state, void (*stage)(WorldData&)) {
+static void stageOf(benchmark::State& state, Stage stage) {
   World world({}, synthetic::abdomenScene());
   world.advance({});
-  evaluateForces(world.data());
-  for ([[maybe_unused]] auto _ : state) stage(world.data());
+  runStage(world.data(), evaluateForces);
+  for ([[maybe_unused]] auto _ : state) runStage(world.data(), stage);
 }
-BENCHMARK_CAPTURE(runStage, links, evaluateLinks);
-BENCHMARK_CAPTURE(runStage, attachments, evaluateAttachments);
-BENCHMARK_CAPTURE(runStage, nodeForces, finishNodeForces);
-BENCHMARK_CAPTURE(runStage, returned, returnLinkForces);
-BENCHMARK_CAPTURE(runStage, sphereSums, sumSphereForces);
-BENCHMARK_CAPTURE(runStage, velocities, stepVelocities);
-BENCHMARK_CAPTURE(runStage, positions, stepPositions);
+BENCHMARK_CAPTURE(stageOf, links, evaluateLinks);
+BENCHMARK_CAPTURE(stageOf, attachments, evaluateAttachments);
+BENCHMARK_CAPTURE(stageOf, nodeForces, finishNodeForces);
+BENCHMARK_CAPTURE(stageOf, returned, returnLinkForces);
+BENCHMARK_CAPTURE(stageOf, sphereSums, sumSphereForces);
+BENCHMARK_CAPTURE(stageOf, velocities, stepVelocities);
+BENCHMARK_CAPTURE(stageOf, positions, stepPositions);
 
 }  // namespace medulla
