@@ -350,7 +350,7 @@ Verb addInfo(CLI::App& app) {
 
 struct BuildArguments {
   BuildOptions options;
-  std::string method = "cover";
+  std::string method = "cover", linkForm = "full";
 };
 
 BuildOptions buildOptions(const BuildArguments& a) {
@@ -363,6 +363,9 @@ BuildOptions buildOptions(const BuildArguments& a) {
   if (!options.fine.empty() && options.fine.size() != options.meshes.size())
     usageError("--fine", options.fine.back(),
                fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
+  options.identification.links = a.linkForm == "full" ? LinkForm::full : LinkForm::diagonal;
+  if (options.identify && options.meshes.size() > 1)
+    usageError("--identify", "", fmt::format("a single mesh, not {}", options.meshes.size()));
   return options;
 }
 
@@ -413,6 +416,23 @@ Verb addBuild(CLI::App& app) {
       ->check(CLI::Range(0, 4))
       ->capture_default_str();
   c->add_option("--report", a.options.reportPath, "write the quality report as CSV too")->type_name("FILE.csv");
+  CLI::Option* identify =
+      c->add_flag("--identify", a.options.identify,
+                  "find the links' stiffness by finite elements of the very mesh, held as --fix says, "
+                  "for bodies that are no network of beams; takes up to a minute");
+  c->add_option("--fix", a.options.fix,
+                "what scenes hold, as their <fix>: box=x0,y0,z0,x1,y1,z1, sphere=x,y,z,r, plane=nx,ny,nz,d (m) or "
+                "vertices=FILE.csv; may be given more than once")
+      ->type_name("REGION")
+      ->allow_extra_args(false)
+      ->needs(identify);
+  c->add_option("--poisson", a.options.identification.poisson, "Poisson's ratio of the tissue, 0 to less than 0.5")
+      ->needs(identify)
+      ->capture_default_str();
+  c->add_option("--link-form", a.linkForm, "six scalars per link, or any stiffness between its two frames")
+      ->check(CLI::IsMember({"diagonal", "full"}))
+      ->needs(identify)
+      ->capture_default_str();
   return {c, [arguments] { return runBuild(buildOptions(*arguments)); }};
 }
 

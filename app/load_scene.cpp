@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "app/files/input_error.h"
@@ -21,6 +22,30 @@ static void requireFile(const Scene& scene, int line, const std::string& what, c
     throw inputError(scene.path, line, fmt::format("{} \"{}\" does not exist", what, path));
 }
 
+// As the build's command line says it.
+static std::string regionText(const NodeChoice& choice) {
+  const auto text = [](const Eigen::Vector3d& a) { return fmt::format("{} {} {}", a.x(), a.y(), a.z()); };
+  if (!choice.verticesPath.empty()) return "vertices=" + choice.verticesPath;
+  const Region& r = choice.region;
+  switch (r.shape) {
+    case Region::Shape::box:
+      return fmt::format("box={} {}", text(r.box.min()), text(r.box.max()));
+    case Region::Shape::ball:
+      return fmt::format("sphere={} {}", text(r.centre), r.radius);
+    case Region::Shape::halfSpace:
+      return fmt::format("plane={} {}", text(r.normal), r.distance);
+  }
+  return {};
+}
+
+// That of the model's own, identified for this body.
+static std::string identifyingCommand(const SoftBodyModel& model, const SceneBody& body) {
+  std::string out = model.settings.substr(0, model.settings.find(" --identify"));
+  out += fmt::format(" --identify --poisson {}", body.tissue.poisson);
+  for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix \"{}\"", regionText(fix.nodes));
+  return out;
+}
+
 static std::vector<int> findNodes(const Scene& scene, int line, const NodeChoice& choice, const SceneBody& body,
                                   const SoftBodyModel& model) {
   if (!choice.verticesPath.empty()) {
@@ -33,8 +58,46 @@ static std::vector<int> findNodes(const Scene& scene, int line, const NodeChoice
   return nodes;
 }
 
+// Patches of an identified model hold it, and no spheres.
+static void resolvePatches(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
+  std::vector<std::vector<int>> asked, known;
+  for (const SceneFix& fix : body.fixes) {
+    if (fix.freedom != FixedFreedom::all)
+      throw inputError(scene.path, fix.line,
+                       fmt::format("body \"{}\" has identified links, which its patches hold wholly: expected "
+                                   "dof=\"all\"",
+                                   body.name));
+    asked.push_back(findNodes(scene, fix.line, fix.nodes, body, model));
+    std::sort(asked.back().begin(), asked.back().end());
+    body.fixedNodes.insert(body.fixedNodes.end(), asked.back().begin(), asked.back().end());
+  }
+  if (!body.fixed.empty())
+    throw inputError(scene.path, body.line,
+                     fmt::format("body \"{}\" has identified links and fixes spheres by number: expected parts of its "
+                                 "surface",
+                                 body.name));
+  if (model.identified)
+    for (const FixedPatch& patch : model.identified->patches) known.push_back(patch.nodes);
+  std::sort(asked.begin(), asked.end());
+  std::sort(known.begin(), known.end());
+  if (model.identified && asked == known && std::abs(model.identified->poisson - body.tissue.poisson) < 1e-9) return;
+  throw inputError(scene.path, body.line,
+                   fmt::format("body \"{}\" has identified links, and its model {}; this would make it: {}", body.name,
+                               !model.identified ? "has none"
+                               : asked != known  ? "was identified with another part of its surface fixed"
+                                                 : fmt::format("was identified for a Poisson's ratio of {}",
+                                                               model.identified->poisson),
+                               identifyingCommand(model, body)));
+}
+
 // Nodes that are fixed, and the spheres that those hold.
 static void resolveFixes(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
+  if (body.links == LinkModel::identified) {
+    resolvePatches(scene, model, body);
+    if (!model.identified->usesFormulas) return;
+    body.links = LinkModel::beam;
+    body.fixedNodes.clear();
+  }
   for (const SceneFix& fix : body.fixes) {
     const std::vector<int> nodes = findNodes(scene, fix.line, fix.nodes, body, model);
     for (const int sphere : spheresHeldBy(model, nodes)) {

@@ -67,16 +67,23 @@ Quaterniond asItWas(const Vector3d&) {
   return Quaterniond::Identity();
 }
 
+Vector3d meanPlace(const SoftBodyModel& m, const std::vector<int>& nodes) {
+  Vector3d sum = Vector3d::Zero();
+  for (const int node : nodes) sum += m.restNodes[node];
+  return sum / std::max(1.0, static_cast<double>(nodes.size()));
+}
+
 int longestAxis(const Eigen::AlignedBox3d& box) {
   int axis = 0;
   box.sizes().maxCoeff(&axis);
   return axis;
 }
 
-// Of the spheres that are held.
+// Of the spheres that are held, or of the nodes where links hold no sphere.
 Vector3d heldPlace(const WorldData& d) {
   Vector3d sum = Vector3d::Zero();
   int count = 0;
+  if (d.bodies[0].fixed.empty()) return meanPlace(*d.bodies[0].model, d.bodies[0].fixedNodes);
   for (int i = 0; i < d.spheres.count; ++i) {
     if (d.spheres.groups[i / 4].inverseMass[i % 4] > 0) continue;
     sum += vectorOf(d.spheres.position[i]);
@@ -139,6 +146,33 @@ void turnOver(WorldData& d, const Eigen::AlignedBox3d& box) {
       asItWas);
 }
 
+template <class Change>
+void changeNetwork(SoftBodyModel& m, const Change& change) {
+  if (!m.identified) return;
+  auto network = std::make_shared<IdentifiedNetwork>(*m.identified);
+  change(*network);
+  m.identified = network;
+}
+
+void scaleNetwork(IdentifiedNetwork& n, double s) {
+  n.lengthScale *= s;
+  for (IdentifiedFrame& f : n.frames) {
+    f.restPosition *= s;
+    f.volume *= s * s * s;
+    f.secondMoment *= std::pow(s, 5);
+  }
+  for (IdentifiedLink& l : n.links) {
+    l.restPoint0 *= s;
+    l.restPoint1 *= s;
+    l.stiffness *= s;
+  }
+  for (std::vector<SkinFrame>& of : n.skin)
+    for (SkinFrame& f : of) f.restPoint *= s;
+  n.layer.normal /= s;
+  n.layer.tangential /= s;
+  n.layer.membrane *= s;
+}
+
 std::shared_ptr<const SoftBodyModel> scaledModel(const SoftBodyModel& m, double s) {
   auto out = std::make_shared<SoftBodyModel>(m);
   for (Vector3d& x : out->restNodes) x *= s;
@@ -160,6 +194,7 @@ std::shared_ptr<const SoftBodyModel> scaledModel(const SoftBodyModel& m, double 
     a.area *= s * s;
     a.volume *= s * s * s;
   }
+  changeNetwork(*out, [s](IdentifiedNetwork& n) { scaleNetwork(n, s); });
   return out;
 }
 
@@ -172,6 +207,13 @@ std::shared_ptr<const SoftBodyModel> unevenModel(const SoftBodyModel& m) {
     out->spheres[i].secondMoment *= factor;
   }
   for (Attachment& a : out->attachments) a.volume *= a.massSphere % 2 == 0 ? 1e-2 : 1e2;
+  changeNetwork(*out, [](IdentifiedNetwork& n) {
+    for (std::size_t i = 0; i < n.frames.size(); ++i) {
+      const double factor = i % 2 == 0 ? 1e-2 : 1e2;
+      n.frames[i].volume *= factor;
+      n.frames[i].secondMoment *= factor;
+    }
+  });
   return out;
 }
 
@@ -196,6 +238,13 @@ std::shared_ptr<const SoftBodyModel> shuffledModel(const SoftBodyModel& m, BodyD
   }
   std::sort(out->edges.begin(), out->edges.end());
   for (int& node : body.fixedNodes) node = place[node];
+  changeNetwork(*out, [&](IdentifiedNetwork& n) {
+    for (std::size_t i = 0; i < order.size(); ++i) n.skin[i] = m.identified->skin[order[i]];
+    for (FixedPatch& p : n.patches) {
+      for (int& node : p.nodes) node = place[node];
+      std::sort(p.nodes.begin(), p.nodes.end());
+    }
+  });
   return out;
 }
 
@@ -263,7 +312,8 @@ double farthestFromRest(const WorldData& d, const BodyDescription& body) {
 int freeEnd(const BodyDescription& body) {
   Vector3d held = Vector3d::Zero();
   for (const FixedSphere& f : body.fixed) held += body.model->spheres[f.sphere].restFrame;
-  held /= static_cast<double>(body.fixed.size());
+  held = body.fixed.empty() ? meanPlace(*body.model, body.fixedNodes)
+                            : Vector3d(held / static_cast<double>(body.fixed.size()));
   int best = 0;
   for (std::size_t i = 0; i < body.model->restNodes.size(); ++i)
     if ((body.model->restNodes[i] - held).squaredNorm() > (body.model->restNodes[best] - held).squaredNorm())
@@ -294,7 +344,7 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
   body.worldFromModel.setIdentity();
   body.driven.clear();
   body.deadLoads.clear();
-  if (body.fixed.empty())
+  if (body.fixed.empty() && (body.links != LinkModel::identified || body.fixedNodes.empty()))
     throw std::runtime_error(fmt::format("body '{}' is not held anywhere: expected a body with <fix>", body.name));
   if (found->change) found->change(body);
   WorldSettings settings;

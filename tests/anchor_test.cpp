@@ -5,8 +5,7 @@
 #include "physics/dynamics/body_mechanics.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/node_motion.h"
-#include "tests/dynamics_states.h"
-#include "tests/synthetic_model.h"
+#include "tests/identified_model.h"
 
 // Where links carry what hangs on them, bent far: rates are the places' differences, loads their transpose. Each of
 // these is written more than once (whole surfaces, single nodes, implicit steps), and all must agree.
@@ -37,11 +36,23 @@ BodyDescription chain(SurfaceMode surface, LinkModel links) {
   return body;
 }
 
+// Nodes on up to three of the chain's frames and of the held patch's, those off the spheres'.
+BodyDescription identifiedChain(SurfaceMode surface) {
+  const BodyDescription plain = chain(surface, LinkModel::beam);
+  BodyDescription body = synthetic::identifiedBody(
+      synthetic::withNetwork(*plain.model, {.held = {0, 1, 2, 3, 4}, .uneven = 0.3, .frames = 3}, {0.001, 0.002, 0}),
+      5e3);
+  body.surface = surface;
+  body.tissue.damping = 0;
+  return body;
+}
+
 // Three links each: the groups of four hold springs and beams side by side.
-World springsAndBeams(SurfaceMode surface) {
+World chainsOfAllLinks(SurfaceMode surface) {
   WorldSettings settings;
   settings.gravity.setZero();
-  return World(settings, {chain(surface, LinkModel::springs), chain(surface, LinkModel::beam)});
+  return World(settings,
+               {chain(surface, LinkModel::springs), chain(surface, LinkModel::beam), identifiedChain(surface)});
 }
 
 void moveSpheres(WorldData& d, const Motion& motion, double time) {
@@ -91,7 +102,7 @@ class BentAnchors : public testing::TestWithParam<double> {};  // rad about each
 }  // namespace
 
 TEST_P(BentAnchors, VelocitiesOfASkinAreThePlacesDifferences) {
-  World world = springsAndBeams(SurfaceMode::skin);
+  World world = chainsOfAllLinks(SurfaceMode::skin);
   WorldData& d = world.data();
   shake(d, 3, GetParam(), 0.003, 0.5);
   const auto places = [](WorldData& of) {
@@ -108,7 +119,7 @@ TEST_P(BentAnchors, VelocitiesOfASkinAreThePlacesDifferences) {
 }
 
 TEST_P(BentAnchors, OneNodeMovesAsTheWholeSurfaceDoesAndLoadsReturnTheSamePower) {
-  World world = springsAndBeams(SurfaceMode::skin);
+  World world = chainsOfAllLinks(SurfaceMode::skin);
   WorldData& d = world.data();
   shake(d, 4, GetParam(), 0.003, 0.5);
   placeCarriedNodes(d);
@@ -116,7 +127,7 @@ TEST_P(BentAnchors, OneNodeMovesAsTheWholeSurfaceDoesAndLoadsReturnTheSamePower)
   for (const BodyRange& range : d.ranges) {
     for (const int i : range.node) {
       const HostPoint point = hostPoint(d, i);
-      ASSERT_GT(point.count, 0);
+      ASSERT_TRUE(point.count > 0 || d.identified.ofNodeGroup[i / 4] >= 0);  // held nodes hang on no sphere
       Vector3d velocity = Vector3d::Zero();
       double power = 0;
       for (int k = 0; k < point.count; ++k) {
@@ -126,14 +137,14 @@ TEST_P(BentAnchors, OneNodeMovesAsTheWholeSurfaceDoesAndLoadsReturnTheSamePower)
         power += linear.dot(point.force[k] * force) + angular.dot(point.torque[k] * force);
       }
       const Vector3d expected = vectorAt(d.nodes.velocity, i);
-      EXPECT_LT((velocity - expected).norm(), 1e-12 * expected.norm());
+      EXPECT_LE((velocity - expected).norm(), 1e-12 * expected.norm());
       EXPECT_NEAR(power, force.dot(expected), 1e-12 * force.norm() * expected.norm());
     }
   }
 }
 
 TEST_P(BentAnchors, TheImplicitStepsMapIsTheAnchorsDerivativeAndReturnsItsTranspose) {
-  World world = springsAndBeams(SurfaceMode::full);
+  World world = chainsOfAllLinks(SurfaceMode::full);
   WorldData& d = world.data();
   shake(d, 5, GetParam(), 0.003, 0.5);
   runStage(d, evaluateForces);

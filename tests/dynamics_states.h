@@ -55,7 +55,7 @@ inline double sphereMass(const WorldData& d, int i) {
   return d.spheres.groups[i / 4].mass[i % 4];
 }
 
-// Every sphere turned by up to `angle` (rad) and every sphere and node moved by up to `shift` (m), spun and thrown.
+// Every sphere turned by up to `angle` (rad) and every sphere and free node moved by up to `shift` (m), spun and thrown.
 inline void shake(WorldData& d, std::uint64_t seed, double angle, double shift, double speed) {
   Random random(seed);
   for (int i = 0; i < d.spheres.count; ++i) {
@@ -67,8 +67,10 @@ inline void shake(WorldData& d, std::uint64_t seed, double angle, double shift, 
   for (const BodyRange& r : d.ranges) {
     for (int i : r.node) {
       if (i >= d.nodes.dynamicEnd) continue;
-      setVector(d.nodes.position, i, vectorAt(d.nodes.position, i) + shift * random.vector());
-      setVector(d.nodes.velocity, i, speed * random.vector());
+      const Vector3d moved = shift * random.vector(), thrown = speed * random.vector();
+      if (d.nodes.inverseMass[i] == 0) continue;  // fixed
+      setVector(d.nodes.position, i, vectorAt(d.nodes.position, i) + moved);
+      setVector(d.nodes.velocity, i, thrown);
     }
   }
   runStage(d, evaluateLinks);
@@ -99,6 +101,52 @@ inline double elastic(WorldData& d) {
   runStage(d, evaluateLinks);
   runStage(d, evaluateAttachments);
   return linkEnergy(d) + surfaceEnergy(d);
+}
+
+// Central differences of the elastic energy along every freedom, against the forces.
+inline void expectForcesAreMinusGradient(WorldData& d, double tolerance) {
+  runStage(d, evaluateForces);
+  const std::vector<Quad> force = d.spheres.force, torque = d.spheres.torque;
+  const std::vector<Lanes3> nodeForce = d.nodes.force;
+  double forceScale = 0, torqueScale = 0;
+  for (int i = 0; i < d.spheres.count; ++i) {
+    forceScale = std::max(forceScale, vectorOf(force[i]).norm());
+    torqueScale = std::max(torqueScale, vectorOf(torque[i]).norm());
+  }
+  const double step = 1e-6;
+  for (int i = 0; i < d.spheres.count; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const Quad position = d.spheres.position[i], q = d.spheres.orientation[i];
+      double energy[2];
+      for (int side : {0, 1}) {
+        d.spheres.position[i].v[k] = position.v[k] + (side == 0 ? -1 : 1) * 0.1 * step;
+        energy[side] = elastic(d);
+        d.spheres.position[i] = position;
+      }
+      EXPECT_NEAR(force[i].v[k], -(energy[1] - energy[0]) / (0.2 * step), tolerance * forceScale)
+          << "sphere " << i << " axis " << k;
+      for (int side : {0, 1}) {
+        turnBy(d, i, (side == 0 ? -step : step) * Vector3d::Unit(k));
+        energy[side] = elastic(d);
+        d.spheres.orientation[i] = q;
+      }
+      EXPECT_NEAR(torque[i].v[k], -(energy[1] - energy[0]) / (2 * step), tolerance * torqueScale)
+          << "sphere " << i << " about " << k;
+    }
+  }
+  for (int i = 0; i < d.nodes.dynamicEnd; i += 5) {
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d position = vectorAt(d.nodes.position, i);
+      double energy[2];
+      for (int side : {0, 1}) {
+        setVector(d.nodes.position, i, position + (side == 0 ? -1 : 1) * 0.1 * step * Vector3d::Unit(k));
+        energy[side] = elastic(d);
+        setVector(d.nodes.position, i, position);
+      }
+      EXPECT_NEAR(vectorAt(nodeForce, i)[k], -(energy[1] - energy[0]) / (0.2 * step), tolerance * forceScale)
+          << "node " << i << " axis " << k;
+    }
+  }
 }
 
 }  // namespace medulla::states

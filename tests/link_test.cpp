@@ -28,52 +28,6 @@ static World bareChain(int spheres, SurfaceMode surface, double damping) {
   return World(settings, {b});
 }
 
-// Central differences of the elastic energy along every freedom, against the forces.
-static void expectForcesAreMinusGradient(WorldData& d, double tolerance) {
-  runStage(d, evaluateForces);
-  const std::vector<Quad> force = d.spheres.force, torque = d.spheres.torque;
-  const std::vector<Lanes3> nodeForce = d.nodes.force;
-  double forceScale = 0, torqueScale = 0;
-  for (int i = 0; i < d.spheres.count; ++i) {
-    forceScale = std::max(forceScale, vectorOf(force[i]).norm());
-    torqueScale = std::max(torqueScale, vectorOf(torque[i]).norm());
-  }
-  const double step = 1e-6;
-  for (int i = 0; i < d.spheres.count; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      const Quad position = d.spheres.position[i], q = d.spheres.orientation[i];
-      double energy[2];
-      for (int side : {0, 1}) {
-        d.spheres.position[i].v[k] = position.v[k] + (side == 0 ? -1 : 1) * 0.1 * step;
-        energy[side] = elastic(d);
-        d.spheres.position[i] = position;
-      }
-      EXPECT_NEAR(force[i].v[k], -(energy[1] - energy[0]) / (0.2 * step), tolerance * forceScale)
-          << "sphere " << i << " axis " << k;
-      for (int side : {0, 1}) {
-        turnBy(d, i, (side == 0 ? -step : step) * Vector3d::Unit(k));
-        energy[side] = elastic(d);
-        d.spheres.orientation[i] = q;
-      }
-      EXPECT_NEAR(torque[i].v[k], -(energy[1] - energy[0]) / (2 * step), tolerance * torqueScale)
-          << "sphere " << i << " about " << k;
-    }
-  }
-  for (int i = 0; i < d.nodes.dynamicEnd; i += 5) {
-    for (int k = 0; k < 3; ++k) {
-      const Vector3d position = vectorAt(d.nodes.position, i);
-      double energy[2];
-      for (int side : {0, 1}) {
-        setVector(d.nodes.position, i, position + (side == 0 ? -1 : 1) * 0.1 * step * Vector3d::Unit(k));
-        energy[side] = elastic(d);
-        setVector(d.nodes.position, i, position);
-      }
-      EXPECT_NEAR(vectorAt(nodeForce, i)[k], -(energy[1] - energy[0]) / (0.2 * step), tolerance * forceScale)
-          << "node " << i << " axis " << k;
-    }
-  }
-}
-
 TEST(Link, ForcesAreMinusTheEnergyGradient) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     World world = bareChain(4, SurfaceMode::skin, 0);

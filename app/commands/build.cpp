@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "app/commands/commands.h"
+#include "app/files/fix_text.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/output_file.h"
@@ -30,11 +31,17 @@ struct BuildJob {
 
 // The command that repeats the build, file names without folders: the model is the same wherever it is built, and the
 // same whether it is built alone or with others.
-std::string repeatingCommand(const BuildJob& job, const std::string& unit) {
+std::string repeatingCommand(const BuildJob& job, const BuildOptions& options) {
   std::string command =
       fmt::format("medulla build {} {}", fs::path(job.meshPath).filename().string(), describeSettings(job.settings));
-  if (unit != "m") command += " --unit " + unit;
+  if (options.unit != "m") command += " --unit " + options.unit;
   if (!job.finePath.empty()) command += " --fine " + fs::path(job.finePath).filename().string();
+  if (options.identify) {
+    const bool full = options.identification.links == LinkForm::full;
+    command += fmt::format(" --identify --poisson {} --link-form {}", options.identification.poisson,
+                           full ? "full" : "diagonal");
+    for (const FixedPatch& patch : job.model.identified->patches) command += " --fix " + patch.region;
+  }
   return command;
 }
 
@@ -111,7 +118,7 @@ void divideSpheres(std::vector<BuildJob>& jobs) {
   for (std::size_t j = 0; j < jobs.size(); ++j) jobs[j].settings.spheres = counts[j];
 }
 
-void buildAll(const std::string& unit, std::vector<BuildJob>& jobs) {
+void buildAll(std::vector<BuildJob>& jobs) {
   Progress progress("build", 100, "%");
   for (std::size_t j = 0; j < jobs.size(); ++j) {
     BuildJob& job = jobs[j];
@@ -124,12 +131,30 @@ void buildAll(const std::string& unit, std::vector<BuildJob>& jobs) {
     });
     job.model.name = job.name;
     job.model.meshHash = job.inputHash;
-    job.model.settings = repeatingCommand(job, unit);
   }
 }
 
+void identifyModel(const BuildOptions& options, BuildJob& job) {
+  Progress progress("identify", 100, "%");
+  const auto tick = [&](double share) {
+    checkInterrupt();
+    progress.update(100 * share);
+  };
+  job.model.identified = std::make_shared<IdentifiedNetwork>(naming(job.meshPath, [&] {
+    std::vector<HeldRegion> held;
+    for (const std::string& text : options.fix) held.push_back(parseHeldRegion(text, job.model));
+    return identifyNetwork(job.model, held, options.identification, tick);
+  }));
+}
+
 std::vector<Result> resultsOf(const std::vector<BuildJob>& jobs) {
-  if (jobs.size() == 1) return buildResults(jobs[0].report);
+  if (jobs.size() == 1) {
+    std::vector<Result> results = buildResults(jobs[0].report);
+    if (jobs[0].model.identified) {
+      for (const Result& r : identifiedResults(*jobs[0].model.identified)) results.push_back(r);
+    }
+    return results;
+  }
   std::vector<Result> results;
   std::vector<BuildReport> reports;
   for (const BuildJob& job : jobs) {
@@ -156,7 +181,9 @@ int runBuild(const BuildOptions& options) {
     readMeshes(scale, jobs);
     const bool shared = jobs.size() > 1 && options.settings.method == BuildMethod::cover && options.settings.gap == 0;
     if (shared) divideSpheres(jobs);
-    buildAll(options.unit, jobs);
+    buildAll(jobs);
+    if (options.identify) identifyModel(options, jobs[0]);
+    for (BuildJob& job : jobs) job.model.settings = repeatingCommand(job, options);
     const std::vector<Result> results = resultsOf(jobs);
     for (const BuildJob& job : jobs) writeModel(job.modelPath, job.model);
     if (!options.reportPath.empty()) writeReport(options.reportPath, results);

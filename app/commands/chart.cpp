@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 struct ChartMethod {
   std::string name;
   std::vector<SceneOverride> overrides;
+  bool anyModel = true;  // has it
 };
 const std::vector<ChartMethod>& chartMethods() {
   static const std::vector<ChartMethod> methods = {
@@ -35,6 +36,7 @@ const std::vector<ChartMethod>& chartMethods() {
       {"springs", {{"body.*.links", "springs"}}},
       {"implicit", {{"dynamics.integrator", "implicit"}}},
       {"implicit_2", {{"dynamics.integrator", "implicit"}, {"dynamics.order", "2"}}},
+      {"identified", {{"body.*.links", "identified"}}, false},
   };
   return methods;
 }
@@ -280,9 +282,10 @@ std::vector<SphereChartRow> sphereRows(const ChartOptions& options, const Loaded
 
 }  // namespace
 
-std::vector<std::string> chartMethodNames() {
+std::vector<std::string> chartMethodNames(bool ofAnyModel) {
   std::vector<std::string> out;
-  for (const ChartMethod& method : chartMethods()) out.push_back(method.name);
+  for (const ChartMethod& method : chartMethods())
+    if (method.anyModel || !ofAnyModel) out.push_back(method.name);
   return out;
 }
 

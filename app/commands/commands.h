@@ -7,6 +7,7 @@
 #include "app/commands/run.h"
 #include "app/scene_view.h"
 #include "physics/model/build.h"
+#include "physics/model/identify/identify.h"
 
 // One function per verb of the command line; each returns the exit code and throws std::runtime_error for bad input.
 namespace medulla {
@@ -16,6 +17,9 @@ struct BuildOptions {
   std::vector<std::string> fine;               // none, or one per mesh
   std::string unit = "m", output, reportPath;  // output: the model, of several meshes a folder for NAME.model.xml each
   BuildSettings settings;                      // spheres: of all meshes together
+  bool identify = false;                       // of one mesh only
+  std::vector<std::string> fix;                // as parseHeldRegion() reads them
+  IdentifySettings identification;
 };
 int runBuild(const BuildOptions& options);
 
@@ -77,7 +81,7 @@ struct ChartOptions {
   std::vector<std::string> methods;  // of chartMethodNames(), at least one; the first is the reference's
   std::vector<std::string> models;   // [BODY=]FILE: of the scene's mesh with other numbers of spheres; empty: its own
 };
-std::vector<std::string> chartMethodNames();
+std::vector<std::string> chartMethodNames(bool ofAnyModel = false);  // true: those that need nothing of a model
 int runChart(const ChartOptions& options);
 
 struct StabilityOptions {

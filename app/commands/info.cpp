@@ -60,14 +60,15 @@ void addBody(const SceneBody& body, const SoftBodyModel& model, std::vector<Resu
   };
   const double volume = enclosedVolume({model.restNodes, model.triangles});
   add("spheres", text(model.spheres.size()), "");
-  add("links", text(model.links.size()), "");
+  add("links", text(body.links == LinkModel::identified ? model.identified->links.size() : model.links.size()), "");
   add("nodes", text(model.restNodes.size()), "");
   add("triangles", text(model.triangles.size()), "");
   add("mass", text(volume * body.tissue.density), "kg");
   add("young", text(body.tissue.young), "Pa");
   add("poisson", text(body.tissue.poisson), "");
   add("damping", text(body.tissue.damping), "");
-  add("link_model", body.links == LinkModel::beam ? "beam" : "springs", "");
+  constexpr const char* links[] = {"springs", "beam", "identified"};
+  add("link_model", links[static_cast<int>(body.links)], "");
   constexpr const char* surfaces[] = {"full", "skin", "contact"};
   add("surface", surfaces[static_cast<int>(body.surface)], "");
   add("look", body.look, "");

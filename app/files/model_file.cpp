@@ -6,10 +6,9 @@
 #include <functional>
 #include <string_view>
 
-#include "app/files/input_error.h"
-#include "app/files/number_text.h"
+#include "app/files/identified_part.h"
+#include "app/files/model_rows.h"
 #include "app/files/output_file.h"
-#include "app/files/xml_element.h"
 #include "physics/model/mesh_topology.h"
 
 // The arrays of a model, one element each, one line of numbers per entry. The columns are those of the structs in
@@ -29,6 +28,8 @@ const XmlRules& modelRules() {
       out.front().children.push_back({array, 1, 1});
       out.push_back({array, {"rows"}, {}, {}, true});
     }
+    out.front().children.push_back({"identified", 0, 1});
+    for (const XmlRule& rule : identifiedRules()) out.push_back(rule);
     return out;
   }();
   return rules;
@@ -36,64 +37,10 @@ const XmlRules& modelRules() {
 
 // ---- writing ----
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
 std::string hexadecimal(std::uint64_t value) {
   char digits[17];
   std::snprintf(digits, sizeof(digits), "%016llx", static_cast<unsigned long long>(value));
   return digits;
-}
-
-// Appends numbers, vectors and arrays to the line that `out` ends with.
-template <typename T>
-void putValue(std::string& out, const T& value) {
-  if constexpr (std::is_arithmetic_v<T>) {
-    if (out.back() != '\n') out += ' ';
-    appendNumber(out, value);
-  } else {
-    for (long k = 0; k < static_cast<long>(value.size()); ++k) putValue(out, value.data()[k]);
-  }
-}
-
-template <typename... T>
-void put(std::string& out, const T&... values) {
-  (putValue(out, values), ...);
-}
-
-template <typename Row>
-void putRows(std::string& out, const char* name, std::size_t rows, const Row& putRow) {
-  out += std::string("  <") + name + " rows=\"" + std::to_string(rows) + "\">\n";
-  for (std::size_t k = 0; k < rows; ++k) {
-    putRow(k);
-    out += '\n';
-  }
-  out += std::string("  </") + name + ">\n";
-}
-
-template <typename T>
-void putArray(std::string& out, const char* name, const std::vector<T>& values) {
-  putRows(out, name, values.size(), [&](std::size_t k) { put(out, values[k]); });
 }
 
 void putVolumeModel(std::string& out, const SoftBodyModel& model) {
@@ -126,86 +73,6 @@ void putRenderSurface(std::string& out, const RenderSurface& s) {
 }
 
 // ---- reading ----
-
-// The numbers of one element's text in order, row by row, with the line for complaints.
-class Rows {
- public:
-  Rows(const std::string& path, const XmlElement& root, const std::string& name)
-      : path_(path), element_(*std::find_if(root.children.begin(), root.children.end(), [&](const XmlElement& e) {
-          return e.name == name;
-        })) {
-    rest_ = element_.text;
-    line_ = std::max(element_.textLine, element_.line);
-    rows_ = readInteger(element_, "rows", 0, notNegative);
-  }
-
-  // Calls readRow() for every row; afterwards no text may be left.
-  template <typename Row>
-  void forEach(const Row& readRow) {
-    for (int k = 0; k < rows_; ++k) readRow();
-    skipSpace();
-    require(rest_.empty(), "more numbers than its rows hold");
-  }
-
-  // Fills numbers, vectors and arrays of fixed size.
-  template <typename... T>
-  void get(T&... values) {
-    (getValue(values), ...);
-  }
-
-  int index(std::size_t size, int lowest = 0) {
-    const int value = next<int>();
-    require(value >= lowest && value < static_cast<long>(size), "an index out of range");
-    return value;
-  }
-
-  template <std::size_t N>
-  std::array<int, N> indices(std::size_t size) {
-    std::array<int, N> out;
-    for (int& i : out) i = index(size);
-    for (std::size_t k = 0; k < N; ++k) require(out[k] != out[(k + 1) % N], "the same index twice");
-    return out;
-  }
-
-  void require(bool condition, const char* message) const {
-    if (!condition) throw inputError(path_, line_, "<" + element_.name + ">: " + message);
-  }
-
- private:
-  static bool isSpace(char c) { return c == ' ' || c == '\n' || c == '\t'; }
-
-  void skipSpace() {
-    std::size_t k = 0;
-    for (; k < rest_.size() && isSpace(rest_[k]); ++k) line_ += rest_[k] == '\n';
-    rest_.remove_prefix(k);
-  }
-
-  template <typename T>
-  T next() {
-    skipSpace();
-    std::size_t length = 0;  // a plain loop: find_first_of() took a quarter of the whole reading time
-    while (length < rest_.size() && !isSpace(rest_[length])) ++length;
-    require(length > 0, "fewer numbers than its rows hold");
-    const std::optional<T> value = parseNumber<T>(rest_.substr(0, length));
-    require(value.has_value(), std::is_integral_v<T> ? "expected an integer" : "expected a finite number");
-    rest_.remove_prefix(length);
-    return *value;
-  }
-
-  template <typename T>
-  void getValue(T& value) {
-    if constexpr (std::is_arithmetic_v<T>) {
-      value = next<T>();
-    } else {
-      for (long k = 0; k < static_cast<long>(value.size()); ++k) getValue(value.data()[k]);
-    }
-  }
-
-  const std::string& path_;
-  const XmlElement& element_;
-  std::string_view rest_;
-  int line_ = 0, rows_ = 0;
-};
 
 std::uint64_t readMeshHash(const XmlElement& root) {
   const std::string text = readText(root, "mesh_hash");
@@ -347,8 +214,8 @@ void readRenderSurface(const std::string& path, const XmlElement& root, std::siz
 void writeModel(const std::string& path, const SoftBodyModel& model) {
   OutputFile file(path);
   std::string out = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
-  out += "<model version=\"" + std::to_string(formatVersion) + "\" name=\"" + escaped(model.name) + "\" mesh_hash=\"" +
-         hexadecimal(model.meshHash) + "\" settings=\"" + escaped(model.settings) + "\">\n";
+  out += "<model version=\"" + std::to_string(formatVersion) + "\" name=\"" + escapedXml(model.name) +
+         "\" mesh_hash=\"" + hexadecimal(model.meshHash) + "\" settings=\"" + escapedXml(model.settings) + "\">\n";
   putArray(out, "input_vertices", model.nodeOfInputVertex);
   putArray(out, "nodes", model.restNodes);
   putArray(out, "triangles", model.triangles);
@@ -357,6 +224,7 @@ void writeModel(const std::string& path, const SoftBodyModel& model) {
   putArray(out, "skeleton_nodes", model.skeleton.nodes);
   putArray(out, "skeleton_links", model.skeleton.links);
   putRenderSurface(out, model.renderSurface);
+  if (model.identified) putIdentified(out, *model.identified);
   file.write(out + "</model>\n");
   file.commit();
 }
@@ -380,6 +248,8 @@ SoftBodyModel readModel(const std::string& path) {
   readBuckets(path, root, model);
   readSkeleton(path, root, model.skeleton);
   readRenderSurface(path, root, model.restNodes.size(), model.renderSurface);
+  for (const XmlElement& child : root.children)
+    if (child.name == "identified") model.identified = readIdentified(path, child, model);
   return model;
 }
 

@@ -45,6 +45,18 @@ std::vector<Result> buildResults(const BuildReport& r) {
           {"seconds", numberText(r.seconds), "s"}};
 }
 
+std::vector<Result> identifiedResults(const IdentifiedNetwork& n) {
+  return {{"identified_voxel", numberText(n.voxel), "m"},
+          {"identified_links", numberText(n.links.size()), ""},
+          {"identified_patches", numberText(n.patches.size()), ""},
+          {"identified_error_max", numberText(n.bulk.maximum), "%"},
+          {"identified_error_rms", numberText(n.bulk.rms), "%"},
+          {"identified_poke_error_max", numberText(n.poke.maximum), "%"},
+          {"identified_poke_error_rms", numberText(n.poke.rms), "%"},
+          {"finite_elements_error_max", numberText(n.ofFiniteElements.maximum), "%"},
+          {"finite_elements_error_rms", numberText(n.ofFiniteElements.rms), "%"}};
+}
+
 std::vector<Result> totalResults(const std::vector<BuildReport>& reports) {
   BuildReport total;
   double covered = 0, widest = 0;

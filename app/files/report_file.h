@@ -16,6 +16,7 @@ struct Result {
 std::vector<Result> buildResults(const BuildReport& report);
 
 // Sums over the bodies of one build; the cover is that of all volumes together, the gap the largest in metres.
+std::vector<Result> identifiedResults(const IdentifiedNetwork& network);
 std::vector<Result> totalResults(const std::vector<BuildReport>& reports);
 
 // CSV with the header name,value,unit. Errors are those of OutputFile.

@@ -246,7 +246,8 @@ void readBodies(const XmlElement& root, Scene& scene) {
     body.modelPath = readPath(*e, "model", scene.path);
     body.look = readText(*e, "look");
     body.tissue = findTissue(*e, tissues);
-    body.links = readChoice(*e, "links", {"beam", "springs"}, 0) == 0 ? LinkModel::beam : LinkModel::springs;
+    constexpr LinkModel links[] = {LinkModel::beam, LinkModel::springs, LinkModel::identified};
+    body.links = links[readChoice(*e, "links", {"beam", "springs", "identified"}, 0)];
     constexpr SurfaceMode surfaces[] = {SurfaceMode::full, SurfaceMode::skin, SurfaceMode::contact};
     body.surface = surfaces[readChoice(*e, "surface", {"full", "skin", "contact"}, 0)];
     body.worldFromModel = readPlacement(*e);

@@ -11,6 +11,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "physics/dynamics/identified_mechanics.h"
 #include "physics/model/attachment.h"
 #include "physics/model/mesh_topology.h"
 
@@ -94,6 +95,7 @@ void checkDescription(const BodyDescription& body) {
     require(a.massSphere >= 0 && a.massSphere < spheres,
             fmt::format("its model takes a node's mass from sphere {}, which does not exist", a.massSphere));
   }
+  if (isIdentified(body)) checkIdentified(body);
 }
 
 // Nodes that are fixed and have a neighbour that is not.
@@ -288,11 +290,16 @@ void setSurfaceStiffness(const BodyDescription& body, BodyMechanics& out) {
     const Attachment& a = m.attachments[i];
     depth.push_back(attachmentDepth(a, out.normal[i], m.spheres));
     out.attachmentStiffness.push_back(depth[i] > 0 ? kFoundationFactor * body.tissue.young * a.area / depth[i] : 0);
+    if (!isIdentified(body)) continue;
+    const IdentifiedLayer& layer = m.identified->layer;
+    out.attachmentStiffness[i] = body.tissue.young * a.area * layer.tangential;
+    out.normalExcess.push_back(body.tissue.young * a.area * (layer.normal - layer.tangential));
   }
   setBulk(body, enclosedVolume(mesh), depth, out);
   const double depthSum = std::accumulate(depth.begin(), depth.end(), 0.0);
-  const double thickness =
-      kLayerThicknessOverDepth * depthSum / static_cast<double>(std::max<std::size_t>(1, m.restNodes.size()));
+  const double thickness = isIdentified(body) ? m.identified->layer.membrane
+                                              : kLayerThicknessOverDepth * depthSum /
+                                                    static_cast<double>(std::max<std::size_t>(1, m.restNodes.size()));
   out.edgeStiffness.assign(m.edges.size(), 0);
   for (const auto& t : m.triangles) {
     const Vector3d a = m.restNodes[t[0]], b = m.restNodes[t[1]], c = m.restNodes[t[2]];
@@ -341,10 +348,11 @@ void setMasses(const BodyDescription& body, BodyMechanics& out) {
   std::vector<double> mass;
   std::vector<Matrix3d> moment;
   for (std::size_t i = 0; i < m.spheres.size(); ++i) {
-    require(m.spheres[i].volume > 0,
-            fmt::format("its model's sphere {} has volume {}: expected more than 0 m3", i, m.spheres[i].volume));
-    mass.push_back(density * m.spheres[i].volume);
-    moment.push_back(density * m.spheres[i].secondMoment);
+    const SphereCell cell = sphereCell(body, static_cast<int>(i));
+    require(cell.volume > 0,
+            fmt::format("its model's sphere {} has volume {}: expected more than 0 m3", i, cell.volume));
+    mass.push_back(density * cell.volume);
+    moment.push_back(density * cell.secondMoment);
   }
   const std::vector<double> wholeMass = mass;
   const std::vector<Matrix3d> wholeMoment = moment;
@@ -378,9 +386,15 @@ BodyMechanics bodyMechanics(const BodyDescription& body) {
   out.nodeMoves.assign(body.model->restNodes.size(), true);
   for (const int node : body.fixedNodes) out.nodeMoves[node] = false;
   for (const DrivenSphere& driven : body.driven) out.moves[driven.sphere] = false;
-  out.spans = linkSpans(body, out);
-  out.links = linkStiffness(body, out.spans);
-  out.attachments = attachmentsToSpans(*body.model, out.spans, out.nodeMoves);
+  if (isIdentified(body)) {
+    out.identifiedLinks = identifiedStiffness(body);
+    out.skin = heldSkin(*body.model);
+    out.attachments = attachmentsToFrames(*body.model, out.skin);
+  } else {
+    out.spans = linkSpans(body, out);
+    out.links = linkStiffness(body, out.spans);
+    out.attachments = attachmentsToSpans(*body.model, out.spans, out.nodeMoves);
+  }
   for (const Attachment& a : out.attachments)
     out.twistShare.push_back(a.onLink ? twistShare(body.model->links[a.host], out.spans[a.host], a.along) : 0);
   setSurfaceStiffness(body, out);

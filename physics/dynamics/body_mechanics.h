@@ -41,6 +41,10 @@ struct BodyMechanics {
   std::vector<double> linkBulk, sphereBulk;  // N/m5, per host: pressure per volume between its nodes and anchors
   double largestPressure = 0;                // Pa
   std::vector<double> edgeStiffness;         // N/m per edge; of the full surface
+  // Of identified links instead of spans and links: identified_mechanics.h.
+  std::vector<Matrix6d> identifiedLinks;     // N/m
+  std::vector<std::vector<SkinFrame>> skin;  // per node
+  std::vector<double> normalExcess;          // N/m per node: what its attachment is stiffer along its normal
   std::vector<double> nodeMass;              // kg; 0 on skin
   std::vector<bool> nodeMoves;               // per node: not fixed
   // Set by dampBody. s, damping over stiffness, Rayleigh's beta of links and surface; 1/s, damping over mass, his

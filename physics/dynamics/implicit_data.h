@@ -41,8 +41,9 @@ struct ImplicitData {
   std::vector<Eigen::Matrix3d> inertia;   // kg m2, per sphere, in its frame
   std::vector<double> pull, carriedMass;  // kg, per node: the attachments' share; what a host feels of node and spring
   std::vector<double> nodeMobility;       // 1/kg, per node: of itself, its attachment and its edges; 0: held
+  std::vector<std::array<int, 2>> pairs;  // spheres of each link, identified ones last; -1: held
   // Of the present iteration.
-  std::vector<Block6> diagonal, beside;      // spheres and links alone, per sphere and per link
+  std::vector<Block6> diagonal, beside;      // spheres and links alone, per sphere and per pair
   std::vector<Block6> lumped, lumpedBeside;  // and with surface and loads lumped into them
   BlockCholesky spheres;                     // of the latter
   std::vector<LoadRow> rows;

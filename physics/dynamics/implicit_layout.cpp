@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <iterator>
+
 #include "physics/dynamics/implicit_stages.h"
 
 namespace medulla {
@@ -47,14 +50,17 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
   layOutNodes(d, s);
   for (int i = 0; i < d.spheres.count; ++i) s.totalMass += d.spheres.groups[i / 4].mass[i % 4];
   for (const double m : d.nodes.mass) s.totalMass += m;
-  std::vector<std::array<int, 2>> links;
   for (int k = 0; k < d.links.count; ++k) {
     const LinkGroup& g = d.links.groups[k / 4];
-    links.push_back({static_cast<int>(g.sphere0[k % 4]), static_cast<int>(g.sphere1[k % 4])});
+    s.pairs.push_back({static_cast<int>(g.sphere0[k % 4]), static_cast<int>(g.sphere1[k % 4])});
   }
+  listIdentifiedPairs(d, s.pairs);
+  std::vector<std::array<int, 2>> links;
+  std::copy_if(s.pairs.begin(), s.pairs.end(), std::back_inserter(links),
+               [](const auto& pair) { return pair[1] >= 0; });
   s.spheres.analyse(d.spheres.count, links);
   s.diagonal.resize(d.spheres.count);
-  s.beside.resize(d.links.count);
+  s.beside.resize(s.pairs.size());
   s.blocks.resize(d.spheres.count);
   for (Motion* m : {&s.balance, &s.kept, &s.before.motion, &s.start.motion, &s.motion, &s.residual, &s.change,
                     &s.direction, &s.image, &s.preconditioned})

@@ -30,7 +30,7 @@ void addTerm(ImplicitData& s, int quad, const Vector3d& coefficient) {
 
 // The terms of a node's velocity along `axis`.
 void addNodeTerms(const WorldData& d, ImplicitData& s, int node, const HostPoint& host, const Vector3d& axis) {
-  if (host.count == 0) addTerm(s, 2 * d.spheres.count + node, axis);
+  if (host.count == 0 && !isSkin(d, node)) addTerm(s, 2 * d.spheres.count + node, axis);
   for (int k = 0; k < host.count; ++k) {
     addTerm(s, 2 * host.spheres[k], host.force[k] * axis);
     addTerm(s, 2 * host.spheres[k] + 1, host.torque[k] * axis);

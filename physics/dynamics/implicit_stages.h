@@ -27,6 +27,19 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& loads);  // 
 
 // link_stiffness.cpp: adds the links' stiffness and damping, times the squared duration, to `diagonal`; sets `beside`.
 void addLinkStiffness(const WorldData& d, ImplicitData& s);
+// Of one link by the line between its ends and the turning of its spheres, `pair`-th in ImplicitData::pairs.
+using LinkMatrix = Eigen::Matrix<double, 9, 9>;
+void addLinkMatrix(const LinkMatrix& m, ImplicitData& s, std::size_t pair);
+
+// identified_implicit.cpp: the same of links and nodes between frames.
+void addIdentifiedStiffness(const WorldData& d, ImplicitData& s);
+void listIdentifiedPairs(const WorldData& d, std::vector<std::array<int, 2>>& pairs);
+void setFrameRates(WorldData& d, const Motion& motion);
+void carryOnFrames(WorldData& d, const HostRange& range, std::vector<Quad>& carried);
+void returnImpulsesToFrames(WorldData& d, const HostRange& range, const std::vector<Quad>& impulses);
+void returnFrameImpulses(const WorldData& d, Motion& motion);
+void addCarriedMassOnFrames(const WorldData& d, const HostRange& range, const std::vector<double>& mass,
+                            std::vector<Block6>& diagonal);
 
 // implicit_system.cpp
 void assembleSystem(WorldData& d, ImplicitData& s);

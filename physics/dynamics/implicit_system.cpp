@@ -94,10 +94,11 @@ void loadFactor(const WorldData& d, ImplicitData& s) {
     for (int k = 0; k < 6; ++k)
       if (m[k] == 0) to(k, k) = 1;
   }
-  for (int k = 0; k < d.links.count; ++k) {
-    const LinkGroup& g = d.links.groups[k / 4];
-    const Vector6 m0 = mask(static_cast<int>(g.sphere0[k % 4])), m1 = mask(static_cast<int>(g.sphere1[k % 4]));
-    s.spheres.addBlock(k, m0.asDiagonal() * s.lumpedBeside[k] * m1.asDiagonal());
+  int blocks = 0;
+  for (std::size_t k = 0; k < s.pairs.size(); ++k) {
+    if (s.pairs[k][1] < 0) continue;
+    const Vector6 m0 = mask(s.pairs[k][0]), m1 = mask(s.pairs[k][1]);
+    s.spheres.addBlock(blocks++, m0.asDiagonal() * s.lumpedBeside[k] * m1.asDiagonal());
   }
 }
 
@@ -161,9 +162,9 @@ void assembleSystem(WorldData& d, ImplicitData& s) {
 void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y) {
   const std::size_t first = 2 * static_cast<std::size_t>(d.spheres.count);
   for (std::size_t i = 0; i < s.blocks.size(); ++i) s.blocks[i].noalias() = s.diagonal[i] * blockOf(x, i);
-  for (int k = 0; k < d.links.count; ++k) {
-    const LinkGroup& g = d.links.groups[k / 4];
-    const std::uint32_t i = g.sphere0[k % 4], j = g.sphere1[k % 4];
+  for (std::size_t k = 0; k < s.pairs.size(); ++k) {
+    const auto [i, j] = s.pairs[k];
+    if (j < 0) continue;
     s.blocks[i].noalias() += s.beside[k] * blockOf(x, j);
     s.blocks[j].noalias() += s.beside[k].transpose() * blockOf(x, i);
   }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "physics/dynamics/identified_layout.h"
 #include "physics/dynamics/stages.h"
 
 namespace medulla {
@@ -97,11 +98,15 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
   std::vector<int> sorted;
   for (std::size_t i = 0; i < mechanics.attachments.size(); ++i)
     if (mechanics.attachments[i].onLink == onLink) sorted.push_back(static_cast<int>(i));
-  std::stable_sort(sorted.begin(), sorted.end(), [&](int i, int j) {
-    return std::pair(mechanics.attachments[i].host, -edges[i]) < std::pair(mechanics.attachments[j].host, -edges[j]);
-  });
+  // On frames what is held hangs on its patch, and stands apart.
+  const bool onFrames = d.bodies[b].links == LinkModel::identified;
+  const auto hostOf = [&](int i) {
+    return std::pair(mechanics.attachments[i].host, onFrames && !mechanics.nodeMoves[i]);
+  };
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [&](int i, int j) { return std::pair(hostOf(i), -edges[i]) < std::pair(hostOf(j), -edges[j]); });
   for (std::size_t k = 0; k < sorted.size();) {
-    const int host = mechanics.attachments[sorted[k]].host;
+    const auto [host, held] = hostOf(sorted[k]);
     HostRange range{firstHost + host,
                     static_cast<int>(order.node.size()) / 4,
                     0,
@@ -109,8 +114,9 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
                     b,
                     (onLink ? mechanics.linkBulk : mechanics.sphereBulk)[host],
                     mechanics.largestPressure,
-                    -1};
-    for (; k < sorted.size() && mechanics.attachments[sorted[k]].host == host; ++k) {
+                    -1,
+                    onFrames};
+    for (; k < sorted.size() && hostOf(sorted[k]) == std::pair(host, held); ++k) {
       order.body.push_back(b);
       order.node.push_back(sorted[k]);
     }
@@ -258,8 +264,9 @@ std::size_t bytesOf(const BodyDescription& body) {
   constexpr std::size_t kPerSphere = 7 * sizeof(Quad) + sizeof(SphereGroup) / 4,
                         kPerLink = (sizeof(LinkGroup) + sizeof(LinkFrame)) / 4 + sizeof(LinkLoads) + 2 * sizeof(Slot),
                         kPerNode = (5 * sizeof(Lanes3) + sizeof(NodeGroup)) / 4 + sizeof(Quad) + 2 * sizeof(double),
-                        kPerEdge = 2 * sizeof(SpringGroup) / 4;
-  return kPerSphere * m.spheres.size() + kPerLink * m.links.size() + kPerNode * m.restNodes.size() +
+                        kPerEdge = 2 * sizeof(SpringGroup) / 4, kPerNodeOnFrames = 7 * sizeof(SkinShare) / 4;
+  const std::size_t perNode = kPerNode + (body.links == LinkModel::identified ? kPerNodeOnFrames : 0);
+  return kPerSphere * m.spheres.size() + kPerLink * m.links.size() + perNode * m.restNodes.size() +
          kPerEdge * m.edges.size();
 }
 
@@ -308,20 +315,21 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.firstSphere = d.spheres.count;
     r.sphereCount = static_cast<int>(m.spheres.size());
     r.firstLink = d.links.count;
-    r.linkCount = static_cast<int>(m.links.size());
+    r.linkCount = d.bodies[b].links == LinkModel::identified ? 0 : static_cast<int>(m.links.size());
     r.node.resize(m.restNodes.size());
     r.restVolume = enclosedVolume(m);
     r.massDamping = mechanics[b].massDamping;
     r.held = !d.bodies[b].fixed.empty() || !d.bodies[b].fixedNodes.empty();
     d.ranges.push_back(r);
     addSpheres(d, d.bodies[b], mechanics[b]);
-    addLinks(d, d.bodies[b], mechanics[b], r.firstSphere);
+    if (r.linkCount > 0) addLinks(d, d.bodies[b], mechanics[b], r.firstSphere);
   }
   d.links.frames.resize(d.links.groups.size());
   d.links.loads.resize(4 * d.links.groups.size());
   d.links.unwoundTwist.resize(d.links.groups.size());
   d.links.slots.resize(8 * d.links.groups.size());
   addNodes(d, mechanics);
+  layOutIdentified(d, mechanics);
   addSprings(d, mechanics);
   for (std::size_t b = 0; b < d.bodies.size(); ++b) addDrives(d, d.bodies[b], d.ranges[b]);
   listSlots(d);

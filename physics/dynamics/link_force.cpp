@@ -2,6 +2,7 @@
 
 #include "physics/dynamics/anchor.h"
 #include "physics/dynamics/angles.h"
+#include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/link_frame.h"
 #include "physics/dynamics/stages.h"
 
@@ -255,6 +256,7 @@ void storeVectors(const Lanes3& v, Quad& q0, Quad& q1, Quad& q2, Quad& q3) {
 void evaluateLinks(WorldData& d, const Batch& batch) {
   for (const int g : batch.linkGroups)
     evaluateGroup(d.links.groups[g], d.spheres, d.links.unwoundTwist[g], d.links.frames[g]);
+  evaluateIdentifiedLinks(d, batch);
 }
 
 // Loads are minus the forces on the nodes; torsion turns the frame's two spins apart, as a load does.
@@ -279,6 +281,7 @@ void returnLinkForces(WorldData& d, const Batch& batch) {
     storeVectors(force1, s[1].force, s[3].force, s[5].force, s[7].force);
     storeVectors(torque1, s[1].torque, s[3].torque, s[5].torque, s[7].torque);
   }
+  returnFrameForces(d, batch);
 }
 
 // J, of the link in one lane.
@@ -291,7 +294,7 @@ static double energyOf(const LinkGroup& link, const LinkMeasures& m, const Flexi
 }
 
 double linkEnergy(const WorldData& d) {
-  double sum = 0;
+  double sum = identifiedLinkEnergy(d);
   for (std::size_t g = 0; g < d.links.groups.size(); ++g) {
     const LinkGroup& link = d.links.groups[g];
     const LinkMeasures m =

@@ -121,33 +121,40 @@ Matrix9 groupStiffness(const LinkGroup& g, const LinkFrame& f, const Spheres& s,
 
 }  // namespace
 
+void addLinkMatrix(const LinkMatrix& h, ImplicitData& s, std::size_t pair) {
+  const auto part = [&h](int i, int j) { return h.block<3, 3>(3 * i, 3 * j); };
+  const auto [sphere0, sphere1] = s.pairs[pair];
+  Block6& own0 = s.diagonal[sphere0];
+  own0.topLeftCorner<3, 3>() += part(0, 0);
+  own0.topRightCorner<3, 3>() -= part(0, 1);
+  own0.bottomLeftCorner<3, 3>() -= part(1, 0);
+  own0.bottomRightCorner<3, 3>() += part(1, 1);
+  if (sphere1 < 0) return;
+  Block6 &own1 = s.diagonal[sphere1], &beside = s.beside[pair];
+  own1.topLeftCorner<3, 3>() += part(0, 0);
+  own1.topRightCorner<3, 3>() += part(0, 2);
+  own1.bottomLeftCorner<3, 3>() += part(2, 0);
+  own1.bottomRightCorner<3, 3>() += part(2, 2);
+  beside.topLeftCorner<3, 3>() = -part(0, 0);
+  beside.topRightCorner<3, 3>() = -part(0, 2);
+  beside.bottomLeftCorner<3, 3>() = part(1, 0);
+  beside.bottomRightCorner<3, 3>() = part(1, 2);
+}
+
 void addLinkStiffness(const WorldData& d, ImplicitData& s) {
   for (std::size_t group = 0; group < d.links.groups.size(); ++group) {
     const LinkGroup& g = d.links.groups[group];
     const Matrix9 m = groupStiffness(g, d.links.frames[group], d.spheres, s.duration);
     const int end = std::min(4, d.links.count - 4 * static_cast<int>(group));
     for (int lane = 0; lane < end; ++lane) {
-      Eigen::Matrix<double, 9, 9> h;
+      LinkMatrix h;
       int e = 0;
       for (int i = 0; i < 9; ++i)
         for (int j = i; j < 9; ++j, ++e) h(i, j) = h(j, i) = m.entry[e][lane];
-      Block6 &own0 = s.diagonal[g.sphere0[lane]], &own1 = s.diagonal[g.sphere1[lane]];
-      Block6& beside = s.beside[4 * group + lane];
-      const auto part = [&h](int i, int j) { return h.block<3, 3>(3 * i, 3 * j); };
-      own0.topLeftCorner<3, 3>() += part(0, 0);
-      own0.topRightCorner<3, 3>() -= part(0, 1);
-      own0.bottomLeftCorner<3, 3>() -= part(1, 0);
-      own0.bottomRightCorner<3, 3>() += part(1, 1);
-      own1.topLeftCorner<3, 3>() += part(0, 0);
-      own1.topRightCorner<3, 3>() += part(0, 2);
-      own1.bottomLeftCorner<3, 3>() += part(2, 0);
-      own1.bottomRightCorner<3, 3>() += part(2, 2);
-      beside.topLeftCorner<3, 3>() = -part(0, 0);
-      beside.topRightCorner<3, 3>() = -part(0, 2);
-      beside.bottomLeftCorner<3, 3>() = part(1, 0);
-      beside.bottomRightCorner<3, 3>() = part(1, 2);
+      addLinkMatrix(h, s, 4 * group + lane);
     }
   }
+  addIdentifiedStiffness(d, s);
 }
 
 }  // namespace medulla

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 
 #include "physics/dynamics/anchor_row.h"
+#include "physics/dynamics/identified_stages.h"
 
 namespace medulla {
 
@@ -10,6 +11,7 @@ using Eigen::Vector3d;
 
 Vector3d nodePosition(const WorldData& d, int node) {
   if (!isSkin(d, node)) return vectorAt(d.nodes.position, node);
+  if (d.identified.ofNodeGroup[node / 4] >= 0) return placeOnFrames(d, node);
   const GroupHost host = d.nodes.groupHosts[node / 4];
   const NodeGroup& group = d.nodes.groups[node / 4];
   const Anchor anchor =
@@ -20,6 +22,7 @@ Vector3d nodePosition(const WorldData& d, int node) {
 HostPoint hostPoint(const WorldData& d, int node) {
   HostPoint p;
   if (!isSkin(d, node)) return p;
+  if (d.identified.ofNodeGroup[node / 4] >= 0) return hostPointOnFrames(d, node);
   const GroupHost host = d.nodes.groupHosts[node / 4];
   const NodeGroup& group = d.nodes.groups[node / 4];
   if (!host.onLink) {

@@ -12,9 +12,9 @@ struct WorldData;
 // A massless node on the spheres that carry it: what a force on it is to each of them. Transposed, what their
 // velocities are to it.
 struct HostPoint {
-  int count = 0;  // of spheres; 0: the node has a mass of its own
-  std::array<int, 2> spheres;
-  std::array<Eigen::Matrix3d, 2> force, torque;  // 1, m
+  int count = 0;  // of spheres; 0: the node has a mass of its own, or is a held one of a skin
+  std::array<int, 6> spheres{};
+  std::array<Eigen::Matrix3d, 6> force, torque;  // 1, m
 };
 
 // The common form of what tools do: ToolSpring and HeldNode.

@@ -2,7 +2,7 @@
 
 namespace medulla {
 
-static bool contains(const Region& region, const Eigen::Vector3d& x) {
+bool contains(const Region& region, const Eigen::Vector3d& x) {
   switch (region.shape) {
     case Region::Shape::box:
       return region.box.contains(x);

@@ -17,6 +17,8 @@ struct Region {
   double distance = 0;
 };
 
+bool contains(const Region& region, const Eigen::Vector3d& x);
+
 // Surface nodes that lie in the region at rest, ascending.
 std::vector<int> nodesInRegion(const SoftBodyModel& model, const Region& region);
 

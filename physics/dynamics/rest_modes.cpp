@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "physics/dynamics/identified_mechanics.h"
+
 namespace medulla {
 
 namespace {
@@ -19,15 +21,34 @@ using Eigen::VectorXd;
 // Freedoms: 6 per sphere (velocity, angular velocity), then 3 per node. One link measure's rate at rest:
 // line . (v1 - v0) + turn0 . w0 + turn1 . w1.
 struct MeasureRow {
-  int sphere0, sphere1;
+  int sphere0, sphere1;  // the second -1: held
   Vector3d line, turn0, turn1;
   double stiffness;
 };
 
+// Of identified links, along the eigenvectors of each one's stiffness.
+std::vector<MeasureRow> identifiedRows(const SoftBodyModel& m, const BodyMechanics& b) {
+  std::vector<MeasureRow> rows;
+  const int spheres = static_cast<int>(m.spheres.size());
+  for (std::size_t k = 0; k < b.identifiedLinks.size(); ++k) {
+    const IdentifiedLink& l = m.identified->links[k];
+    const RestMeasures measures = restMeasures(m, l);
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(b.identifiedLinks[k]);
+    for (int i = 0; i < 6; ++i) {
+      if (!(eigen.eigenvalues()[i] > 0)) continue;
+      const Eigen::Matrix<double, 1, 6> e = eigen.eigenvectors().col(i).transpose();
+      rows.push_back({l.frame0, l.frame1 < spheres ? l.frame1 : -1, (e * measures.line).transpose(),
+                      (e * measures.turn0).transpose(), (e * measures.turn1).transpose(), eigen.eigenvalues()[i]});
+    }
+  }
+  return rows;
+}
+
 std::vector<MeasureRow> measureRows(const SoftBodyModel& m, const BodyMechanics& b) {
+  if (!b.identifiedLinks.empty()) return identifiedRows(m, b);
   std::vector<MeasureRow> rows;
   const Vector3d none = Vector3d::Zero();
-  for (std::size_t k = 0; k < m.links.size(); ++k) {
+  for (std::size_t k = 0; k < b.spans.size(); ++k) {
     const ElasticLink& l = m.links[k];
     const Vector3d d = b.spans[k].end1 - b.spans[k].end0;
     const Vector3d arm0 = b.spans[k].end0 - m.spheres[l.sphere0].restFrame,
@@ -63,6 +84,8 @@ class RestModel {
         spheres_(static_cast<int>(mechanics.sphereMass.size())),
         nodes_(body.surface != SurfaceMode::skin ? static_cast<int>(mechanics.attachments.size()) : 0) {
     for (const Matrix3d& i : mechanics.sphereInertia) inverseInertia_.push_back(i.inverse());
+    for (std::size_t i = 0; i < mechanics.skin.size(); ++i)
+      hosts_.push_back(hostRates(model_, mechanics.skin[i], static_cast<int>(i)));
   }
 
   int size() const { return 6 * spheres_ + 3 * nodes_; }
@@ -72,6 +95,12 @@ class RestModel {
     VectorXd y = VectorXd::Zero(size());
     for (const MeasureRow& r : rows_) {
       const int i0 = 6 * r.sphere0, i1 = 6 * r.sphere1;
+      if (i1 < 0) {
+        const double f = links * r.stiffness * (r.turn0.dot(x.segment<3>(i0 + 3)) - r.line.dot(x.segment<3>(i0)));
+        y.segment<3>(i0) -= f * r.line;
+        y.segment<3>(i0 + 3) += f * r.turn0;
+        continue;
+      }
       const double rate = r.line.dot(x.segment<3>(i1) - x.segment<3>(i0)) + r.turn0.dot(x.segment<3>(i0 + 3)) +
                           r.turn1.dot(x.segment<3>(i1 + 3));
       const double f = links * r.stiffness * rate;
@@ -94,6 +123,8 @@ class RestModel {
       const Attachment& a = mechanics_.attachments[i];
       const double bulk = (a.onLink ? mechanics_.linkBulk : mechanics_.sphereBulk)[a.host];
       force[i] += bulk * volume(a) * a.area * mechanics_.normal[i];
+      if (!hosts_.empty())
+        force[i] += mechanics_.normalExcess[i] * mechanics_.normal[i].dot(displaced[i]) * mechanics_.normal[i];
     }
     for (std::size_t e = 0; e < model_.edges.size(); ++e) {
       const auto& [a, b] = model_.edges[e];
@@ -137,13 +168,9 @@ class RestModel {
     const int count = 6 * spheres_;
     std::vector<Eigen::Triplet<double>> entries;
     for (int i = 0; i < nodes_; ++i) {
-      const Attachment& a = mechanics_.attachments[i];
-      const std::array<int, 2> hosts =
-          a.onLink ? std::array<int, 2>{model_.links[a.host].sphere0, model_.links[a.host].sphere1}
-                   : std::array<int, 2>{a.host, a.host};
       const double root = mechanics_.nodeMoves[i] ? std::sqrt(mechanics_.nodeMass[i]) : 0;
-      for (int h = 0; h < (a.onLink ? 2 : 1); ++h)
-        for (int k = 6 * hosts[h]; k < 6 * hosts[h] + 6; ++k) {
+      for (const int host : hostsOf(i))
+        for (int k = 6 * host; k < 6 * host + 6; ++k) {
           const Vector3d rate = root * anchorRate(i, VectorXd::Unit(count, k));
           for (int c = 0; c < 3; ++c) entries.emplace_back(3 * i + c, k, rate[c]);
         }
@@ -166,6 +193,17 @@ class RestModel {
 
  private:
   int node(int i) const { return 6 * spheres_ + 3 * i; }
+
+  std::vector<int> hostsOf(int i) const {
+    std::vector<int> out;
+    if (!hosts_.empty()) {
+      for (const HostRate& h : hosts_[i]) out.push_back(h.sphere);
+      return out;
+    }
+    const Attachment& a = mechanics_.attachments[i];
+    if (!a.onLink) return {a.host};
+    return {model_.links[a.host].sphere0, model_.links[a.host].sphere1};
+  }
 
   // An anchor on a link, at rest.
   struct LinkAnchor {
@@ -196,6 +234,12 @@ class RestModel {
 
   // Where freedoms' rates x carry the anchor of node i.
   Vector3d anchorRate(int i, const VectorXd& x) const {
+    if (!hosts_.empty()) {
+      Vector3d sum = Vector3d::Zero();
+      for (const HostRate& h : hosts_[i])
+        sum += h.linear * x.segment<3>(6 * h.sphere) + h.angular * x.segment<3>(6 * h.sphere + 3);
+      return sum;
+    }
     const Attachment& a = mechanics_.attachments[i];
     if (!a.onLink) return x.segment<3>(6 * a.host) + x.segment<3>(6 * a.host + 3).cross(a.restOffset);
     const LinkAnchor p = linkAnchor(i);
@@ -210,6 +254,13 @@ class RestModel {
 
   // The transpose: y += what a force f on the anchor of node i does to its spheres.
   void addAnchorLoad(int i, const Vector3d& f, VectorXd& y) const {
+    if (!hosts_.empty()) {
+      for (const HostRate& h : hosts_[i]) {
+        y.segment<3>(6 * h.sphere) += h.linear.transpose() * f;
+        y.segment<3>(6 * h.sphere + 3) += h.angular.transpose() * f;
+      }
+      return;
+    }
     const Attachment& a = mechanics_.attachments[i];
     if (!a.onLink) {
       y.segment<3>(6 * a.host) += f;
@@ -255,6 +306,7 @@ class RestModel {
   const BodyMechanics& mechanics_;
   std::vector<MeasureRow> rows_;
   std::vector<Matrix3d> inverseInertia_;
+  std::vector<std::vector<HostRate>> hosts_;  // per node of an identified body; empty of others
   bool isBeam_;
   double thinning_;  // relative, of what hangs on a link, per relative stretch
   int spheres_, nodes_;
@@ -268,7 +320,8 @@ struct CellMasses {
 
 CellMasses cellMasses(const BodyDescription& body) {
   CellMasses out;
-  for (const FillingSphere& s : body.model->spheres) {
+  for (std::size_t i = 0; i < body.model->spheres.size(); ++i) {
+    const SphereCell s = sphereCell(body, static_cast<int>(i));
     out.mass.push_back(body.tissue.density * s.volume);
     out.inertia.push_back(body.tissue.density * (s.secondMoment.trace() * Matrix3d::Identity() - s.secondMoment));
   }
@@ -313,7 +366,8 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
   for (int i = 0; i < spheres; ++i)
     for (int k = 0; k < 6; ++k)
       if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) freedom[6 * i + k] = count++;
-  if (count == 0 || m.links.empty()) return 0;
+  const std::vector<MeasureRow> rows = measureRows(m, mechanics);
+  if (count == 0 || rows.empty()) return 0;
 
   const CellMasses cells = cellMasses(body);
   using Triplet = Eigen::Triplet<double>;
@@ -321,13 +375,14 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
   const auto put = [&](std::vector<Triplet>& to, int i, int j, double value) {
     if (freedom[i] >= 0 && freedom[j] >= 0) to.emplace_back(freedom[i], freedom[j], value);
   };
-  for (const MeasureRow& r : measureRows(m, mechanics)) {
+  for (const MeasureRow& r : rows) {
+    const int size = r.sphere1 < 0 ? 6 : 12;
     std::array<int, 12> index;
     Eigen::Matrix<double, 12, 1> row;
     row << -r.line, r.turn0, r.line, r.turn1;
     for (int k = 0; k < 12; ++k) index[k] = k < 6 ? 6 * r.sphere0 + k : 6 * r.sphere1 + k - 6;
-    for (int i = 0; i < 12; ++i)
-      for (int j = 0; j < 12; ++j) put(stiffness, index[i], index[j], r.stiffness * row[i] * row[j]);
+    for (int i = 0; i < size; ++i)
+      for (int j = 0; j < size; ++j) put(stiffness, index[i], index[j], r.stiffness * row[i] * row[j]);
   }
   for (int i = 0; i < spheres; ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -340,7 +395,8 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
   mm.setFromTriplets(mass.begin(), mass.end());
 
   // Inverse iteration, rigid motions projected out; a shift far below any mode keeps the factorisation regular.
-  MatrixXd rigid = freeRigidMotions(m, freedom, count);
+  const bool held = std::any_of(rows.begin(), rows.end(), [](const MeasureRow& r) { return r.sphere1 < 0; });
+  MatrixXd rigid = held ? MatrixXd(count, 0) : freeRigidMotions(m, freedom, count);
   for (int i = 0; i < rigid.cols(); ++i) {
     for (int j = 0; j < i; ++j) rigid.col(i) -= rigid.col(j).dot(mm * rigid.col(i)) * rigid.col(j);
     rigid.col(i) /= std::sqrt(rigid.col(i).dot(mm * rigid.col(i)));

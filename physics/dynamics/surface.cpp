@@ -3,6 +3,7 @@
 
 #include "physics/dynamics/anchor.h"
 #include "physics/dynamics/edge_springs.h"
+#include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/stages.h"
 
 // The surface (paper 2.3): point masses on the nodes, damped springs on the edges, elastic attachments to the skeleton.
@@ -120,12 +121,13 @@ void evaluateAttachments(WorldData& d, const Batch& batch) {
     store(d.spheres.torque[i], zero);
   }
   for (const HostRange& range : batch.onLinks) pullOnLink(d, range);
-  for (const HostRange& range : batch.onSpheres) pullOnSphere(d, range);
+  for (const HostRange& range : batch.onSpheres) range.onFrames ? pullOnFrames(d, range) : pullOnSphere(d, range);
 }
 
 void finishNodeForces(WorldData& d, const Batch& batch) {
   for (const HostRange& range : batch.onLinks) returnToLink(d, range);
-  for (const HostRange& range : batch.onSpheres) returnToSphere(d, range);
+  for (const HostRange& range : batch.onSpheres)
+    range.onFrames ? returnToFrames(d, range, splat(pressureOf(d, range))) : returnToSphere(d, range);
 }
 
 void placeCarriedNodes(WorldData& d) {
@@ -139,6 +141,7 @@ void placeCarriedNodes(WorldData& d) {
     for (int g = range.firstGroup; g < range.endGroup; ++g) place(anchorOnLink(host, d.nodes.groups[g]), g);
   };
   const auto onSphere = [&](const HostRange& range) {
+    if (range.onFrames) return placeOnFrames(d, range);
     const SphereHost host = sphereHost(d, range.host);
     for (int g = range.firstGroup; g < range.endGroup; ++g) place(anchorOnSphere(host, d.nodes.groups[g]), g);
   };
@@ -153,7 +156,7 @@ double surfaceEnergy(const WorldData& d) {
   double sum = 0;
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
     const Eigen::Vector3d own = vectorOf(d.nodes.displaced[i]);
-    sum += 0.5 * d.nodes.groups[i / 4].stiffness[i % 4] * own.squaredNorm();
+    sum += 0.5 * d.nodes.groups[i / 4].stiffness[i % 4] * own.squaredNorm() + normalEnergy(d, i);
     for (int e = d.springs.first[i / 4]; e < d.springs.first[i / 4 + 1]; ++e) {
       const SpringGroup& s = d.springs.groups[e];  // half of each spring here, half at its other node
       const Eigen::Vector3d other = vectorOf(d.nodes.displaced[s.other[i % 4] / sizeof(Quad)]);

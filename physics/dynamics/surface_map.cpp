@@ -68,7 +68,12 @@ void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried)
       storeFour(base + cross(omega, offset), carried, 4 * g);
     }
   }
+  setFrameRates(d, motion);
   for (const HostRange& range : d.nodes.onSpheres) {
+    if (range.onFrames) {
+      carryOnFrames(d, range, carried);
+      continue;
+    }
     const Lanes3 v = splat(motion[2 * range.host]), omega = splat(motion[2 * range.host + 1]);
     for (int g = range.firstGroup; g < range.endGroup; ++g)
       storeFour(v + cross(omega, d.nodes.offset[g]), carried, 4 * g);
@@ -89,7 +94,12 @@ void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& mot
     setLoads(h, sum, d.links.loads[range.host]);
   }
   returnFromLinks(d, motion);
+  for (FrameLoad& load : d.identified.loads) load = {};
   for (const HostRange& range : d.nodes.onSpheres) {
+    if (range.onFrames) {
+      returnImpulsesToFrames(d, range, impulses);
+      continue;
+    }
     Lanes3 sum = none, moment = none;
     for (int g = range.firstGroup; g < range.endGroup; ++g) {
       const Lanes3 impulse = gatherFour(impulses, 4 * g);
@@ -99,6 +109,7 @@ void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& mot
     addTo(motion[2 * range.host], sumOfLanes(sum, zero));
     addTo(motion[2 * range.host + 1], sumOfLanes(moment, zero));
   }
+  returnFrameImpulses(d, motion);
 }
 
 namespace {
@@ -136,6 +147,10 @@ void addCarriedMass(const WorldData& d, const std::vector<double>& mass, std::ve
     beside[range.host] += m.topRightCorner<6, 6>();
   }
   for (const HostRange& range : d.nodes.onSpheres) {
+    if (range.onFrames) {
+      addCarriedMassOnFrames(d, range, mass, diagonal);
+      continue;
+    }
     Lanes sum[21];
     for (Lanes& s : sum) s = splat(0);
     for (int g = range.firstGroup; g < range.endGroup; ++g) {

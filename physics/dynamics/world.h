@@ -31,8 +31,10 @@ struct LinkFactors {
 };
 
 // How a link answers. springs: six independent damped springs (paper 2.2). beam: the flexion angles of its two ends are
-// coupled as in a beam, elongation is neo-Hookean, and what hangs on it grows thinner with its stretch.
-enum class LinkModel { springs, beam };
+// coupled as in a beam, elongation is neo-Hookean, and what hangs on it grows thinner with its stretch. identified: the
+// model's own links, skin and patches, from finite elements (SoftBodyModel::identified); what it holds is what
+// `fixedNodes` must name.
+enum class LinkModel { springs, beam, identified };
 
 enum class SurfaceMode {
   full,     // every node is a mass of its own (paper 2.3)

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "physics/dynamics/contact_data.h"
+#include "physics/dynamics/identified_data.h"
 #include "physics/dynamics/point_spring.h"
 #include "physics/dynamics/simd.h"
 #include "physics/dynamics/world.h"
@@ -136,13 +137,14 @@ struct NodeGroup {    // constants of four nodes
 };
 
 struct HostRange {
-  int host;                  // link or sphere
+  int host;                  // link or sphere; of nodes on frames, the sphere that they have most of
   int firstGroup, endGroup;  // of its nodes
   double relaxation;         // s, the attachments' damping over stiffness
   int body;
   double bulk;             // N/m5: pressure per volume between these nodes and their anchors
   double largestPressure;  // Pa
   int part;                // place in Nodes::swollen and SurfaceParts::parts; of dynamic nodes
+  bool onFrames;           // of an identified body, among those on spheres: each node hangs on frames of its own
 };
 
 struct GroupHost {
@@ -273,6 +275,7 @@ struct WorldData {
   Links links;
   Nodes nodes;
   Springs springs;
+  Identified identified;
   SurfaceParts surface;
   std::vector<Rest> rest;              // per body
   std::vector<StillPlace> stillPlace;  // per sphere; state

@@ -105,6 +105,7 @@ VoxelBody voxelise(const TriangleMesh& mesh, double volume, int target) {
   for (int a = 0; a < 3; ++a) body.count[a] = static_cast<int>((bounds.high[a] - bounds.low[a]) / body.size) + 2;
   Columns columns{
       bounds.low - Vector3d(0.31, 0.27, 0.5) * body.size, body.size, body.count[0] + 1, body.count[1] + 1, {}};
+  body.low = columns.origin - Vector3d(0.5, 0.5, 0) * body.size;
   body.count = {columns.countX, columns.countY, body.count[2] + 1};
   columns.crossings.resize(static_cast<std::size_t>(columns.countX) * columns.countY);
   for (const std::array<int, 3>& t : mesh.triangles) {

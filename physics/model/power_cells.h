@@ -19,7 +19,8 @@ struct VoxelPiece {
 };
 
 struct VoxelBody {
-  double size = 0;  // m, edge of a voxel
+  double size = 0;                                // m, edge of a voxel
+  Eigen::Vector3d low = Eigen::Vector3d::Zero();  // m, corner of voxel (0, 0, 0)
   std::array<int, 3> count{};
   std::vector<VoxelPiece> pieces;  // by x, y, then z
   std::vector<int> pieceAt;        // first piece of voxel (i * count[1] + j) * count[2] + k, -1 where empty

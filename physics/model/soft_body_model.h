@@ -3,8 +3,11 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
+
+#include "physics/model/identified_network.h"
 
 // What is known of a body before it moves: made once from a closed mesh, shared by every body that uses it, never
 // changed. Everything is in the frame of the mesh ("model frame"), in metres, and free of material: density and
@@ -87,6 +90,7 @@ struct SoftBodyModel {
   std::vector<std::vector<int>> buckets;  // triangles of each sphere; every triangle in exactly one (paper 4)
   Skeleton skeleton;
   RenderSurface renderSurface;
+  std::shared_ptr<const IdentifiedNetwork> identified;  // optional: build --identify
 };
 
 }  // namespace medulla

@@ -1,0 +1,187 @@
+#include "app/files/identified_part.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <cmath>
+
+#include "app/files/model_rows.h"
+
+namespace medulla {
+
+namespace {
+
+// Computed in double and written exactly, so that only rounding separates values from the ideal.
+constexpr double kRounding = 1e-9;
+
+void putSkin(std::string& out, const IdentifiedNetwork& network) {
+  putRows(out, "identified_skin", network.skin.size(), [&](std::size_t n) {
+    put(out, static_cast<int>(network.skin[n].size()));
+    for (const SkinFrame& f : network.skin[n]) {
+      put(out, f.frame, f.weight);
+      if (f.frame >= static_cast<int>(network.frames.size())) put(out, f.restPoint);
+      put(out, f.map);
+    }
+  });
+}
+
+std::string attribute(const char* name, double value) {
+  std::string out = std::string(" ") + name + "=\"";
+  appendNumber(out, value);
+  return out + '"';
+}
+
+void readFrames(const std::string& path, const XmlElement& element, std::size_t spheres, IdentifiedNetwork& network) {
+  Rows rows(path, element, "identified_frames");
+  rows.forEach([&] {
+    IdentifiedFrame& f = network.frames.emplace_back();
+    rows.get(f.restPosition, f.volume, f.secondMoment);
+    rows.require(f.volume > 0, "a volume that is not positive");
+    rows.require(f.secondMoment.isApprox(f.secondMoment.transpose(), kRounding),
+                 "a second moment that is not symmetric");
+    rows.require(f.secondMoment.llt().info() == Eigen::Success, "a second moment that is not positive definite");
+  });
+  rows.require(network.frames.size() == spheres, "expected one frame per sphere");
+}
+
+void readPatches(const std::string& path, const XmlElement& element, std::size_t nodes, IdentifiedNetwork& network) {
+  for (const XmlElement& child : element.children) {
+    if (child.name != "identified_patch") continue;
+    FixedPatch& patch = network.patches.emplace_back();
+    patch.region = readText(child, "region");
+    Rows rows(path, child);
+    rows.forEach([&] { patch.nodes.push_back(rows.index(nodes)); });
+    rows.require(!patch.nodes.empty(), "expected at least one node");
+    rows.require(
+        std::adjacent_find(patch.nodes.begin(), patch.nodes.end(), std::greater_equal<>()) == patch.nodes.end(),
+        "nodes that are not ascending");
+  }
+}
+
+void readLinks(const std::string& path, const XmlElement& element, IdentifiedNetwork& network) {
+  Rows rows(path, element, "identified_links");
+  rows.forEach([&] {
+    IdentifiedLink& l = network.links.emplace_back();
+    l.frame0 = rows.index(network.frames.size());
+    l.frame1 = rows.index(network.frames.size() + network.patches.size());
+    rows.require(l.frame0 != l.frame1, "the same index twice");
+    l.restPoint0 = network.frames[l.frame0].restPosition;
+    rows.get(l.restPoint1, l.axes);
+    if (l.frame1 < static_cast<int>(network.frames.size()))
+      rows.require(l.restPoint1 == network.frames[l.frame1].restPosition, "a second end that is not its frame's");
+    rows.require(
+        (l.axes * l.axes.transpose() - Eigen::Matrix3d::Identity()).norm() <= kRounding && l.axes.determinant() > 0,
+        "axes that are not unit, perpendicular and right-handed");
+    for (int b = 0; b < 6; ++b) {
+      for (int a = b; a < 6; ++a) {
+        rows.get(l.stiffness(a, b));
+        l.stiffness(b, a) = l.stiffness(a, b);
+      }
+    }
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> own(l.stiffness, Eigen::EigenvaluesOnly);
+    rows.require(own.eigenvalues().allFinite() && own.eigenvalues()[0] >= -kRounding * std::abs(own.eigenvalues()[5]),
+                 "a stiffness that is not positive semidefinite");
+  });
+}
+
+void readSkin(const std::string& path, const XmlElement& element, std::size_t nodes, IdentifiedNetwork& network) {
+  Rows rows(path, element, "identified_skin");
+  const std::size_t spheres = network.frames.size();
+  rows.forEach([&] {
+    std::vector<SkinFrame>& frames = network.skin.emplace_back();
+    const int count = rows.index(spheres + network.patches.size() + 1, 1);
+    double sum = 0;
+    for (int k = 0; k < count; ++k) {
+      SkinFrame& f = frames.emplace_back();
+      f.frame = rows.index(spheres + network.patches.size());
+      rows.get(f.weight);
+      if (f.frame < static_cast<int>(spheres)) {
+        f.restPoint = network.frames[f.frame].restPosition;
+      } else {
+        rows.get(f.restPoint);
+      }
+      rows.get(f.map);
+      rows.require(f.weight >= 0, "a negative weight");
+      sum += f.weight;
+    }
+    rows.require(std::abs(sum - 1) <= kRounding, "weights whose sum is not 1");
+  });
+  rows.require(network.skin.size() == (network.usesFormulas ? 0 : nodes),
+               network.usesFormulas ? "no skin expected where formulas are used" : "expected one row per node");
+}
+
+IdentifiedError readError(const XmlElement& element, const char* name) {
+  const std::vector<double> values = readNumbers(element, name, 2, notNegative);
+  return {values[0], values[1]};
+}
+
+}  // namespace
+
+XmlRules identifiedRules() {
+  return {
+      {"identified",
+       {"poisson", "length_scale", "voxel", "formulas", "layer", "error_bulk", "error_poke", "error_finite_elements"},
+       {},
+       {{"identified_frames", 1, 1}, {"identified_patch"}, {"identified_links", 1, 1}, {"identified_skin", 1, 1}}},
+      {"identified_frames", {"rows"}, {}, {}, true},
+      {"identified_patch", {"rows", "region"}, {}, {}, true},
+      {"identified_links", {"rows"}, {}, {}, true},
+      {"identified_skin", {"rows"}, {}, {}, true}};
+}
+
+void putIdentified(std::string& out, const IdentifiedNetwork& network) {
+  const auto list = [&](const char* name, std::initializer_list<double> values) {
+    out += std::string(" ") + name + "=\"";
+    for (const double value : values) {
+      if (out.back() != '"') out += ' ';
+      appendNumber(out, value);
+    }
+    out += '"';
+  };
+  out += "  <identified" + attribute("poisson", network.poisson) + attribute("length_scale", network.lengthScale) +
+         attribute("voxel", network.voxel) + " formulas=\"" + (network.usesFormulas ? "yes" : "no") + '"';
+  list("layer", {network.layer.normal, network.layer.tangential, network.layer.membrane});
+  list("error_bulk", {network.bulk.maximum, network.bulk.rms});
+  list("error_poke", {network.poke.maximum, network.poke.rms});
+  list("error_finite_elements", {network.ofFiniteElements.maximum, network.ofFiniteElements.rms});
+  out += ">\n";
+  putRows(out, "identified_frames", network.frames.size(), [&](std::size_t k) {
+    const IdentifiedFrame& f = network.frames[k];
+    put(out, f.restPosition, f.volume, f.secondMoment);
+  });
+  for (const FixedPatch& patch : network.patches) {
+    putRows(
+        out, "identified_patch", patch.nodes.size(), [&](std::size_t k) { put(out, patch.nodes[k]); },
+        " region=\"" + escapedXml(patch.region) + '"');
+  }
+  putRows(out, "identified_links", network.links.size(), [&](std::size_t k) {
+    const IdentifiedLink& l = network.links[k];
+    put(out, l.frame0, l.frame1, l.restPoint1, l.axes);
+    for (int b = 0; b < 6; ++b) {
+      for (int a = b; a < 6; ++a) put(out, l.stiffness(a, b));
+    }
+  });
+  putSkin(out, network);
+  out += "  </identified>\n";
+}
+
+std::shared_ptr<const IdentifiedNetwork> readIdentified(const std::string& path, const XmlElement& element,
+                                                        const SoftBodyModel& model) {
+  auto network = std::make_shared<IdentifiedNetwork>();
+  network->poisson = readNumber(element, "poisson", 0, {0, 0.5, false, true});
+  network->lengthScale = readNumber(element, "length_scale", 0, positive);
+  network->voxel = readNumber(element, "voxel", 0, positive);
+  network->usesFormulas = readChoice(element, "formulas", {"no", "yes"}, 0) == 1;
+  const std::vector<double> layer = readNumbers(element, "layer", 3, notNegative);
+  network->layer = {layer[0], layer[1], layer[2]};
+  network->bulk = readError(element, "error_bulk");
+  network->poke = readError(element, "error_poke");
+  network->ofFiniteElements = readError(element, "error_finite_elements");
+  readFrames(path, element, model.spheres.size(), *network);
+  readPatches(path, element, model.restNodes.size(), *network);
+  readLinks(path, element, *network);
+  readSkin(path, element, model.restNodes.size(), *network);
+  return network;
+}
+
+}  // namespace medulla

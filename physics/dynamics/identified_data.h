@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "physics/dynamics/simd.h"
+
+// Arrays of what was identified offline (physics/model/identified_network.h), in this world's units and for AVX2: links
+// and nodes four at a time, both between frames.
+namespace medulla {
+
+// What links and nodes hang on: where a sphere carries the centroid of its cell, or a point of a held patch.
+struct FrameState {
+  Quad position, velocity;            // m, m/s, world
+  Quad orientation, angularVelocity;  // worldFromModel of the frame at rest, as x, y, z, w; rad/s
+};
+struct FrameLoad {
+  Quad force, torque;  // N, N m
+};
+struct CarriedFrame {
+  int sphere;     // -1: held
+  Quad restArm;   // m, from the sphere's frame, in it
+  Quad worldArm;  // m, of the current substep
+};
+
+// Measures of four links in the frame half way between their two frames, which lies as the model frame does at rest:
+// t (m), and L w (m) with the rotation vector w. Stiffness is that of these, the links' own axes multiplied into it.
+struct IdentifiedLinkGroup {
+  std::uint32_t frame0[4], frame1[4];
+  Lanes3 restLine;                      // m
+  Lanes3 along;                         // unit: the axis whose elongation is neo-Hookean
+  Lanes inverseRestLength, restLength;  // 1/m, m
+  Lanes lengthScale;                    // m
+  Lanes stiffness[21];                  // N/m: upper triangle, row after row
+  Lanes relaxation;                     // s, Rayleigh's beta
+};
+
+// ---- Nodes: those of one sphere are seen from its frame, their home, and so are the other frames that any of them
+// hangs on.
+
+struct SkinTerms {  // four of those frames; a host's last are filled up with its home
+  std::uint32_t frame[4];
+  Lanes3 restPlace;  // m, from the home's
+};
+
+// The frames as they are seen from home; four at a time, so that number i of the one in a lane is 4 i + lane doubles
+// from the beginning.
+struct SkinTermState {
+  Lanes3 way, turn;          // m, how far they are from where they are at rest; twice their quaternion's vector part
+  Lanes3 wayRate, turnRate;  // m/s, 1/s
+  Lanes3 place;              // m, from home
+  Lanes cosine;              // of half the angle
+};
+
+struct SkinHost {
+  int home;  // a frame
+  int firstTerms, endTerms;
+};
+
+// What one frame's way and turn do to four nodes' places, and its share of how far their own frames are turned.
+// Single precision: a rigid motion asks nothing of these, and they are most of what a substep reads.
+struct alignas(16) SkinShare {
+  std::int32_t state, load;  // offsets in doubles of the frame's first number in SkinTermState, and in SkinTermLoad
+  float map[18][4];          // 1 and m: on way and turn, six numbers for x, y and z each
+  float weight[4];
+};
+
+struct SkinGroup {  // four nodes
+  int host;
+  int firstShare, endShare;
+  Lanes3 restOffset;   // m, from home
+  Lanes3 lever;        // m: what turns with the nodes' own frames to second order
+  Lanes normalExcess;  // N/m5: what the attachment is stiffer along the node's area, over that area's square
+};
+
+struct SkinTermLoad {  // of one frame, per node in each lane: on way and turn
+  Lanes onWay[3], onTurn[3];
+};
+
+struct IdentifiedBody {              // nothing of others
+  int firstFrame = 0, endFrame = 0;  // the spheres' first, in their order
+  int firstLinkGroup = 0, endLinkGroup = 0;
+};
+
+struct Identified {
+  std::vector<IdentifiedBody> bodies;  // as the world's
+  std::vector<FrameState> frames;
+  std::vector<FrameLoad> loads;       // of the current substep
+  std::vector<CarriedFrame> carried;  // per frame
+  std::vector<IdentifiedLinkGroup> links;
+  int linkCount = 0;
+  std::vector<SkinHost> hosts;
+  std::vector<SkinTerms> terms;
+  std::vector<SkinTermState> termStates;  // of the current substep
+  std::vector<SkinTermLoad> termLoads;    // of one host, while its nodes return theirs
+  std::vector<SkinShare> shares;
+  std::vector<SkinGroup> skin;
+  std::vector<Lanes3> turns;     // per SkinGroup: of its nodes' own frames against home; of the current substep
+  std::vector<int> ofNodeGroup;  // per group of nodes: in `skin`, -1 of others
+};
+
+}  // namespace medulla

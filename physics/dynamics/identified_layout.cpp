@@ -1,0 +1,210 @@
+#include "physics/dynamics/identified_layout.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <map>
+
+#include "physics/dynamics/identified_measures.h"
+#include "physics/dynamics/identified_mechanics.h"
+
+namespace medulla {
+
+namespace {
+
+using Eigen::Vector3d;
+
+// One body's frames: its spheres', and the points of held patches that links and nodes ask for, each once.
+class FrameNumbers {
+ public:
+  FrameNumbers(WorldData& d, int body) : s_(&d.identified), description_(&d.bodies[body]) {
+    first_ = static_cast<int>(s_->frames.size());
+    const SoftBodyModel& m = *description_->model;
+    for (std::size_t i = 0; i < m.spheres.size(); ++i) {
+      const Vector3d rest = m.identified->frames[i].restPosition;
+      append(rest, {d.ranges[body].firstSphere + static_cast<int>(i), quadOf(rest - m.spheres[i].restFrame), {}});
+    }
+  }
+  int of(int frame, const Vector3d& restPoint) {
+    if (frame < static_cast<int>(description_->model->spheres.size())) return first_ + frame;
+    const auto [found, isNew] = held_.try_emplace({restPoint.x(), restPoint.y(), restPoint.z()}, 0);
+    if (isNew) {
+      found->second = static_cast<int>(s_->frames.size());
+      append(restPoint, {-1, {}, {}});
+    }
+    return found->second;
+  }
+  Vector3d restPoint(int frame, const Vector3d& ofPatch) const {
+    const IdentifiedNetwork& n = *description_->model->identified;
+    return frame < static_cast<int>(n.frames.size()) ? n.frames[frame].restPosition : ofPatch;
+  }
+  int first() const { return first_; }
+  int end() const { return static_cast<int>(s_->frames.size()); }
+
+ private:
+  void append(const Vector3d& rest, const CarriedFrame& carried) {
+    const Eigen::Quaterniond q = Eigen::Quaterniond(description_->worldFromModel.rotation()).normalized();
+    FrameState state;
+    state.position = quadOf(description_->worldFromModel * rest);
+    state.orientation = {{q.x(), q.y(), q.z(), q.w()}};
+    s_->frames.push_back(state);
+    s_->carried.push_back(carried);
+  }
+
+  Identified* s_;
+  const BodyDescription* description_;
+  int first_;
+  std::map<std::array<double, 3>, int> held_;
+};
+
+IdentifiedLinkGroup emptyGroup(int frame) {  // links between a frame and itself, without stiffness
+  IdentifiedLinkGroup g{};
+  std::fill_n(g.frame0, 4, static_cast<std::uint32_t>(frame));
+  std::fill_n(g.frame1, 4, static_cast<std::uint32_t>(frame));
+  g.inverseRestLength = splat(1);
+  return g;
+}
+
+void addLinks(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbers& frames) {
+  const IdentifiedNetwork& n = *d.bodies[body].model->identified;
+  std::vector<IdentifiedLinkGroup>& groups = d.identified.links;
+  for (std::size_t k = 0; k < n.links.size(); ++k) {
+    const IdentifiedLink& link = n.links[k];
+    const int l = static_cast<int>(k % 4);
+    if (l == 0) groups.push_back(emptyGroup(frames.first()));
+    IdentifiedLinkGroup& g = groups.back();
+    g.frame0[l] = static_cast<std::uint32_t>(frames.of(link.frame0, link.restPoint0));
+    g.frame1[l] = static_cast<std::uint32_t>(frames.of(link.frame1, link.restPoint1));
+    const Vector3d line =
+        frames.restPoint(link.frame1, link.restPoint1) - frames.restPoint(link.frame0, link.restPoint0);
+    setLane(g.restLine, l, line);
+    setLane(g.along, l, link.axes.row(0).transpose());
+    g.restLength[l] = line.norm();
+    g.inverseRestLength[l] = 1 / line.norm();
+    g.lengthScale[l] = n.lengthScale;
+    g.relaxation[l] = mechanics.linkRelaxation;
+    for (int i = 0; i < 6; ++i)
+      for (int j = i; j < 6; ++j) g.stiffness[entryOf(i, j)][l] = mechanics.identifiedLinks[k](i, j);
+    ++d.identified.linkCount;
+  }
+}
+
+// The host of a range of nodes, its frames numbered as the nodes ask for them.
+class HostTerms {
+ public:
+  HostTerms(Identified& s, int home, const Vector3d& homePlace) : s_(&s), homePlace_(homePlace) {
+    host_ = static_cast<int>(s.hosts.size());
+    s.hosts.push_back({home, static_cast<int>(s.terms.size()), static_cast<int>(s.terms.size())});
+  }
+  int host() const { return host_; }
+  const Vector3d& homePlace() const { return homePlace_; }
+  int of(int frame, const Vector3d& restPlace) {
+    const auto [found, isNew] = number_.try_emplace(frame, static_cast<int>(number_.size()));
+    if (!isNew) return found->second;
+    SkinHost& host = s_->hosts[host_];
+    const int lane = found->second % 4;
+    if (lane == 0) {
+      SkinTerms terms{};
+      std::fill_n(terms.frame, 4, static_cast<std::uint32_t>(host.home));
+      s_->terms.push_back(terms);
+      ++host.endTerms;
+    }
+    s_->terms.back().frame[lane] = static_cast<std::uint32_t>(frame);
+    setLane(s_->terms.back().restPlace, lane, restPlace - homePlace_);
+    return found->second;
+  }
+
+ private:
+  Identified* s_;
+  Vector3d homePlace_;
+  int host_;
+  std::map<int, int> number_;
+};
+
+void setMap(SkinShare& share, int lane, const SkinRow& row, double weight) {
+  share.weight[lane] = static_cast<float>(weight);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      share.map[6 * i + j][lane] = static_cast<float>(row.onWay(i, j));
+      share.map[6 * i + 3 + j][lane] = static_cast<float>(row.onTurn(i, j));
+    }
+  }
+}
+
+// Four nodes, -1 on pads.
+void addSkin(WorldData& d, int body, const BodyMechanics& mechanics, const std::array<int, 4>& nodes, HostTerms& terms,
+             FrameNumbers& frames) {
+  Identified& s = d.identified;
+  const SoftBodyModel& m = *d.bodies[body].model;
+  SkinGroup group{};
+  group.host = terms.host();
+  group.firstShare = static_cast<int>(s.shares.size());
+  std::map<int, SkinShare> shares;  // by the frame's number in the host
+  for (int l = 0; l < 4; ++l) {
+    if (nodes[l] < 0) continue;
+    const std::vector<SkinFrame>& skin = mechanics.skin[nodes[l]];
+    const std::vector<SkinRow> rows = skinRows(m, skin, nodes[l]);
+    for (std::size_t k = 0; k < skin.size() && mechanics.nodeMoves[nodes[l]]; ++k) {
+      const int frame = frames.of(skin[k].frame, skin[k].restPoint);
+      if (frame == s.hosts[terms.host()].home) continue;
+      const int term = terms.of(frame, frames.restPoint(skin[k].frame, skin[k].restPoint));
+      SkinShare& share = shares[term];
+      constexpr int kDoubles = sizeof(SkinTermState) / sizeof(double);
+      share.load = term;
+      share.state = kDoubles * (term / 4) + term % 4;
+      setMap(share, l, rows[k], skin[k].weight);
+    }
+    setLane(group.restOffset, l, m.restNodes[nodes[l]] - terms.homePlace());
+    setLane(group.lever, l, skinLever(m, skin, nodes[l]));
+    const double area = mechanics.attachments[nodes[l]].area;
+    if (area > 0) group.normalExcess[l] = mechanics.normalExcess[nodes[l]] / (area * area);
+  }
+  for (const auto& [term, share] : shares) s.shares.push_back(share);
+  group.endShare = static_cast<int>(s.shares.size());
+  s.skin.push_back(group);
+}
+
+void addSkins(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbers& frames) {
+  std::vector<int> nodeAt(d.nodes.count, -1);
+  for (std::size_t i = 0; i < d.ranges[body].node.size(); ++i) nodeAt[d.ranges[body].node[i]] = static_cast<int>(i);
+  for (const std::vector<HostRange>* ranges : {&d.nodes.onSpheres, &d.nodes.skinOnSpheres}) {
+    for (const HostRange& range : *ranges) {
+      if (range.body != body) continue;
+      const int node = nodeAt[4 * range.firstGroup];
+      const SkinFrame& first = mechanics.skin[node].front();
+      // Held nodes all hang on patches, which do not move against each other.
+      const int home = mechanics.nodeMoves[node] ? range.host - d.ranges[body].firstSphere : first.frame;
+      HostTerms terms(d.identified, frames.of(home, first.restPoint), frames.restPoint(home, first.restPoint));
+      for (int g = range.firstGroup; g < range.endGroup; ++g) {
+        d.identified.ofNodeGroup[g] = static_cast<int>(d.identified.skin.size());
+        addSkin(d, body, mechanics, {nodeAt[4 * g], nodeAt[4 * g + 1], nodeAt[4 * g + 2], nodeAt[4 * g + 3]}, terms,
+                frames);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void layOutIdentified(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
+  Identified& s = d.identified;
+  s.ofNodeGroup.assign(d.nodes.count / 4, -1);
+  s.bodies.resize(d.bodies.size());
+  for (std::size_t b = 0; b < d.bodies.size(); ++b) {
+    if (d.bodies[b].links != LinkModel::identified) continue;
+    const int body = static_cast<int>(b);
+    FrameNumbers frames(d, body);
+    const int firstLinkGroup = static_cast<int>(s.links.size());
+    addLinks(d, body, mechanics[b], frames);
+    addSkins(d, body, mechanics[b], frames);
+    s.bodies[b] = {frames.first(), frames.end(), firstLinkGroup, static_cast<int>(s.links.size())};
+  }
+  s.loads.resize(s.frames.size());
+  s.termStates.resize(s.terms.size());
+  int most = 0;
+  for (const SkinHost& host : s.hosts) most = std::max(most, host.endTerms - host.firstTerms);
+  s.termLoads.resize(4 * most);
+  s.turns.resize(s.skin.size());
+}
+
+}  // namespace medulla

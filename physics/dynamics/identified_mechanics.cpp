@@ -1,0 +1,191 @@
+#include "physics/dynamics/identified_mechanics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace medulla {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+void require(bool condition, const std::string& message) {
+  if (!condition) throw std::runtime_error(message);
+}
+
+Matrix3d crossMatrix(const Vector3d& a) {
+  return (Matrix3d() << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0).finished();
+}
+
+// From a sphere's frame to that of its cell; 0 of what is held.
+Vector3d armOf(const SoftBodyModel& m, int frame) {
+  if (frame >= static_cast<int>(m.spheres.size())) return Vector3d::Zero();
+  return m.identified->frames[frame].restPosition - m.spheres[frame].restFrame;
+}
+
+void checkNetwork(const SoftBodyModel& m) {
+  const IdentifiedNetwork& n = *m.identified;
+  require(n.frames.size() == m.spheres.size() && n.skin.size() == m.restNodes.size(),
+          fmt::format("its model identifies {} frames and {} nodes: expected {} and {}", n.frames.size(), n.skin.size(),
+                      m.spheres.size(), m.restNodes.size()));
+  const int spheres = static_cast<int>(m.spheres.size()), frames = spheres + static_cast<int>(n.patches.size());
+  require(n.lengthScale > 0, fmt::format("its model's length scale is {}: expected more than 0 m", n.lengthScale));
+  for (const IdentifiedLink& l : n.links) {
+    require(l.frame0 >= 0 && l.frame0 < spheres && l.frame1 >= 0 && l.frame1 < frames && l.frame0 != l.frame1,
+            fmt::format("its model identifies a link between frames {} and {}: expected two of 0 to {}, the first of a "
+                        "sphere",
+                        l.frame0, l.frame1, frames - 1));
+    require(l.restPoint0 != l.restPoint1,
+            fmt::format("its model's frames {} and {} are linked and lie in one point", l.frame0, l.frame1));
+  }
+  for (std::size_t i = 0; i < n.skin.size(); ++i) {
+    constexpr std::size_t kMost = 6;
+    require(!n.skin[i].empty() && n.skin[i].size() <= kMost,
+            fmt::format("its model hangs node {} on {} frames: expected 1 to {}", i, n.skin[i].size(), kMost));
+    double sum = 0;
+    for (const SkinFrame& f : n.skin[i]) {
+      require(f.frame >= 0 && f.frame < frames,
+              fmt::format("its model hangs node {} on frame {}: expected 0 to {}", i, f.frame, frames - 1));
+      sum += f.weight;
+    }
+    require(std::abs(sum - 1) < 1e-6, fmt::format("the weights of its model's node {} sum to {}: expected 1", i, sum));
+  }
+}
+
+}  // namespace
+
+void checkIdentified(const BodyDescription& body) {
+  const SoftBodyModel& m = *body.model;
+  require(m.identified != nullptr, "its links are to be identified: expected a model built with --identify");
+  const IdentifiedNetwork& n = *m.identified;
+  require(!n.usesFormulas, "its model was identified as one of beams: expected beams as its links");
+  checkNetwork(m);
+  require(std::abs(n.poisson - body.tissue.poisson) < 1e-9,
+          fmt::format("its model was identified for a Poisson's ratio of {}: its tissue has {}", n.poisson,
+                      body.tissue.poisson));
+  std::vector<int> held, fixed = body.fixedNodes;
+  for (const FixedPatch& p : n.patches) held.insert(held.end(), p.nodes.begin(), p.nodes.end());
+  for (std::vector<int>* nodes : {&held, &fixed}) {
+    std::sort(nodes->begin(), nodes->end());
+    nodes->erase(std::unique(nodes->begin(), nodes->end()), nodes->end());
+  }
+  require(held == fixed,
+          fmt::format("its model was identified with {} nodes held: expected the same ones, not these {}", held.size(),
+                      fixed.size()));
+  require(body.surface == SurfaceMode::skin || (n.layer.normal > 0 && n.layer.tangential > 0),
+          "its model's surface layer has no stiffness: expected more than 0");
+}
+
+std::vector<Matrix6d> identifiedStiffness(const BodyDescription& body) {
+  std::vector<Matrix6d> out;
+  const LinkFactors& f = body.factors;
+  Eigen::Matrix<double, 6, 1> steer;
+  steer << f.elongation, f.flexion, f.flexion, f.torsion, f.flexion, f.flexion;
+  const Eigen::Matrix<double, 6, 1> root = steer.cwiseSqrt();
+  for (const IdentifiedLink& l : body.model->identified->links) {
+    Matrix6d axes = Matrix6d::Zero();
+    axes.topLeftCorner<3, 3>() = axes.bottomRightCorner<3, 3>() = l.axes;
+    const Matrix6d steered = root.asDiagonal() * axes;
+    const Matrix6d k = body.tissue.young * steered.transpose() * l.stiffness * steered;
+    out.push_back(0.5 * (k + k.transpose()));
+  }
+  return out;
+}
+
+std::vector<std::vector<SkinFrame>> heldSkin(const SoftBodyModel& model) {
+  std::vector<std::vector<SkinFrame>> out = model.identified->skin;
+  for (std::size_t p = 0; p < model.identified->patches.size(); ++p) {
+    for (const int node : model.identified->patches[p].nodes) {
+      SkinFrame alone;
+      alone.frame = static_cast<int>(model.spheres.size() + p);
+      alone.weight = 1;
+      alone.restPoint = model.restNodes[node];
+      out[node] = {alone};
+    }
+  }
+  return out;
+}
+
+std::vector<Attachment> attachmentsToFrames(const SoftBodyModel& model,
+                                            const std::vector<std::vector<SkinFrame>>& skin) {
+  std::vector<Attachment> out = model.attachments;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    Attachment& a = out[i];
+    a.onLink = false;
+    a.along = 0;
+    a.host = a.massSphere;
+    double most = 0;
+    for (const SkinFrame& f : skin[i]) {
+      if (f.frame >= static_cast<int>(model.spheres.size()) || f.weight <= most) continue;
+      most = f.weight;
+      a.host = f.frame;
+    }
+    a.restOffset = model.restNodes[i] - model.spheres[a.host].restFrame;
+  }
+  return out;
+}
+
+SphereCell sphereCell(const BodyDescription& body, int sphere) {
+  const FillingSphere& s = body.model->spheres[sphere];
+  if (!isIdentified(body)) return {s.volume, s.secondMoment};
+  const IdentifiedFrame& f = body.model->identified->frames[sphere];
+  const Vector3d arm = f.restPosition - s.restFrame;
+  return {f.volume, f.secondMoment + f.volume * arm * arm.transpose()};
+}
+
+static Vector3d meanOf(const std::vector<SkinFrame>& frames) {
+  Vector3d mean = Vector3d::Zero();
+  for (const SkinFrame& f : frames) mean += f.weight * f.restPoint;
+  return mean;
+}
+
+std::vector<SkinRow> skinRows(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node) {
+  const double scale = model.identified->lengthScale;
+  const Vector3d mean = meanOf(frames);
+  // Of the blended frame: its way, and its turn with what it carries.
+  Matrix3d ofMean = Matrix3d::Identity(), ofTurn = -crossMatrix(model.restNodes[node] - mean);
+  for (const SkinFrame& f : frames) {
+    const Matrix3d way = f.map.leftCols<3>(), turn = scale * f.map.rightCols<3>();
+    ofMean -= way;
+    ofTurn += way * crossMatrix(f.restPoint - mean) - turn;
+  }
+  std::vector<SkinRow> out;
+  for (const SkinFrame& f : frames)
+    out.push_back({f.weight * ofMean + f.map.leftCols<3>(), f.weight * ofTurn + scale * f.map.rightCols<3>()});
+  return out;
+}
+
+Vector3d skinLever(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node) {
+  const Vector3d mean = meanOf(frames);
+  Vector3d lever = model.restNodes[node] - mean;
+  for (const SkinFrame& f : frames) lever -= f.map.leftCols<3>().trace() / 3 * (f.restPoint - mean);
+  return lever;
+}
+
+std::vector<HostRate> hostRates(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node) {
+  const std::vector<SkinRow> rows = skinRows(model, frames, node);
+  std::vector<HostRate> out;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const int frame = frames[k].frame;
+    if (frame >= static_cast<int>(model.spheres.size())) continue;
+    out.push_back({frame, rows[k].onWay, rows[k].onTurn - rows[k].onWay * crossMatrix(armOf(model, frame))});
+  }
+  return out;
+}
+
+// t' = v1 - v0 - (omega0 + omega1) / 2 x d, w' = omega1 - omega0, with the velocities of the cells' frames.
+RestMeasures restMeasures(const SoftBodyModel& model, const IdentifiedLink& link) {
+  const double scale = model.identified->lengthScale;
+  const Matrix3d half = 0.5 * crossMatrix(link.restPoint1 - link.restPoint0), one = scale * Matrix3d::Identity();
+  RestMeasures out;
+  out.line << Matrix3d::Identity(), Matrix3d::Zero();
+  out.turn0 << half + crossMatrix(armOf(model, link.frame0)), -one;
+  out.turn1 << half - crossMatrix(armOf(model, link.frame1)), one;
+  return out;
+}
+
+}  // namespace medulla

@@ -1,0 +1,86 @@
+#include <Eigen/Geometry>
+
+#include "physics/dynamics/identified_stages.h"
+#include "physics/dynamics/skin_map.h"
+
+// Single nodes on frames: those that carry loads.
+namespace medulla {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+
+// A host's frames as they are, without a world to write to.
+struct SeenHost {
+  HomeFrame home;
+  std::vector<SkinTermState> states;
+};
+
+SeenHost see(const Identified& s, const SkinHost& host) {
+  SeenHost out{homeFrame(s, host), std::vector<SkinTermState>(host.endTerms - host.firstTerms)};
+  seeFrames(s, host, out.home, out.states.data());
+  return out;
+}
+
+Matrix3d crossMatrix(const Vector3d& a) {
+  return (Matrix3d() << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0).finished();
+}
+
+void add(HostPoint& p, const CarriedFrame& frame, const Matrix3d& force, const Matrix3d& torque) {
+  if (frame.sphere < 0) return;
+  p.spheres[p.count] = frame.sphere;
+  p.force[p.count] = force;
+  p.torque[p.count] = torque + crossMatrix(vectorOf(frame.worldArm)) * force;
+  ++p.count;
+}
+
+}  // namespace
+
+Vector3d placeOnFrames(const WorldData& d, int node) {
+  const Identified& s = d.identified;
+  const SkinGroup& g = s.skin[s.ofNodeGroup[node / 4]];
+  const SeenHost seen = see(s, s.hosts[g.host]);
+  const SkinPlace place = placeSkin<false>(s, g, seen.states.data());
+  return vectorOf(seen.home.position + rotate(seen.home.rotation, place.offset), node % 4);
+}
+
+// The transpose of the rates in skin_map.h for one node, column by column of its force.
+HostPoint hostPointOnFrames(const WorldData& d, int node) {
+  const Identified& s = d.identified;
+  const SkinGroup& g = s.skin[s.ofNodeGroup[node / 4]];
+  const SkinHost& host = s.hosts[g.host];
+  const SeenHost seen = see(s, host);
+  const int lane = node % 4;
+  const SkinPlace place = placeSkin<false>(s, g, seen.states.data());
+  const Matrix3d r = quaternionOf(s.frames[host.home].orientation).toRotationMatrix();
+  const Vector3d turn = vectorOf(place.turn, lane), lever = vectorOf(g.lever, lane);
+  // Of the second order by the turn of the node's own frame: (s.P) / 2 + s P^T / 2 - P s^T.
+  const Matrix3d second =
+      0.5 * turn.dot(lever) * Matrix3d::Identity() + 0.5 * turn * lever.transpose() - lever * turn.transpose();
+  HostPoint p;
+  Matrix3d force = r.transpose(), moment = crossMatrix(vectorOf(place.offset, lane)) * r.transpose();
+  for (int k = g.firstShare; k < g.endShare; ++k) {
+    const SkinShare& share = s.shares[k];
+    Matrix3d onWay, onTurn;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        onWay(j, i) = share.map[6 * i + j][lane];
+        onTurn(j, i) = share.map[6 * i + 3 + j][lane];
+      }
+    }
+    if (onWay.isZero(0) && onTurn.isZero(0) && share.weight[lane] == 0) continue;  // another node's
+    onTurn += static_cast<double>(share.weight[lane]) * second.transpose();
+    const SkinTermState& at = seen.states[share.load / 4];
+    const int l = share.load % 4;
+    const Matrix3d f = onWay * r.transpose(), t = onTurn * r.transpose();
+    const Matrix3d torque = at.cosine[l] * t + 0.5 * crossMatrix(vectorOf(at.turn, l)) * t;
+    force -= f;
+    moment -= torque + crossMatrix(vectorOf(at.place, l)) * f;
+    add(p, s.carried[s.terms[host.firstTerms + share.load / 4].frame[l]], r * f, r * torque);
+  }
+  add(p, s.carried[host.home], r * force, r * moment);
+  return p;
+}
+
+}  // namespace medulla

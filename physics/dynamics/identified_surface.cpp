@@ -1,0 +1,125 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "physics/dynamics/edge_springs.h"
+#include "physics/dynamics/identified_stages.h"
+#include "physics/dynamics/skin_map.h"
+
+// The surface of bodies with identified links: its nodes hang on up to six frames each.
+namespace medulla {
+
+namespace {
+
+int hostOf(const WorldData& d, int group) {
+  return d.identified.skin[d.identified.ofNodeGroup[group]].host;
+}
+
+SkinTermState* statesOf(Identified& s, const SkinHost& host) {
+  return s.termStates.data() + host.firstTerms;
+}
+
+// The host's frames, seen from its home.
+MEDULLA_INLINE HomeFrame seeHost(Identified& s, const SkinHost& host) {
+  const HomeFrame home = homeFrame(s, host);
+  seeFrames(s, host, home, statesOf(s, host));
+  return home;
+}
+
+}  // namespace
+
+void pullOnFrames(WorldData& d, const HostRange& range) {
+  Nodes& n = d.nodes;
+  Identified& s = d.identified;
+  const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
+  const HomeFrame home = seeHost(s, host);
+  const Lanes relaxation = splat(range.relaxation);
+  Lanes volume = splat(0);
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const int skin = s.ofNodeGroup[g];
+    const SkinPlace place = placeSkin<true>(s, s.skin[skin], statesOf(s, host));
+    put(place.turn, s.turns[skin]);
+    const NodeGroup& group = n.groups[g];
+    const Lanes3 offset = rotate(home.rotation, place.offset), area = rotate(home.rotation, group.restArea);
+    const Lanes3 lever = n.position[g] - home.position, displaced = lever - offset;
+    const Lanes3 rate =
+        home.velocity + cross(home.omega, lever) + rotate(home.rotation, place.offsetRate) - n.velocity[g];
+    const Lanes lifted = dot(displaced, area), lifting = dot(rate, area), excess = s.skin[skin].normalExcess;
+    volume = volume + lifted;
+    const Lanes3 pull = fnma(group.stiffness, displaced, (group.stiffness * relaxation) * rate);
+    put(fma(excess * fma(relaxation, lifting, splat(0) - lifted), area, pull), n.force[g]);
+    put(offset, n.offset[g]);
+    put(area, n.area[g]);
+    storeFour(displaced, n.displaced, 4 * g);
+  }
+  n.swollen[range.part] = sumOfLanes(volume);
+}
+
+// Springs pull along what nodes are displaced by, edges act at the nodes' places; all else acts at the nodes, and home
+// bears the difference.
+void returnToFrames(WorldData& d, const HostRange& range, Lanes pressure) {
+  Nodes& n = d.nodes;
+  FrameReturn back(d, range);
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const Lanes3 displaced = gatherFour(n.displaced, 4 * g);
+    const Lanes3 edges = pullOfEdges(d.springs, n.displaced.data(), displaced, n.groups[g].edges, g);
+    const Lanes3 own = fnma(pressure, n.area[g], n.force[g]), force = own + edges;
+    put(force, n.force[g]);
+    const Lanes minus = splat(-1);
+    back.add(g, minus * force, minus * cross(displaced, own));
+  }
+  back.finish();
+}
+
+void placeOnFrames(WorldData& d, const HostRange& range) {
+  Nodes& n = d.nodes;
+  Identified& s = d.identified;
+  const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
+  const HomeFrame home = seeHost(s, host);
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const SkinPlace place = placeSkin<true>(s, s.skin[s.ofNodeGroup[g]], statesOf(s, host));
+    const Lanes3 offset = rotate(home.rotation, place.offset);
+    put(home.position + offset + gatherFour(n.displaced, 4 * g), n.position[g]);
+    put(home.velocity + cross(home.omega, offset) + rotate(home.rotation, place.offsetRate), n.velocity[g]);
+    put(rotate(home.rotation, n.groups[g].restArea), n.area[g]);
+  }
+}
+
+FrameReturn::FrameReturn(WorldData& d, const HostRange& range)
+    : d_(&d), host_(&d.identified.hosts[hostOf(d, range.firstGroup)]) {
+  const Identified& s = d.identified;
+  const FrameState& home = s.frames[host_->home];
+  rotation_ = rotationOf(splat(home.orientation), splat(home.orientation.v[3]));
+  const Lanes zero = splat(0);
+  force_ = moment_ = {zero, zero, zero};
+  std::fill_n(d.identified.termLoads.begin(), 4 * (host_->endTerms - host_->firstTerms), SkinTermLoad{});
+}
+
+void FrameReturn::add(int g, const Lanes3& force, const Lanes3& moment) {
+  Identified& s = d_->identified;
+  const int skin = s.ofNodeGroup[g];
+  const Lanes3 f = rotateBack(rotation_, force);
+  put(force_ + f, force_);
+  put(moment_ + rotateBack(rotation_, moment + cross(d_->nodes.offset[g], force)), moment_);
+  giveToTerms(s, s.skin[skin], s.turns[skin], f, s.termLoads.data());
+}
+
+void FrameReturn::finish() {
+  Identified& s = d_->identified;
+  const HomeLoad own = giveToFrames(s, *host_, rotation_, statesOf(s, *host_), s.termLoads.data(), force_, moment_,
+                                    [&](const std::uint32_t* frames, const Lanes3& force, const Lanes3& torque) {
+                                      addFour(force, s.loads.data(), frames, &FrameLoad::force);
+                                      addFour(torque, s.loads.data(), frames, &FrameLoad::torque);
+                                    });
+  FrameLoad& home = s.loads[host_->home];
+  store(home.force, load(home.force) + own.force);
+  store(home.torque, load(home.torque) + own.moment);
+}
+
+double normalEnergy(const WorldData& d, int node) {
+  const int skin = d.identified.ofNodeGroup[node / 4];
+  if (skin < 0) return 0;
+  const double lifted = vectorAt(d.nodes.area, node).dot(vectorOf(d.nodes.displaced[node]));
+  return 0.5 * d.identified.skin[skin].normalExcess[node % 4] * lifted * lifted;
+}
+
+}  // namespace medulla

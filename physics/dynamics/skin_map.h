@@ -1,0 +1,167 @@
+#pragma once
+
+#include "physics/dynamics/frame_turn.h"
+#include "physics/dynamics/world_data.h"
+
+// How nodes follow the frames they hang on (physics/model/identified_network.h), seen from the frame of their home
+// sphere: with e_k and s_k how far frame k is from its place at rest and twice the vector part of its quaternion, both
+// in the home frame,
+//   node = home + R (restOffset + sum map_k (e_k, s_k) + s x (s x lever) / 2),   s = sum weight_k s_k.
+// The maps are the skin's first derivatives, the last term what turning adds to second order. Rates and the transpose
+// are exact:
+//   e_k' = R^T (v_k - v - omega x (x_k - home)),   s_k' = c_k D + D x s_k / 2,   D = R^T (omega_k - omega).
+namespace medulla {
+
+struct HomeFrame {  // the same in all lanes
+  Lanes3 position, q;
+  Lanes w;
+  Lanes3 velocity, omega;
+  Rotation rotation;
+};
+
+MEDULLA_INLINE HomeFrame homeFrame(const Identified& s, const SkinHost& host) {
+  const FrameState& f = s.frames[host.home];
+  HomeFrame out;
+  put(splat(f.position), out.position);
+  put(splat(f.orientation), out.q);
+  out.w = splat(f.orientation.v[3]);
+  put(splat(f.velocity), out.velocity);
+  put(splat(f.angularVelocity), out.omega);
+  out.rotation = rotationOf(out.q, out.w);
+  return out;
+}
+
+// Sets the host's SkinTermStates; `states` has one for each of its terms.
+MEDULLA_INLINE void seeFrames(const Identified& s, const SkinHost& host, const HomeFrame& home, SkinTermState* states) {
+  const Lanes half = splat(0.5);
+  for (int t = host.firstTerms; t < host.endTerms; ++t, ++states) {
+    const SkinTerms& terms = s.terms[t];
+    const FrameLanes frames = gatherFrames(s.frames.data(), terms.frame);
+    const RelativeTurn r = turnBetween(home.q, home.w, frames.q, frames.w);
+    states->cosine = r.cosine;
+    const Lanes3 turn = splat(2) * r.v;
+    put(turn, states->turn);
+    const Lanes3 from = frames.position - home.position, place = rotateBack(home.rotation, from);
+    put(place, states->place);
+    put(place - terms.restPlace, states->way);
+    const Lanes3 velocity = gatherQuads(s.frames.data(), terms.frame, &FrameState::velocity) - home.velocity;
+    put(rotateBack(home.rotation, velocity - cross(home.omega, from)), states->wayRate);
+    const Lanes3 apart =
+        rotateBack(home.rotation, gatherQuads(s.frames.data(), terms.frame, &FrameState::angularVelocity) - home.omega);
+    put(fma(r.cosine, apart, half * cross(apart, turn)), states->turnRate);
+  }
+}
+
+MEDULLA_INLINE Lanes shareEntry(const float (&four)[4]) {
+  return _mm256_cvtps_pd(_mm_load_ps(four));
+}
+MEDULLA_INLINE Lanes3 broadcastThree(const double* p) {
+  return {_mm256_broadcast_sd(p), _mm256_broadcast_sd(p + 4), _mm256_broadcast_sd(p + 8)};
+}
+
+struct SkinPlace {  // in the home frame: of the nodes, and how their own frames are turned against it
+  Lanes3 offset, turn;
+  Lanes3 offsetRate;
+};
+
+// s x (s x lever) / 2
+MEDULLA_INLINE Lanes3 secondOrder(const Lanes3& s, const Lanes3& lever) {
+  const Lanes half = splat(0.5);
+  return fma(half * dot(s, lever), s, (splat(-0.5) * dot(s, s)) * lever);
+}
+
+template <bool withRates>
+MEDULLA_INLINE SkinPlace placeSkin(const Identified& s, const SkinGroup& g, const SkinTermState* states) {
+  const Lanes zero = splat(0);
+  const double* numbers = reinterpret_cast<const double*>(states);
+  Lanes3 y = g.restOffset, turn{zero, zero, zero}, yRate = turn, turnRate = turn;
+  for (int k = g.firstShare; k < g.endShare; ++k) {
+    const SkinShare& share = s.shares[k];
+    const double* at = numbers + share.state;
+    const Lanes3 way = broadcastThree(at), turned = broadcastThree(at + 12);
+    Lanes3 wayRate, turnedRate;
+    if (withRates) {
+      put(broadcastThree(at + 24), wayRate);
+      put(broadcastThree(at + 36), turnedRate);
+    }
+    const Lanes weight = shareEntry(share.weight);
+    Lanes* rows[3] = {&y.x, &y.y, &y.z};
+    Lanes* rates[3] = {&yRate.x, &yRate.y, &yRate.z};
+    for (int i = 0; i < 3; ++i) {
+      const float(*row)[4] = &share.map[6 * i];
+      const Lanes3 onWay{shareEntry(row[0]), shareEntry(row[1]), shareEntry(row[2])},
+          onTurn{shareEntry(row[3]), shareEntry(row[4]), shareEntry(row[5])};
+      const auto add = [&](const Lanes3& a, const Lanes3& b, Lanes& sum) {
+        sum = fma(onWay.x, a.x, fma(onWay.y, a.y, fma(onWay.z, a.z, sum)));
+        sum = fma(onTurn.x, b.x, fma(onTurn.y, b.y, fma(onTurn.z, b.z, sum)));
+      };
+      add(way, turned, *rows[i]);
+      if (withRates) add(wayRate, turnedRate, *rates[i]);
+    }
+    put(fma(weight, turned, turn), turn);
+    if (withRates) put(fma(weight, turnedRate, turnRate), turnRate);
+  }
+  SkinPlace out;
+  put(y + secondOrder(turn, g.lever), out.offset);
+  put(turn, out.turn);
+  if (withRates) {
+    const Lanes half = splat(0.5);
+    put(fma(half * dot(turn, g.lever), turnRate,
+            fma(half * dot(turnRate, g.lever), turn, fnma(dot(turn, turnRate), g.lever, yRate))),
+        out.offsetRate);
+  }
+  return out;
+}
+
+// Forces (N) at the nodes' places, in the home frame, added to the loads on the host's other frames.
+MEDULLA_INLINE void giveToTerms(const Identified& s, const SkinGroup& g, const Lanes3& turn, const Lanes3& force,
+                                SkinTermLoad* loads) {
+  const Lanes half = splat(0.5);
+  const Lanes3 onOwn = fma(half * dot(turn, g.lever), force,
+                           fma(half * dot(turn, force), g.lever, (splat(-1) * dot(g.lever, force)) * turn));
+  const Lanes f[3] = {force.x, force.y, force.z}, own[3] = {onOwn.x, onOwn.y, onOwn.z};
+  for (int k = g.firstShare; k < g.endShare; ++k) {
+    const SkinShare& share = s.shares[k];
+    SkinTermLoad& to = loads[share.load];
+    const Lanes weight = shareEntry(share.weight);
+    for (int j = 0; j < 3; ++j) {
+      Lanes way = to.onWay[j], turning = fma(weight, own[j], to.onTurn[j]);
+      for (int i = 0; i < 3; ++i) {
+        way = fma(shareEntry(share.map[6 * i + j]), f[i], way);
+        turning = fma(shareEntry(share.map[6 * i + 3 + j]), f[i], turning);
+      }
+      to.onWay[j] = way;
+      to.onTurn[j] = turning;
+    }
+  }
+}
+
+struct HomeLoad {
+  Lanes force, moment;  // N, N m, in the world's frame, as quads
+};
+
+// What nodes get in sum, forces and moments about home, in the home frame and node by node in the lanes, and the loads
+// that giveToTerms() left: to the frames. `give(frames, forces, torques)` has four of them in the world's frame; home's
+// own is returned.
+template <class Give>
+MEDULLA_INLINE HomeLoad giveToFrames(const Identified& s, const SkinHost& host, const Rotation& rotation,
+                                     const SkinTermState* states, const SkinTermLoad* loads, Lanes3 force,
+                                     Lanes3 moment, const Give& give) {
+  for (int t = host.firstTerms; t < host.endTerms; ++t, ++states, loads += 4) {
+    const auto sums = [&](const Lanes(SkinTermLoad::*on)[3]) {
+      const auto sum = [&](int j) {
+        return sumsOfLanes((loads[0].*on)[j], (loads[1].*on)[j], (loads[2].*on)[j], (loads[3].*on)[j]);
+      };
+      return Lanes3{sum(0), sum(1), sum(2)};
+    };
+    const Lanes3 onWay = sums(&SkinTermLoad::onWay), onTurn = sums(&SkinTermLoad::onTurn);
+    const Lanes3 torque = fma(states->cosine, onTurn, splat(0.5) * cross(states->turn, onTurn));
+    force = force - onWay;
+    moment = moment - torque - cross(states->place, onWay);
+    give(s.terms[t].frame, rotate(rotation, onWay), rotate(rotation, torque));
+  }
+  const Lanes zero = splat(0);
+  return {sumOfLanes(rotate(rotation, force), zero), sumOfLanes(rotate(rotation, moment), zero)};
+}
+
+}  // namespace medulla

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "physics/model/identified_network.h"
+#include "physics/model/identify/voxel_solid.h"
+
+namespace medulla {
+
+// What the spheres' frames are in finite elements: each moves as its power cell does in the mean,
+//   t = mean u,  theta = J^-1 integral r x u      J the cell's inertia per unit density, r from its centroid.
+struct CellFrames {
+  std::vector<IdentifiedFrame> frames;
+  double lengthScale = 0;  // m, cube root of the mean volume
+  RowSparse motion;        // 6 frames x 3 grid nodes: (t at restPosition, lengthScale theta) of each
+  PowerSites sites;
+  std::map<std::pair<int, int>, double> contactArea;  // m2, as of PowerCells
+};
+
+CellFrames makeCellFrames(const TriangleMesh& mesh, const std::vector<Ball>& balls, const VoxelSolid& solid);
+
+// The frame in whose cell a point lies.
+int cellAt(const PowerSites& sites, const Eigen::Vector3d& point);
+
+}  // namespace medulla

@@ -1,0 +1,88 @@
+#include "physics/model/identify/check_loads.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "physics/model/mesh_topology.h"
+#include "physics/model/surface_samples.h"
+
+namespace medulla {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+
+NodeSurface measureNodes(const TriangleMesh& mesh, const std::vector<FixedPatch>& patches) {
+  NodeSurface out;
+  out.areas.assign(mesh.vertices.size(), 0);
+  out.normals.assign(mesh.vertices.size(), Vector3d::Zero());
+  out.held.assign(mesh.vertices.size(), false);
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vector3d normal = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
+    for (const int n : {a, b, c}) {
+      out.areas[n] += normal.norm() / 6;
+      out.normals[n] += normal;
+    }
+  }
+  for (Vector3d& n : out.normals) n.normalize();
+  for (const FixedPatch& patch : patches) {
+    for (const int n : patch.nodes) out.held[n] = true;
+  }
+  return out;
+}
+
+RowMatrix randomLoads(const TriangleMesh& mesh, const NodeSurface& surface, LoadKind kind, double lengthScale,
+                      int count, std::uint64_t seed) {
+  constexpr int tries = 20;  // for a patch clear of what is held; then any will do
+  RandomSequence random{seed};
+  const double diagonal = boundsDiagonal(mesh);
+  const std::vector<SurfaceSample> centres = sampleSurface(mesh, count * tries, seed);
+  RowMatrix forces = RowMatrix::Zero(3 * static_cast<Index>(mesh.vertices.size()), count);
+  for (int load = 0; load < count; ++load) {
+    const bool poke = kind == LoadKind::poke;
+    const double share = random.uniform();
+    const double radius = poke ? (1 + 2 * share) / 3 * lengthScale : (1 + share) / 8 * diagonal;
+    const Vector3d direction = random.normal().normalized();
+    for (int k = 0; k < tries; ++k) {
+      // Samples run along the surface: every load tries one in each of `tries` parts of it.
+      const SurfaceSample& centre = centres[(load + k * count + (load * 7 % tries) * count) % (count * tries)];
+      int nodes = 0;
+      bool clear = true;
+      forces.col(load).setZero();
+      for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
+        if ((mesh.vertices[n] - centre.point).norm() > radius || surface.normals[n].dot(centre.normal) < 0.2) continue;
+        if (surface.held[n]) {
+          clear = false;
+          continue;
+        }
+        forces.block<3, 1>(3 * static_cast<Index>(n), load) =
+            surface.areas[n] * (poke ? Vector3d(-centre.normal) : direction);
+        ++nodes;
+      }
+      if (nodes >= 3 && (clear || k + 1 == tries)) break;
+    }
+  }
+  return forces;
+}
+
+IdentifiedError errorOf(const MatrixXd& found, const MatrixXd& expected) {
+  IdentifiedError error;
+  double squares = 0;
+  const Index nodes = expected.rows() / 3;
+  for (Index load = 0; load < expected.cols(); ++load) {
+    double largest = 0, worst = 0, sum = 0;
+    for (Index n = 0; n < nodes; ++n) {
+      largest = std::max(largest, expected.block<3, 1>(3 * n, load).norm());
+      const double off = (found.block<3, 1>(3 * n, load) - expected.block<3, 1>(3 * n, load)).norm();
+      worst = std::max(worst, off);
+      sum += off * off;
+    }
+    if (!(largest > 0)) continue;
+    error.maximum = std::max(error.maximum, 100 * worst / largest);
+    squares += sum / static_cast<double>(nodes) / (largest * largest);
+  }
+  if (expected.cols() > 0) error.rms = 100 * std::sqrt(squares / static_cast<double>(expected.cols()));
+  return error;
+}
+
+}  // namespace medulla

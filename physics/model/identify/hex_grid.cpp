@@ -1,0 +1,173 @@
+#include "physics/model/identify/hex_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kFractionMin = 0.02, kFloorWeight = 1e-3;
+
+// Legendre polynomials of degree 0 to 5 at x in -1..1.
+std::array<double, 6> legendre(double x) {
+  std::array<double, 6> p = {1, x};
+  for (int n = 1; n < 5; ++n) p[n + 1] = ((2 * n + 1) * x * p[n] - n * p[n - 1]) / (n + 1);
+  return p;
+}
+
+// Five weights that integrate polynomials up to the fourth degree over [from, to] of 0..1 by their values at the Gauss
+// points of the whole: the projection on Legendre polynomials, whose antiderivative is (P[n+1] - P[n-1]) / (2 n + 1).
+std::array<double, 5> partWeights(double from, double to) {
+  const std::array<double, 6> high = legendre(2 * to - 1), low = legendre(2 * from - 1);
+  std::array<double, 5> moments;  // (2 n + 1) times the integral of P[n] over the part
+  moments[0] = 2 * (to - from);
+  for (int n = 1; n < 5; ++n) moments[n] = high[n + 1] - high[n - 1] - low[n + 1] + low[n - 1];
+  const GaussRule& rule = fivePointRule();
+  std::array<double, 5> weights{};
+  for (int i = 0; i < 5; ++i) {
+    const std::array<double, 6> at = legendre(2 * rule.points[i] - 1);
+    for (int n = 0; n < 5; ++n) weights[i] += rule.weights[i] / 2 * at[n] * moments[n];
+  }
+  return weights;
+}
+
+std::array<double, 5> voxelWeights(int voxel) {
+  return partWeights(static_cast<double>(voxel) / HexGrid::kVoxels, (voxel + 1.) / HexGrid::kVoxels);
+}
+
+void numberNodes(HexGrid& grid) {
+  const std::array<int, 3> lines = {2 * grid.count[0] + 1, 2 * grid.count[1] + 1, 2 * grid.count[2] + 1};
+  std::vector<int> number(static_cast<std::size_t>(lines[0]) * lines[1] * lines[2], -1);
+  const auto at = [&](const std::array<int, 3>& cell, int a) -> int& {
+    const int i = 2 * cell[0] + a / 9, j = 2 * cell[1] + a / 3 % 3, k = 2 * cell[2] + a % 3;
+    return number[(static_cast<std::size_t>(i) * lines[1] + j) * lines[2] + k];
+  };
+  for (const std::array<int, 3>& cell : grid.cells) {
+    for (int a = 0; a < kHexNodes; ++a) at(cell, a) = 0;
+  }
+  for (std::size_t n = 0; n < number.size(); ++n) {
+    if (number[n] < 0) continue;
+    number[n] = static_cast<int>(grid.nodes.size());
+    const int k = static_cast<int>(n % lines[2]), j = static_cast<int>(n / lines[2] % lines[1]),
+              i = static_cast<int>(n / lines[2] / lines[1]);
+    grid.nodes.push_back(grid.low + grid.size / 2 * Vector3d(i, j, k));
+  }
+  for (const std::array<int, 3>& cell : grid.cells) {
+    std::array<int, kHexNodes>& nodes = grid.cellNodes.emplace_back();
+    for (int a = 0; a < kHexNodes; ++a) nodes[a] = at(cell, a);
+  }
+}
+
+std::array<int, 3> cellOf(const VoxelPiece& piece) {
+  return {piece.index[0] / HexGrid::kVoxels, piece.index[1] / HexGrid::kVoxels, piece.index[2] / HexGrid::kVoxels};
+}
+
+}  // namespace
+
+const GaussRule& fivePointRule() {
+  static const GaussRule rule = [] {
+    const double a = std::sqrt(5 - 2 * std::sqrt(10. / 7)) / 3, b = std::sqrt(5 + 2 * std::sqrt(10. / 7)) / 3;
+    const double wa = (322 + 13 * std::sqrt(70.)) / 1800, wb = (322 - 13 * std::sqrt(70.)) / 1800;
+    return GaussRule{{(1 - b) / 2, (1 - a) / 2, 0.5, (1 + a) / 2, (1 + b) / 2}, {wb, wa, 64. / 225, wa, wb}};
+  }();
+  return rule;
+}
+
+std::array<double, 3> quadraticShapes(double x) {
+  return {(2 * x - 1) * (x - 1), 4 * x * (1 - x), x * (2 * x - 1)};
+}
+
+std::array<double, 3> quadraticSlopes(double x) {
+  return {4 * x - 3, 4 - 8 * x, 4 * x - 1};
+}
+
+HexGrid makeHexGrid(const VoxelBody& voxels) {
+  constexpr int n = HexGrid::kVoxels;
+  HexGrid grid;
+  grid.size = n * voxels.size;
+  grid.low = voxels.low;
+  for (int a = 0; a < 3; ++a) grid.count[a] = (voxels.count[a] + n - 1) / n;
+  const auto at = [&](const std::array<int, 3>& c) {
+    return (static_cast<std::size_t>(c[0]) * grid.count[1] + c[1]) * grid.count[2] + c[2];
+  };
+  std::vector<double> inside(static_cast<std::size_t>(grid.count[0]) * grid.count[1] * grid.count[2], 0);
+  for (const VoxelPiece& piece : voxels.pieces) inside[at(cellOf(piece))] += piece.height / voxels.size / (n * n * n);
+  grid.cellAt.assign(inside.size(), -1);
+  for (int i = 0; i < grid.count[0]; ++i) {
+    for (int j = 0; j < grid.count[1]; ++j) {
+      for (int k = 0; k < grid.count[2]; ++k) {
+        const double part = inside[at({i, j, k})];
+        if (part < kFractionMin) continue;
+        grid.cellAt[at({i, j, k})] = static_cast<int>(grid.cells.size());
+        grid.cells.push_back({i, j, k});
+        grid.fractions.push_back(part);
+      }
+    }
+  }
+  numberNodes(grid);
+
+  std::array<std::array<double, 5>, n> across;
+  for (int v = 0; v < n; ++v) across[v] = voxelWeights(v);
+  const GaussRule& rule = fivePointRule();
+  grid.weights.resize(kHexGauss, static_cast<Eigen::Index>(grid.cells.size()));
+  for (int q = 0; q < kHexGauss; ++q) {
+    grid.weights.row(q).setConstant(kFloorWeight * rule.weights[q / 25] * rule.weights[q / 5 % 5] *
+                                    rule.weights[q % 5]);
+  }
+  for (const VoxelPiece& piece : voxels.pieces) {
+    const int cell = grid.cellAt[at(cellOf(piece))];
+    if (cell < 0) continue;
+    const double middle = (piece.centre.z() - grid.low.z()) / grid.size - grid.cells[cell][2];
+    const double half = piece.height / grid.size / 2;
+    const std::array<double, 5>&x = across[piece.index[0] % n], &y = across[piece.index[1] % n],
+                             z = partWeights(middle - half, middle + half);
+    for (int q = 0; q < kHexGauss; ++q) grid.weights(q, cell) += x[q / 25] * y[q / 5 % 5] * z[q % 5];
+  }
+  return grid;
+}
+
+// The cell among those around `home` whose box is nearest, the first among equals.
+static int nearestCell(const HexGrid& grid, const std::array<int, 3>& home, const Vector3d& local) {
+  int best = -1;
+  double least = std::numeric_limits<double>::infinity();
+  for (int ring = 0; best < 0; ++ring) {
+    for (int i = std::max(0, home[0] - ring); i <= std::min(grid.count[0] - 1, home[0] + ring); ++i) {
+      for (int j = std::max(0, home[1] - ring); j <= std::min(grid.count[1] - 1, home[1] + ring); ++j) {
+        for (int k = std::max(0, home[2] - ring); k <= std::min(grid.count[2] - 1, home[2] + ring); ++k) {
+          const int cell = grid.cellAt[(static_cast<std::size_t>(i) * grid.count[1] + j) * grid.count[2] + k];
+          if (cell < 0) continue;
+          const Vector3d corner(i, j, k);
+          const Vector3d clamped = local.cwiseMax(corner).cwiseMin(corner + Vector3d::Ones());
+          const double distance = (local - clamped).squaredNorm();
+          if (distance < least) {
+            least = distance;
+            best = cell;
+          }
+        }
+      }
+    }
+  }
+  return best;
+}
+
+HexPoint locate(const HexGrid& grid, const Vector3d& point) {
+  const Vector3d local = (point - grid.low) / grid.size;
+  std::array<int, 3> home;
+  for (int a = 0; a < 3; ++a) home[a] = std::clamp(static_cast<int>(std::floor(local[a])), 0, grid.count[a] - 1);
+  HexPoint out;
+  out.cell = grid.cellAt[(static_cast<std::size_t>(home[0]) * grid.count[1] + home[1]) * grid.count[2] + home[2]];
+  if (out.cell < 0) out.cell = nearestCell(grid, home, local);
+  std::array<std::array<double, 3>, 3> shapes;
+  for (int a = 0; a < 3; ++a) {
+    // Beyond half a cell quadratic shapes say nothing any more.
+    shapes[a] = quadraticShapes(std::clamp(local[a] - grid.cells[out.cell][a], -0.5, 1.5));
+  }
+  for (int a = 0; a < kHexNodes; ++a) out.shape[a] = shapes[0][a / 9] * shapes[1][a / 3 % 3] * shapes[2][a % 3];
+  return out;
+}
+
+}  // namespace medulla

@@ -1,0 +1,252 @@
+#include "physics/model/identify/link_fit.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "physics/model/identify/lbfgs.h"
+#include "physics/model/identify/skin_fit.h"
+
+namespace medulla {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using Matrix6x12d = Eigen::Matrix<double, 6, 12>;
+
+namespace {
+
+constexpr double kContactMin = 0.1;  // of the smaller cell's face: less is a corner or an edge
+
+IdentifiedLink linkBetween(int frame0, int frame1, const Vector3d& from, const Vector3d& to) {
+  IdentifiedLink link;
+  link.frame0 = frame0;
+  link.frame1 = frame1;
+  link.restPoint0 = from;
+  link.restPoint1 = to;
+  const Vector3d d = to - from;
+  const Vector3d along = d.norm() > 0 ? d.normalized().eval() : Vector3d::UnitX();
+  const Vector3d aside = std::abs(along.z()) < 0.8 ? Vector3d::UnitZ() : Vector3d::UnitX();
+  const Vector3d u = (aside - along * along.dot(aside)).normalized();
+  link.axes << along.transpose(), u.transpose(), along.cross(u).transpose();
+  return link;
+}
+
+// Area of the patch in each frame's cell, m2.
+std::vector<double> heldAreas(const TriangleMesh& mesh, const CellFrames& cells, const std::vector<int>& triangles) {
+  constexpr int parts = 4;
+  std::vector<double> areas(cells.frames.size(), 0);
+  for (const int t : triangles) {
+    const Vector3d o = mesh.vertices[mesh.triangles[t][0]], u = mesh.vertices[mesh.triangles[t][1]] - o,
+                   v = mesh.vertices[mesh.triangles[t][2]] - o;
+    const double area = u.cross(v).norm() / 2 / (parts * (parts + 1) / 2);
+    for (int i = 0; i < parts; ++i) {
+      for (int j = 0; i + j < parts; ++j)
+        areas[cellAt(cells.sites, o + (i + 1. / 3) / parts * u + (j + 1. / 3) / parts * v)] += area;
+    }
+  }
+  return areas;
+}
+
+Matrix3d cross(const Vector3d& r) {
+  Matrix3d m;
+  m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
+  return m;
+}
+
+}  // namespace
+
+std::vector<IdentifiedLink> layOutLinks(const TriangleMesh& mesh, const CellFrames& cells,
+                                        const std::vector<FixedPatch>& patches,
+                                        const std::vector<std::vector<int>>& patchTriangles) {
+  std::vector<IdentifiedLink> links;
+  const auto face = [&](int i) { return std::cbrt(cells.frames[i].volume * cells.frames[i].volume); };
+  std::vector<double> most(cells.frames.size(), 0);  // no cell goes without its largest contact
+  for (const auto& [pair, area] : cells.contactArea) {
+    most[pair.first] = std::max(most[pair.first], area);
+    most[pair.second] = std::max(most[pair.second], area);
+  }
+  for (const auto& [pair, area] : cells.contactArea) {
+    const auto [i, j] = pair;
+    if (area < kContactMin * std::min(face(i), face(j)) && area < most[i] && area < most[j]) continue;
+    links.push_back(linkBetween(i, j, cells.frames[i].restPosition, cells.frames[j].restPosition));
+  }
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    const std::vector<double> areas = heldAreas(mesh, cells, patchTriangles[p]);
+    const double largest = *std::max_element(areas.begin(), areas.end());
+    for (int i = 0; i < static_cast<int>(areas.size()); ++i) {
+      if (areas[i] < kContactMin * face(i) && areas[i] < largest) continue;
+      const Vector3d& from = cells.frames[i].restPosition;
+      links.push_back(linkBetween(i, static_cast<int>(cells.frames.size() + p), from,
+                                  mesh.vertices[nearestNode(mesh, patches[p], from)]));
+    }
+  }
+  return links;
+}
+
+Matrix6x12d linkMeasures(const IdentifiedLink& link, double lengthScale) {
+  Matrix6x12d g = Matrix6x12d::Zero();
+  const Matrix3d bend = link.axes * cross(link.restPoint1 - link.restPoint0) / (2 * lengthScale);
+  g.block<3, 3>(0, 0) = -link.axes;
+  g.block<3, 3>(0, 3) = bend;
+  g.block<3, 3>(0, 6) = link.axes;
+  g.block<3, 3>(0, 9) = bend;
+  g.block<3, 3>(3, 3) = -link.axes;
+  g.block<3, 3>(3, 9) = link.axes;
+  return g;
+}
+
+namespace {
+
+void addLink(const Eigen::Matrix<double, 12, 12>& k, int frame0, int frame1, int frames, MatrixXd& sum) {
+  sum.block<6, 6>(6 * frame0, 6 * frame0) += k.topLeftCorner<6, 6>();
+  if (frame1 >= frames) return;
+  sum.block<6, 6>(6 * frame1, 6 * frame1) += k.bottomRightCorner<6, 6>();
+  sum.block<6, 6>(6 * frame0, 6 * frame1) += k.topRightCorner<6, 6>();
+  sum.block<6, 6>(6 * frame1, 6 * frame0) += k.bottomLeftCorner<6, 6>();
+}
+
+Matrix6d measured(const MatrixXd& m, const IdentifiedLink& link, const Matrix6x12d& g, int frames) {
+  Eigen::Matrix<double, 12, 12> part = Eigen::Matrix<double, 12, 12>::Zero();
+  const int i = link.frame0, j = link.frame1;
+  part.topLeftCorner<6, 6>() = m.block<6, 6>(6 * i, 6 * i);
+  if (j < frames) {
+    part.bottomRightCorner<6, 6>() = m.block<6, 6>(6 * j, 6 * j);
+    part.topRightCorner<6, 6>() = m.block<6, 6>(6 * i, 6 * j);
+    part.bottomLeftCorner<6, 6>() = m.block<6, 6>(6 * j, 6 * i);
+  }
+  return g * part * g.transpose();
+}
+
+// Unknowns: of each link the lower triangle (or the diagonal) of L in k = T L L^T T, where T undoes the scale of the
+// compliance that finite elements give its measures.
+class LinkFit {
+ public:
+  LinkFit(const MatrixXd& compliance, const MatrixXd& grounding, double lengthScale, LinkForm form,
+          std::vector<IdentifiedLink>& links)
+      : compliance_(compliance),
+        grounding_(grounding),
+        links_(links),
+        frames_(static_cast<int>(compliance.rows() / 6)) {
+    for (int b = 0; b < 6; ++b) {
+      for (int a = b; a < (form == LinkForm::full ? 6 : b + 1); ++a) places_.push_back({a, b});
+    }
+    for (const IdentifiedLink& link : links) {
+      measures_.push_back(linkMeasures(link, lengthScale));
+      const Matrix6d h = measured(compliance, link, measures_.back(), frames_);
+      if (form == LinkForm::diagonal) {
+        scales_.push_back(h.diagonal().cwiseSqrt().cwiseInverse().asDiagonal());
+      } else {
+        scales_.push_back(Eigen::SelfAdjointEigenSolver<Matrix6d>(h).operatorInverseSqrt());
+      }
+    }
+    const Index n = compliance.rows();
+    // Rotations count for less: they reach the surface over a cell's radius only.
+    weight_ = Eigen::Matrix<double, 6, 1>(1, 1, 1, 0.09, 0.09, 0.09).replicate(n / 6, 1);
+    perResponse_ = (weight_.asDiagonal() * compliance.cwiseAbs2()).colwise().sum().cwiseInverse().transpose();
+  }
+
+  VectorXd start() const {
+    VectorXd x = VectorXd::Zero(static_cast<Index>(links_.size() * places_.size()));
+    for (std::size_t l = 0; l < links_.size(); ++l) {
+      for (std::size_t k = 0; k < places_.size(); ++k) {
+        if (places_[k][0] == places_[k][1])
+          x[static_cast<Index>(l * places_.size() + k)] =
+              std::sqrt(static_cast<double>(frames_) / static_cast<double>(links_.size()));
+      }
+    }
+    return x;
+  }
+
+  void setStiffness(const VectorXd& x) const {
+    for (std::size_t l = 0; l < links_.size(); ++l) {
+      const Matrix6d root = scales_[l] * unpacked(x, l);
+      links_[l].stiffness = root * root.transpose();
+    }
+  }
+
+  // KL divergence per freedom times `kl`, plus `response` times half the mean square relative error of the responses.
+  double value(const VectorXd& x, VectorXd& gradient, double kl, double response) const {
+    const Index n = compliance_.rows();
+    MatrixXd stiffness = grounding_.size() > 0 ? grounding_ : MatrixXd::Zero(n, n);
+    for (std::size_t l = 0; l < links_.size(); ++l) {
+      const Matrix6d root = scales_[l] * unpacked(x, l);
+      const Eigen::Matrix<double, 12, 6> g = measures_[l].transpose() * root;
+      addLink(g * g.transpose(), links_[l].frame0, links_[l].frame1, frames_, stiffness);
+    }
+    const Eigen::LLT<MatrixXd> cholesky(stiffness);
+    if (cholesky.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+    const double logDeterminant = 2 * cholesky.matrixLLT().diagonal().array().log().sum();
+    const MatrixXd inverse = cholesky.solve(MatrixXd::Identity(n, n));
+    const auto size = static_cast<double>(n);
+    double f = kl / size * (compliance_.cwiseProduct(stiffness).sum() - logDeterminant - size);
+    MatrixXd slope = kl / size * (compliance_ - inverse);  // of f by the stiffness
+    if (response > 0) {
+      const MatrixXd off = inverse - compliance_;
+      MatrixXd e = weight_.asDiagonal() * off * perResponse_.asDiagonal();
+      f += response / (2 * size) * e.cwiseProduct(off).sum();
+      e = (e + e.transpose()).eval() / (2 * size);
+      const MatrixXd product = inverse * e;
+      slope.noalias() -= response * product * inverse;
+    }
+    for (std::size_t l = 0; l < links_.size(); ++l) {
+      const Matrix6d g =
+          2 * scales_[l] * measured(slope, links_[l], measures_[l], frames_) * scales_[l] * unpacked(x, l);
+      for (std::size_t k = 0; k < places_.size(); ++k)
+        gradient[static_cast<Index>(l * places_.size() + k)] = g(places_[k][0], places_[k][1]);
+    }
+    return f;
+  }
+
+ private:
+  Matrix6d unpacked(const VectorXd& x, std::size_t link) const {
+    Matrix6d out = Matrix6d::Zero();
+    for (std::size_t k = 0; k < places_.size(); ++k)
+      out(places_[k][0], places_[k][1]) = x[static_cast<Index>(link * places_.size() + k)];
+    return out;
+  }
+
+  const MatrixXd &compliance_, &grounding_;
+  std::vector<IdentifiedLink>& links_;
+  int frames_;
+  std::vector<std::array<int, 2>> places_;
+  std::vector<Matrix6x12d> measures_;
+  std::vector<Matrix6d> scales_;
+  VectorXd weight_, perResponse_;
+};
+
+}  // namespace
+
+MatrixXd networkStiffness(const std::vector<IdentifiedLink>& links, double lengthScale, int frames) {
+  MatrixXd sum = MatrixXd::Zero(6 * frames, 6 * frames);
+  for (const IdentifiedLink& link : links) {
+    const Matrix6x12d g = linkMeasures(link, lengthScale);
+    addLink(g.transpose() * link.stiffness * g, link.frame0, link.frame1, frames, sum);
+  }
+  return sum;
+}
+
+void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double lengthScale, LinkForm form,
+              std::vector<IdentifiedLink>& links, const std::function<void(double)>& progress) {
+  constexpr int warmUp = 60, iterations = 300;
+  constexpr double klWeight = 0.1, responseWeight = 100;
+  const LinkFit fit(compliance, grounding, lengthScale, form, links);
+  VectorXd x = fit.start();
+  int calls = 0;
+  const auto counting = [&](double kl, double response) {
+    return [&, kl, response](const VectorXd& at, VectorXd& gradient) {
+      if (progress) progress(std::min(1., calls++ / (1.1 * (warmUp + iterations))));
+      return fit.value(at, gradient, kl, response);
+    };
+  };
+  descend(counting(1, 0), {warmUp}, x);
+  descend(counting(klWeight, responseWeight), {iterations}, x);
+  fit.setStiffness(x);
+}
+
+}  // namespace medulla

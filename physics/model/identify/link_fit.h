@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "physics/model/identify/cell_frames.h"
+
+namespace medulla {
+
+enum class LinkForm { diagonal, full };  // six scalars along the link's axes, or any positive semidefinite matrix
+
+// Links between cells that share a face worth the name, and from cells to the patches that hold them, without
+// stiffness. `patchTriangles`: held triangles of each patch.
+std::vector<IdentifiedLink> layOutLinks(const TriangleMesh& mesh, const CellFrames& cells,
+                                        const std::vector<FixedPatch>& patches,
+                                        const std::vector<std::vector<int>>& patchTriangles);
+
+// The measures of a link at rest, linear in the motions (u, lengthScale theta) of its two frames; a patch does not
+// move.
+Eigen::Matrix<double, 6, 12> linkMeasures(const IdentifiedLink& link, double lengthScale);
+
+// Stiffness matrix of the network, 6 frames square.
+Eigen::MatrixXd networkStiffness(const std::vector<IdentifiedLink>& links, double lengthScale, int frames);
+
+// Sets the links' stiffness so that the network answers loads on its frames as finite elements do: `compliance` (6
+// frames square). Minimises the relative error of the responses to single loads, kept together by the Kullback-Leibler
+// divergence of the two normal distributions that have these stiffnesses. `grounding`, if not empty, is added to the
+// network's stiffness: what the compliance has on rigid motions of a free body. `progress` gets 0..1.
+void fitLinks(const Eigen::MatrixXd& compliance, const Eigen::MatrixXd& grounding, double lengthScale, LinkForm form,
+              std::vector<IdentifiedLink>& links, const std::function<void(double)>& progress);
+
+}  // namespace medulla

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "physics/model/identify/hex_grid.h"
+
+// Cholesky factors of a grid's stiffness matrix by nested dissection (George 1973) and fronts (Duff and Reid 1983):
+// the cells are halved again and again by planes; a front eliminates what no cell outside its part touches and hands
+// the rest, a dense matrix, to the front of both halves together. Nearly all work is on dense blocks.
+namespace medulla {
+
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+struct Front {
+  std::array<int, 2> halves = {-1, -1};  // fronts of its halves; -1 in a leaf
+  int firstCell = 0, cellCount = 0;      // of `cellOrder`
+  std::vector<int> nodes;                // of the grid; the first `own` are eliminated here
+  int own = 0;
+};
+
+struct DissectionPlan {
+  int nodes = 0;
+  std::vector<int> cellOrder;
+  std::vector<Front> fronts;  // halves before their whole; the root is the last
+  double factorNumbers = 0;   // in all factors
+  double operations = 0;      // multiplications and additions
+};
+
+DissectionPlan planDissection(const HexGrid& grid);
+
+struct FrontFactors {
+  // Of each front: 3 nodes x 3 own. Its upper square is the lower triangular L11, the rest is L21.
+  std::vector<Eigen::MatrixXd> columns;
+};
+
+// `cellStiffness` gives a cell's matrix (kHexFreedoms square, lower triangle read); called in the order of cellOrder.
+// `progress`, if given, is called with 0..1. Throws std::runtime_error where the matrix is not positive definite.
+FrontFactors factorise(const DissectionPlan& plan, const HexGrid& grid,
+                       const std::function<void(int cell, Eigen::MatrixXd& matrix)>& cellStiffness,
+                       const std::function<void(double)>& progress = {});
+
+// Solves in place: 3 nodes x right-hand sides.
+void solve(const DissectionPlan& plan, const FrontFactors& factors, RowMatrix& x);
+
+}  // namespace medulla

@@ -1,0 +1,214 @@
+#include "physics/model/identify/voxel_solid.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+
+#include "physics/model/identify/hex_stiffness.h"
+#include "physics/model/mass_properties.h"
+
+namespace medulla {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kPenalty = 100;  // times E / cell size: a hundredth of the cell's own give, of no account
+
+// The springs of held triangles, by cell: shape shape^T times stiffness, summed over points a third of a cell apart.
+using HeldCells = std::map<int, Eigen::Matrix<double, kHexNodes, kHexNodes>>;
+
+void holdPoint(const HexGrid& grid, const Vector3d& point, double stiffness, HeldCells& held) {
+  const HexPoint at = locate(grid, point);
+  const Eigen::Map<const Eigen::Matrix<double, kHexNodes, 1>> shape(at.shape.data());
+  held.try_emplace(at.cell, Eigen::Matrix<double, kHexNodes, kHexNodes>::Zero()).first->second +=
+      stiffness * shape * shape.transpose();
+}
+
+// Calls use(point, shapes, area) for points of a triangle a third of a cell apart, with linear shapes of its corners.
+template <typename Use>
+void overTriangle(const TriangleMesh& mesh, const std::array<int, 3>& corners, double cellSize, const Use& use) {
+  const Vector3d o = mesh.vertices[corners[0]], u = mesh.vertices[corners[1]] - o, v = mesh.vertices[corners[2]] - o;
+  const double longest = std::max({u.norm(), v.norm(), (u - v).norm()});
+  const int parts = std::max(1, static_cast<int>(std::ceil(longest / (cellSize / 3))));
+  const double area = u.cross(v).norm() / 2 / (parts * parts);
+  const auto at = [&](double a, double b) { use(o + a * u + b * v, Vector3d(1 - a - b, a, b), area); };
+  for (int i = 0; i < parts; ++i) {
+    for (int j = 0; i + j < parts; ++j) {
+      at((i + 1. / 3) / parts, (j + 1. / 3) / parts);
+      if (i + j + 1 < parts) at((i + 2. / 3) / parts, (j + 2. / 3) / parts);
+    }
+  }
+}
+
+void holdTriangles(const TriangleMesh& mesh, const std::vector<int>& triangles, const HexGrid& grid, HeldCells& held) {
+  for (const int t : triangles) {
+    overTriangle(mesh, mesh.triangles[t], grid.size, [&](const Vector3d& point, const Vector3d&, double area) {
+      holdPoint(grid, point, kPenalty / grid.size * area, held);
+    });
+  }
+}
+
+void holdSpace(const VoxelBody& voxels, const std::function<bool(const Vector3d&)>& space, const HexGrid& grid,
+               HeldCells& held) {
+  const double perHeight = kPenalty / (grid.size * grid.size) * voxels.size * voxels.size;
+  for (const VoxelPiece& piece : voxels.pieces)
+    if (space(piece.centre)) holdPoint(grid, piece.centre, perHeight * piece.height, held);
+}
+
+void addHeld(const Eigen::Matrix<double, kHexNodes, kHexNodes>& springs, MatrixXd& matrix) {
+  for (int b = 0; b < kHexNodes; ++b) {
+    for (int a = 0; a < kHexNodes; ++a) {
+      for (int k = 0; k < 3; ++k) matrix(3 * a + k, 3 * b + k) += springs(a, b);
+    }
+  }
+}
+
+RowSparse tractions(const TriangleMesh& mesh, const HexGrid& grid) {
+  std::vector<double> areas(mesh.vertices.size(), 0);
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    overTriangle(mesh, t, grid.size, [&](const Vector3d&, const Vector3d& shapes, double area) {
+      for (int c = 0; c < 3; ++c) areas[t[c]] += shapes[c] * area;
+    });
+  }
+  std::vector<Eigen::Triplet<double>> entries;
+  std::vector<std::map<int, double>> shares(mesh.vertices.size());  // by grid node
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    overTriangle(mesh, t, grid.size, [&](const Vector3d& point, const Vector3d& shapes, double area) {
+      const HexPoint at = locate(grid, point);
+      for (int c = 0; c < 3; ++c) {
+        const double share = shapes[c] * area / areas[t[c]];
+        for (int a = 0; a < kHexNodes; ++a) shares[t[c]][grid.cellNodes[at.cell][a]] += share * at.shape[a];
+      }
+    });
+  }
+  for (std::size_t n = 0; n < shares.size(); ++n) {
+    for (const auto& [node, share] : shares[n]) {
+      for (int k = 0; k < 3; ++k) entries.emplace_back(3 * node + k, static_cast<int>(3 * n) + k, share);
+    }
+  }
+  RowSparse out(3 * static_cast<Index>(grid.nodes.size()), 3 * static_cast<Index>(mesh.vertices.size()));
+  out.setFromTriplets(entries.begin(), entries.end());
+  return out;
+}
+
+struct GridPin {
+  int node = 0, axis = 0;
+};
+
+// Six freedoms of three nodes far apart: holding them takes the rigid motions away and no more.
+std::vector<GridPin> isostaticPins(const HexGrid& grid) {
+  const auto farthest = [&](const auto& distance) {
+    int best = 0;
+    for (std::size_t n = 1; n < grid.nodes.size(); ++n)
+      if (distance(grid.nodes[n]) > distance(grid.nodes[best])) best = static_cast<int>(n);
+    return best;
+  };
+  const int a = farthest([](const Vector3d& x) { return -x.x(); });
+  const Vector3d from = grid.nodes[a];
+  const int b = farthest([&](const Vector3d& x) { return (x - from).norm(); });
+  const Vector3d line = (grid.nodes[b] - from).normalized();
+  const int c = farthest([&](const Vector3d& x) { return (x - from).cross(line).norm(); });
+  // Of their nine freedoms the six that rigid motions move most independently.
+  const double size = (grid.nodes[b] - from).norm();
+  Eigen::Matrix<double, 6, 9> rigid;
+  for (int k = 0; k < 9; ++k) {
+    const Vector3d r = (grid.nodes[std::array{a, b, c}[k / 3]] - from) / size, axis = Vector3d::Unit(k % 3);
+    rigid.col(k).head<3>() = axis;
+    rigid.col(k).tail<3>() = r.cross(axis);
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 6, 9>> order(rigid);
+  std::vector<GridPin> pins;
+  for (int k = 0; k < 6; ++k) {
+    const int freedom = order.colsPermutation().indices()[k];
+    pins.push_back({std::array{a, b, c}[freedom / 3], freedom % 3});
+  }
+  return pins;
+}
+
+// By cell: the freedoms of it that are pinned, each pin in one cell only.
+std::map<int, std::vector<int>> pinnedFreedoms(const HexGrid& grid, const std::vector<GridPin>& pins) {
+  std::map<int, std::vector<int>> out;
+  for (const GridPin& pin : pins) {
+    for (std::size_t c = 0; c < grid.cells.size(); ++c) {
+      const auto& nodes = grid.cellNodes[c];
+      const auto at = std::find(nodes.begin(), nodes.end(), pin.node);
+      if (at == nodes.end()) continue;
+      out[static_cast<int>(c)].push_back(3 * static_cast<int>(at - nodes.begin()) + pin.axis);
+      break;
+    }
+  }
+  return out;
+}
+
+RowSparse interpolation(const HexGrid& grid, const std::vector<Vector3d>& points) {
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(points.size() * kHexFreedoms);
+  for (std::size_t p = 0; p < points.size(); ++p) {
+    const HexPoint at = locate(grid, points[p]);
+    for (int a = 0; a < kHexNodes; ++a) {
+      for (int k = 0; k < 3; ++k) {
+        entries.emplace_back(static_cast<int>(3 * p) + k, 3 * grid.cellNodes[at.cell][a] + k, at.shape[a]);
+      }
+    }
+  }
+  RowSparse out(3 * static_cast<Index>(points.size()), 3 * static_cast<Index>(grid.nodes.size()));
+  out.setFromTriplets(entries.begin(), entries.end());
+  return out;
+}
+
+}  // namespace
+
+VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
+                          const std::function<void(double)>& progress) {
+  VoxelSolid solid;
+  const double volume = massProperties(mesh).volume, voxel = cellSize / HexGrid::kVoxels;
+  solid.voxels = voxelise(mesh, volume, static_cast<int>(volume / (voxel * voxel * voxel)));
+  solid.grid = makeHexGrid(solid.voxels);
+  const HexGrid& grid = solid.grid;
+  solid.plan = planDissection(grid);
+  if (8 * solid.plan.factorNumbers > settings.memoryMax) {
+    throw std::runtime_error(
+        fmt::format("finite elements of {:.3g} mm would take {:.1f} GB, expected at most {:.1f} GB", 1e3 * grid.size,
+                    8e-9 * solid.plan.factorNumbers, 1e-9 * settings.memoryMax));
+  }
+  HeldCells held;
+  holdTriangles(mesh, settings.heldTriangles, grid, held);
+  if (settings.heldSpace) holdSpace(solid.voxels, settings.heldSpace, grid, held);
+  const auto pinned = pinnedFreedoms(grid, held.empty() ? isostaticPins(grid) : std::vector<GridPin>());
+  // A batch of cells at once makes their matrices by one large product.
+  constexpr std::size_t batch = 32;
+  const MatrixXd perPoint = stiffnessPerPoint(settings.poisson);
+  std::size_t next = 0;
+  MatrixXd stiffness;
+  const auto cellStiffness = [&](int cell, MatrixXd& matrix) {
+    if (next % batch == 0) {
+      const std::span<const int> rest = std::span(solid.plan.cellOrder).subspan(next);
+      stiffness = hexStiffness(grid, perPoint, rest.first(std::min(batch, rest.size())));
+    }
+    matrix = stiffness.col(static_cast<Index>(next++ % batch)).reshaped(kHexFreedoms, kHexFreedoms);
+    if (const auto springs = held.find(cell); springs != held.end()) addHeld(springs->second, matrix);
+    if (const auto pins = pinned.find(cell); pins != pinned.end()) {
+      for (const int freedom : pins->second) matrix(freedom, freedom) += grid.size;
+    }
+  };
+  solid.factors = factorise(solid.plan, grid, cellStiffness, progress);
+  solid.surface = interpolation(grid, mesh.vertices);
+  solid.loading = tractions(mesh, grid);
+  return solid;
+}
+
+RowMatrix displacementsUnder(const VoxelSolid& solid, const RowMatrix& forces) {
+  RowMatrix x = solid.loading * forces;
+  solve(solid.plan, solid.factors, x);
+  return x;
+}
+
+}  // namespace medulla

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <Eigen/SparseCore>
+#include <functional>
+#include <vector>
+
+#include "physics/model/identify/multifrontal.h"
+#include "physics/model/triangle_mesh.h"
+
+namespace medulla {
+
+using RowSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+// The body as finite elements, per pascal of Young's modulus: quadratic cells of a regular grid, held by stiff springs
+// on whole triangles of the surface and on material (penalty 100 / cell size, and that over the cell size). A body that
+// nothing holds stands on six springs that hold rigid motions alone: they carry nothing under balanced loads.
+struct VoxelSolid {
+  VoxelBody voxels;  // HexGrid::kVoxels of them along a cell's edge
+  HexGrid grid;
+  DissectionPlan plan;
+  FrontFactors factors;
+  RowSparse surface;  // 3 mesh nodes x 3 grid nodes: displacement of the mesh's nodes
+  RowSparse loading;  // 3 grid nodes x 3 mesh nodes: a node's force as a traction that falls to 0 on its neighbours
+};
+
+struct SolidSettings {
+  double poisson = 0.45;  // 0 <= poisson < 0.5
+  std::vector<int> heldTriangles;
+  std::function<bool(const Eigen::Vector3d&)> heldSpace;  // holds the material there, too; empty: none
+  double memoryMax = 3e9;                                 // bytes for the factors
+};
+
+// `cellSize` is met within a percent. Throws std::runtime_error where the factors would not fit.
+VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
+                          const std::function<void(double)>& progress = {});
+
+// Displacements of the grid's nodes under forces on the mesh's nodes (3 mesh nodes x loads).
+RowMatrix displacementsUnder(const VoxelSolid& solid, const RowMatrix& forces);
+
+}  // namespace medulla

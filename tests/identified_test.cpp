@@ -1,0 +1,166 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "physics/dynamics/body_mechanics.h"
+#include "physics/dynamics/rest_modes.h"
+#include "tests/identified_model.h"
+
+// Links, skin and patches of an identified network, whatever its numbers.
+namespace medulla {
+
+using namespace states;
+
+namespace {
+
+constexpr double kYoung = 5e3;
+
+// Five spheres, 20 mm apart; the first one's end is held.
+BodyDescription chain(SurfaceMode surface, bool held, double damping = 0, double uneven = 0.3) {
+  const auto tube = synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10));
+  synthetic::NetworkSettings settings;
+  settings.uneven = uneven;
+  settings.frames = 4;
+  if (held)
+    for (int i = 0; i < 11; ++i) settings.held.push_back(i);
+  BodyDescription out =
+      synthetic::identifiedBody(synthetic::withNetwork(*tube, settings, {0.001, -0.002, 0.001}), kYoung);
+  out.surface = surface;
+  out.tissue.damping = damping;
+  return out;
+}
+
+WorldSettings weightless(int substeps = 0) {
+  WorldSettings s;
+  s.gravity.setZero();
+  s.substeps = substeps;
+  return s;
+}
+
+// Of one sphere against the next, rad, either way round.
+double turnAgainstNext(const WorldData& d, int i) {
+  const Quaterniond q = orientation(d, i).conjugate() * orientation(d, i + 1);
+  return 2 * std::atan2(q.vec().norm(), q.w());
+}
+
+}  // namespace
+
+TEST(IdentifiedLink, ForcesAreMinusTheEnergyGradient) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    World world(weightless(), {chain(SurfaceMode::skin, true)});
+    shake(world.data(), seed, seed <= 3 ? 0.2 : 1.0, 0.004, 0);
+    expectForcesAreMinusGradient(world.data(), 1e-6);
+  }
+}
+
+TEST(IdentifiedLink, ForcesAreMinusTheGradientTurnedByAnyAngle) {
+  // Beyond 232 degrees the rotation vector falls back, and forces are its slope still.
+  for (const double degrees : {60.0, 120.0, 170.0, 179.99, 200.0, 231.0, 260.0, 320.0}) {
+    World world(weightless(), {chain(SurfaceMode::skin, false)});
+    WorldData& d = world.data();
+    shake(d, 4, 0.05, 0.002, 0);
+    const Vector3d turn = degrees / 180 * std::numbers::pi * Vector3d(0.5, -0.7, 0.3).normalized();
+    for (int i = 2; i < 5; ++i) {
+      turnBy(d, i, 0.5 * turn);  // in two halves: which way round is the quaternions' to tell
+      turnBy(d, i, 0.5 * turn);
+    }
+    ASSERT_NEAR(turnAgainstNext(d, 1), degrees / 180 * std::numbers::pi, 0.15);
+    expectForcesAreMinusGradient(d, 2e-6);
+  }
+}
+
+TEST(IdentifiedSurface, ForcesOnNodesAndSpheresAreMinusTheEnergyGradient) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    World world(weightless(), {chain(SurfaceMode::full, true)});
+    shake(world.data(), seed, seed <= 2 ? 0.2 : 0.7, 0.003, 0);
+    expectForcesAreMinusGradient(world.data(), 1e-6);
+  }
+}
+
+TEST(IdentifiedSurface, FollowsARigidMotionRigidly) {
+  for (const SurfaceMode surface : {SurfaceMode::skin, SurfaceMode::full}) {
+    World world(weightless(), {chain(surface, false)});
+    WorldData& d = world.data();
+    const Quaterniond q(Eigen::AngleAxisd(2.8, Vector3d(0.3, 0.5, -0.8).normalized()));
+    const Vector3d shift(0.1, -0.2, 0.05);
+    const SoftBodyModel& m = *d.bodies[0].model;
+    for (int i = 0; i < d.spheres.count; ++i) {
+      d.spheres.position[i] = quadOf(q * vectorOf(d.spheres.position[i]) + shift);
+      setOrientation(d, i, q);
+    }
+    for (const int i : d.ranges[0].node) setVector(d.nodes.position, i, q * vectorAt(d.nodes.position, i) + shift);
+    runStage(d, evaluateForces);
+    placeCarriedNodes(d);
+    for (std::size_t i = 0; i < m.restNodes.size(); ++i)
+      EXPECT_LT((vectorAt(d.nodes.position, d.ranges[0].node[i]) - q * m.restNodes[i] - shift).norm(), 1e-15);
+    EXPECT_LT(elastic(d), 1e-25);
+    for (int i = 0; i < d.spheres.count; ++i) EXPECT_LT(vectorOf(d.spheres.force[i]).norm(), 1e-12);
+  }
+}
+
+TEST(IdentifiedBody, MomentaOfAFreeBodyStayWhileItIsDamped) {
+  for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    World world(weightless(), {chain(surface, false, 0.1)});
+    shake(world.data(), 3, 0.3, 0.002, 0.1);
+    const Momentum before = momentum(world.data());
+    for (int i = 0; i < 50; ++i) world.advance({});
+    const Momentum after = momentum(world.data());
+    EXPECT_LT((after.linear - before.linear).norm(), 1e-12 * before.linearScale);
+    EXPECT_LT((after.angular - before.angular).norm(), 1e-12 * before.angularScale);
+  }
+}
+
+TEST(IdentifiedBody, EnergyOfAnUndampedBodyDoesNotDrift) {
+  World world(weightless(200), {chain(SurfaceMode::full, false)});
+  shake(world.data(), 5, 0.1, 0.0005, 0.05);
+  const Energies start = world.energies();
+  double largest = 0;
+  for (int i = 0; i < 250; ++i) {
+    world.advance({});
+    const Energies e = world.energies();
+    largest = std::max(largest, std::abs(e.kinetic + e.elastic - start.kinetic - start.elastic));
+  }
+  EXPECT_LT(largest, 0.02 * (start.kinetic + start.elastic));
+  EXPECT_GT(world.energies().kinetic, 0.05 * start.kinetic);
+}
+
+TEST(IdentifiedBody, DampingTakesEnergyInEveryFrame) {
+  for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    World world(weightless(400), {chain(surface, true, 0.1)});
+    shake(world.data(), 7, 0.3, 0.002, 0.1);
+    double before = world.energies().kinetic + world.energies().elastic;
+    const double start = before;
+    for (int i = 0; i < 40; ++i) {
+      world.advance({});
+      const double now = world.energies().kinetic + world.energies().elastic;
+      EXPECT_LE(now, before + 1e-9 * start) << "frame " << i;
+      before = now;
+    }
+    EXPECT_LT(before, 0.5 * start);
+  }
+}
+
+TEST(IdentifiedBody, StableAtTheEstimateAndUnstableWellAbove) {
+  for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    const double stable = World(weightless(), {chain(surface, true)}).stableSubstep();
+    const auto grows = [&](double step) {
+      WorldSettings settings = weightless(100);
+      settings.frameDuration = 100 * step;
+      World world(settings, {chain(surface, true)});
+      shake(world.data(), 2, 1e-4, 1e-6, 0);
+      const double start = world.energies().elastic;
+      try {
+        for (int i = 0; i < 30; ++i) world.advance({});
+      } catch (const std::runtime_error&) {
+        return true;
+      }
+      const Energies e = world.energies();
+      return e.kinetic + e.elastic > 100 * start;
+    };
+    EXPECT_FALSE(grows(0.95 * stable));
+    EXPECT_TRUE(grows(1.1 * stable));
+  }
+}
+
+}  // namespace medulla
