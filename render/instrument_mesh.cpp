@@ -33,7 +33,7 @@ class Builder {
     mesh_.uv.push_back(40.f * glm::vec2(p.z, p.x + p.y));
     mesh_.albedo.push_back(albedo);
     mesh_.openness.push_back(openness);
-    mesh_.blanch.push_back(0);
+    for (auto* none : {&mesh_.thinness, &mesh_.area, &mesh_.hollow, &mesh_.blanch}) none->push_back(0);
     return i;
   }
   // Corners counter-clockwise from outside.

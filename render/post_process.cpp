@@ -147,7 +147,7 @@ void PostProcess::addGlare(Image& image) {
     for (int cx = 0; cx + 1 < cellsX_; ++cx) {
       const float* g = &glare_[std::size_t(cy) * cellsX_ + cx];
       const float a = g[0], b = g[1], c = g[cellsX_], d = g[cellsX_ + 1];
-      if (a + b + c + d < 1) continue;
+      if (kGlareAmount * std::max({a, b, c, d}) < kRound) continue;  // no level of difference
       const int x0 = cx * kCell - kCell / 2, y0 = cy * kCell - kCell / 2;
       for (int y = std::max(y0, 0); y < std::min(y0 + kCell, height_); ++y)
         for (int x = std::max(x0, 0); x < std::min(x0 + kCell, width_); ++x) {

@@ -174,6 +174,7 @@ void Renderer::Data::placeSurfaces(const Picture& picture) {
       std::copy(rest.position.begin() + first, rest.position.begin() + last, mesh.position.begin() + first);
       std::copy(rest.normal.begin() + first, rest.normal.begin() + last, mesh.normal.begin() + first);
       std::copy(rest.tangent.begin() + first, rest.tangent.begin() + last, mesh.tangent.begin() + first);
+      std::copy(rest.area.begin() + first, rest.area.begin() + last, mesh.area.begin() + first);
     }
   }
 }

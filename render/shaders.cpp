@@ -83,7 +83,7 @@ void main() {
 }
 )";
 
-// surface: mottling, vessel opacity, slope of the film's relief, share of it in the diffuse light.
+// surface: mottling, vessel opacity, slope of the film's relief, how far red light bleeds into shadow.
 const char* const kTissueFragmentShader = R"(
 noperspective in vec4 vDirect;
 noperspective in vec4 vAmbient;
@@ -131,11 +131,11 @@ void main() {
   float d1 = x * lobes.x + 1., d2 = x * lobes.z + 1.;
   float gloss = vDirect.w * (lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), tint.w));
 #endif
-  vec3 diffuse = vDirect.rgb * (1. - along * surface.w);
+  vec3 diffuse = vDirect.rgb * (1. - along * .9);
 #if SHADE == 1
   float s = softShadow(vShadow.xyz / vShadow.w * .5 + .5, vAmbient.w);
   // Light bleeds into the shadow's edge through the tissue, and red light farthest.
-  diffuse *= vec3(mix(s, sqrt(s), .5) * .955 + .045, s, s);
+  diffuse *= vec3(mix(s, mix(s, sqrt(s), .5) * .955 + .045, surface.w), s, s);
   gloss *= s;
 #endif
   vec3 colour = detailColour * (diffuse + vAmbient.rgb) + gloss * vec3(1., .97, .93);

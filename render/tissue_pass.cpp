@@ -4,6 +4,7 @@
 #include <GL/gl.h>
 #include <GL/glext.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/gtc/type_ptr.hpp>
 
@@ -156,11 +157,11 @@ void TissuePass::draw(const SceneMesh& mesh, const DrawLists& lists, const std::
     const Look& look = *mesh.parts[run.part].look;
     const Program& p = programs_[static_cast<std::size_t>(run.variant)];
     const GlossLobes lobes = glossLobes(look);
-    constexpr float kDiffuseRelief = 0.9f;
+    const float bleed = std::clamp(4 * (look.wrap.r - look.wrap.b), 0.f, 1.f);
     glUseProgram(p.id);
     glUniformMatrix4fv(p.clipFromWorld, 1, GL_FALSE, glm::value_ptr(view.clipFromWorld));
     glUniformMatrix4fv(p.shadowFromWorld, 1, GL_FALSE, glm::value_ptr(lightView.clipFromWorld));
-    glUniform4f(p.surface, look.mottle, look.vessels, look.bump, kDiffuseRelief);
+    glUniform4f(p.surface, look.mottle, look.vessels, look.bump, bleed);
     glUniform4f(p.lobes, lobes.a1 - 1, lobes.c1, lobes.a2 - 1, lobes.c2);
     glUniform4f(p.tint, look.vesselTint.x, look.vesselTint.y, look.vesselTint.z, kFilmPeak);
     glUniform1f(p.opacity, opacity);

@@ -19,13 +19,15 @@ void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part) {
 namespace {
 
 // x -> x + offset exp(-(x - centre)^2 / width^2), m. A normal turns to n - grad w (offset . n), up to length (inverse
-// transpose, first order).
+// transpose, first order). What lies next to the centre loses its blood.
 void displace(const MeshPart& part, glm::vec3 centre, glm::vec3 offset, float width, SceneMesh& mesh) {
-  constexpr float kShade = 1.8f;  // share of the cavity's light lost, per slope
+  constexpr float kShade = 1.8f;           // share of the cavity's light lost, per slope
+  constexpr float kBlanchWidth = 0.0050f;  // m
   for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
     const glm::vec3 d = mesh.position[i] - centre;
     const float q = glm::dot(d, d) / (width * width);
     if (q > 9) continue;
+    mesh.blanch[i] = glm::mix(mesh.blanch[i], 1.f, std::exp(-glm::dot(d, d) / (kBlanchWidth * kBlanchWidth)));
     const float w = std::exp(-q);
     const glm::vec3 gradient = d * (-2 * w / (width * width));
     const float along = glm::dot(offset, mesh.normal[i]);
@@ -60,25 +62,18 @@ Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
 
 // The simulation moves nodes a centimetre apart; this is what happens between them.
 void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
-  constexpr float kWidth = 0.0055f, kBlanchWidth = 0.0050f, kPressed = 0.0014f;  // m
+  constexpr float kWidth = 0.0055f, kPressed = 0.0014f;  // m
   // A smooth surface stays behind the held nodes that it hangs on, up to kReach; the jaws bite kBite of it.
   constexpr float kReach = 0.014f, kBite = 0.0035f;
   const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, 1);
-  glm::vec3 blanched = instrument.tip;
   if (instrument.holding) {
     const Nearest held = nearestMoving(mesh, instrument.tip, kReach);
     if (!held.part) return;
     const glm::vec3 offset = instrument.tip + kBite * axis - held.position;
     displace(*held.part, held.position, offset, std::max(kWidth, 1.3f * glm::length(offset)), mesh);
-    blanched += kBite * axis;
   } else {
     for (const MeshPart& part : mesh.parts)
       if (!part.instrument) displace(part, instrument.tip, -kPressed * axis, kWidth, mesh);
-  }
-  for (std::size_t i = 0; i < mesh.position.size(); ++i) {
-    const glm::vec3 d = mesh.position[i] - blanched;
-    const float q = glm::dot(d, d) / (kBlanchWidth * kBlanchWidth);
-    if (q < 9) mesh.blanch[i] = std::max(mesh.blanch[i], std::exp(-q));
   }
 }
 

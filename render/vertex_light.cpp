@@ -126,11 +126,17 @@ bool canGlint(float gloss, float cosine, const Look& look, const GlossLobes& lob
   return gloss * (lobes.c1 / (d1 * d1) + std::min(lobes.c2 / (d2 * d2), kFilmPeak)) > kVisible;
 }
 
+// m to the next vertices: six even triangles of edge e have, twice, 5.2 e^2.
+float spacingOf(const SceneMesh& mesh, std::size_t i) {
+  return 0.44f * std::sqrt(mesh.area[i]);
+}
+
 // Is the vertex lit, dark, or near an edge? Looks around it in the shadow map as far as a soft edge reaches; the
 // distance of what it finds in the way sets how soft the edge is (Fernando 2005, percentage-closer soft shadows).
-Shade shadeVertex(const ShadowMap& shadow, vec3 texel, const Shading& v, const LightView& light, LitVertex& out) {
+Shade shadeVertex(const ShadowMap& shadow, vec3 texel, float spacing, const Shading& v, const LightView& light,
+                  LitVertex& out) {
   struct Tap {
-    float x, y, away;  // texels
+    float x, y, away;  // of 22
   };
   constexpr Tap kTaps[] = {{0, 0, 0},       {18, 0, 18},      {-18, 0, 18},     {0, 18, 18},       {0, -18, 18},
                            {13, 13, 18.4f}, {13, -13, 18.4f}, {-13, 13, 18.4f}, {-13, -13, 18.4f}, {8, 4, 8.9f},
@@ -144,13 +150,16 @@ Shade shadeVertex(const ShadowMap& shadow, vec3 texel, const Shading& v, const L
   const float range = light.farDistance * light.nearDistance / (light.farDistance - light.nearDistance);
   const float depthPerMetre = range / (v.lightDistance * v.lightDistance);
   const float metresPerTexel = 2 * v.lightDistance * light.tangent / kShadowSide;
+  // As far as a soft edge reaches beyond the middle between this vertex and the next ones, m apart.
+  constexpr float kSoft = 8.5f, kFarthest = 22;  // texels
+  const float reach = std::min(kSoft + 0.8f * spacing / metresPerTexel, kFarthest) / kFarthest;
   int lit = 0, tried = 0;
   float blockers = 0, blockerDepth = 0;
   for (const Tap& tap : kTaps) {
-    const int x = int(texel.x + tap.x), y = int(texel.y + tap.y);
+    const int x = int(texel.x + reach * tap.x), y = int(texel.y + reach * tap.y);
     if (x < 0 || y < 0 || x >= kShadowSide || y >= kShadowSide) continue;
     ++tried;
-    const float bias = kMinimumBias + depthPerMetre * (0.5f + tap.away) * metresPerTexel * (slope + kBend);
+    const float bias = kMinimumBias + depthPerMetre * (0.5f + reach * tap.away) * metresPerTexel * (slope + kBend);
     const float depth = shadow.map.at(x, y);
     if (texel.z - bias <= depth)
       ++lit;
@@ -245,7 +254,8 @@ void lightVertices(const SceneMesh& mesh, const VisibleTriangles& seen, const Vi
       const Shading v = lightVertex(mesh, *part.look, i, seen.picture[i], s, o);
       out.glinting[k] = canGlint(o.gloss, o.halfway.z, *part.look, lobes);
       // Instruments take no shadow: the light sits beside the lens, and a thin jaw only shadows itself in stripes.
-      if (shadow && !part.instrument) out.shade[k] = shadeVertex(*shadow, shadow->texel[i], v, lightView, o);
+      if (shadow && !part.instrument)
+        out.shade[k] = shadeVertex(*shadow, shadow->texel[i], spacingOf(mesh, i), v, lightView, o);
     }
   }
 }
