@@ -8,7 +8,9 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <deque>
 #include <stdexcept>
+#include <utility>
 
 #include "render/gl_context.h"
 #include "render/haze.h"
@@ -102,6 +104,8 @@ struct Renderer::Data {
   PostProcess post;
   LightTables tables;
   Image fine;
+  std::deque<bool> begun;  // of pictures not yet taken, the oldest first: whether they are round
+  Image held;              // the older of two, read back
 
   SceneMesh mesh;  // surfaces at their place in this picture, then instruments
   SceneMesh rest;  // surfaces at rest, baked
@@ -277,27 +281,51 @@ void Renderer::Data::finish(bool round, Image& out) {
   post.fadeRim(out);
 }
 
-void Renderer::render(const Picture& picture, Image& out, StageTimes* times) {
-  const auto stage = [times](const char* name) {
-    if (times) times->start(name);
-  };
+static void start(StageTimes* times, const char* stage) {
+  if (times) times->start(stage);
+}
+
+void Renderer::begin(const Picture& picture, StageTimes* times) {
   Data& d = *data_;
+  assert(d.begun.size() < 2);
   d.context->makeCurrent();
   const bool round = picture.endoscopeMask && picture.view != ViewKind::model;
   const Viewpoint view = makeViewpoint(picture.camera, float(d.settings.width) / float(d.settings.height), round);
-  stage("bake");
+  start(times, "bake");
   d.bake();
-  stage("place");
+  start(times, "place");
   d.placeSurfaces(picture);
   d.placeInstruments(picture);
-  stage("light");
+  start(times, "light");
   d.lightAndSort(picture, view);
-  stage("draw");
+  start(times, "read back");
+  if (!d.begun.empty()) d.readBack(d.held);
+  start(times, "draw");
   d.draw(picture, view);
-  d.readBack(d.settings.supersample > 1 ? d.fine : out);
-  stage("finish");
-  d.finish(round, out);
+  glFlush();
+  d.begun.push_back(round);
   if (times) times->stop();
+}
+
+void Renderer::take(Image& out, StageTimes* times) {
+  Data& d = *data_;
+  assert(!d.begun.empty());
+  d.context->makeCurrent();
+  start(times, "read back");
+  Image& drawn = d.settings.supersample > 1 ? d.fine : out;
+  if (d.begun.size() == 2)
+    std::swap(drawn, d.held);
+  else
+    d.readBack(drawn);
+  start(times, "finish");
+  d.finish(d.begun.front(), out);
+  d.begun.pop_front();
+  if (times) times->stop();
+}
+
+void Renderer::render(const Picture& picture, Image& out, StageTimes* times) {
+  begin(picture, times);
+  take(out, times);
 }
 
 RendererSettings rendererSettings(int width, int height, const std::string& context, Quality quality) {

@@ -126,6 +126,10 @@ class Renderer {
   Renderer(Renderer&&) noexcept;
   int addSurface(SurfaceShape shape);  // throws std::runtime_error on an unknown look, naming the known ones
   void render(const Picture& picture, Image& out, StageTimes* times = nullptr);  // adds to `times`, if given
+  // The same in two steps: OpenGL's threads fill one picture while the next is placed and lit. begin() may be one
+  // picture ahead of take(), which gives the pictures in their order.
+  void begin(const Picture& picture, StageTimes* times = nullptr);
+  void take(Image& out, StageTimes* times = nullptr);
   std::string description() const;  // GL_RENDERER and GL_VERSION: golden images record it
 
  private:

@@ -30,13 +30,13 @@ void StageTimes::start(const std::string& name) {
   running_ = static_cast<int>(known - stages_.begin());
   if (known == stages_.end()) stages_.push_back({name, 0, 0});
   wall_ = wallSeconds();
-  cpu_ = cpuClock_();
+  cpu_ = threadCpuSeconds();
 }
 
 void StageTimes::stop() {
   if (running_ < 0) return;
   stages_[running_].wall += wallSeconds() - wall_;
-  stages_[running_].cpu += cpuClock_() - cpu_;
+  stages_[running_].cpu += threadCpuSeconds() - cpu_;
   running_ = -1;
 }
 

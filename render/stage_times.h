@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,21 +12,18 @@ double threadCpuSeconds();
 // By the clock, s; from an unknown beginning on.
 double wallSeconds();
 
-// What takes the time of repeated work, by stages that follow each other.
+// What takes the time of one thread's repeated work, by stages that follow each other.
 class StageTimes {
  public:
   struct Stage {
     std::string name;
-    double wall = 0, cpu = 0;  // s, in all
+    double wall = 0, cpu = 0;  // s, in all; CPU of the thread that starts and stops
   };
-  // `cpu`: the clock of those threads that the stages employ.
-  explicit StageTimes(std::function<double()> cpu = processCpuSeconds) : cpuClock_(std::move(cpu)) {}
   void start(const std::string& name);  // ends the stage before; stages of one name add up
   void stop();
   const std::vector<Stage>& stages() const { return stages_; }  // in the order of their first start
 
  private:
-  std::function<double()> cpuClock_;
   std::vector<Stage> stages_;
   int running_ = -1;
   double wall_ = 0, cpu_ = 0;

@@ -1,9 +1,7 @@
 #include "app/commands/artist.h"
 
 #include <fmt/format.h>
-#include <pthread.h>
 
-#include <ctime>
 #include <utility>
 
 #include "app/files/content_hash.h"
@@ -14,8 +12,8 @@ namespace medulla {
 
 namespace {
 
-// One that is drawn, one that waits: more only costs memory.
-constexpr int kSheets = 3;  // and one that is composed
+// Two that are drawn, one that waits, one that is composed: more only costs memory.
+constexpr int kSheets = 4;
 
 // Even, as videos need it; what that leaves over stays black between the panels.
 int panelWidth(const Scene& scene, const ViewOptions& view) {
@@ -53,6 +51,9 @@ struct Artist::Desk {
   Image panel, image;
   Progress progress;
   int done = 0;
+  std::deque<std::unique_ptr<Sheet>> begun;  // pictures at work, the oldest first
+  int ahead = 0;                             // panels begun and not taken
+  int taken = 0;                             // panels of the oldest picture
 
   Desk(const LoadedScene& loaded, const RenderOptions& options, int first, int count, int width,
        const DynamicsFrame& rest)
@@ -68,9 +69,7 @@ Artist::Artist(const LoadedScene& loaded, const RenderOptions& options, int firs
       options_(&options),
       first_(first),
       count_(count),
-      panelWidth_(panelWidth(loaded.scene, options.view)),
-      caller_(pthread_self()),
-      times_([this] { return ownCpuSeconds(); }) {
+      panelWidth_(panelWidth(loaded.scene, options.view)) {
   for (int k = 0; k < kSheets; ++k) spare_.push_back(std::make_unique<Sheet>());
   thread_ = std::thread([this, &rest] { work(rest); });
   std::unique_lock lock(mutex_);
@@ -88,15 +87,6 @@ Artist::~Artist() {
   }
   changed_.notify_all();
   if (thread_.joinable()) thread_.join();
-}
-
-// Of drawing and its raster threads: all but the caller's and the encoders', which have rows of their own.
-double Artist::ownCpuSeconds() const {
-  clockid_t clock{};
-  timespec caller{};
-  if (pthread_getcpuclockid(caller_, &clock) == 0) clock_gettime(clock, &caller);
-  const double others = desk_ ? desk_->outputs.encoding().cpu : 0;
-  return processCpuSeconds() - static_cast<double>(caller.tv_sec) - 1e-9 * static_cast<double>(caller.tv_nsec) - others;
 }
 
 void Artist::work(const DynamicsFrame& rest) {
@@ -125,19 +115,52 @@ void Artist::drawAll() {
     times_.start("idle");
     std::unique_ptr<Sheet> sheet = next();
     if (!sheet) break;
-    if (sheet->needed) drawSheet(*sheet);
-    desk_->progress.update(++desk_->done);
-    {
-      const std::lock_guard lock(mutex_);
-      spare_.push_back(std::move(sheet));
+    if (!sheet->needed) {
+      giveBack(std::move(sheet));
+      continue;
     }
-    changed_.notify_all();
+    desk_->begun.push_back(std::move(sheet));
+    // The first panel of this picture meets the last one of the picture before.
+    for (const Picture& panel : desk_->begun.back()->panels) {
+      desk_->renderer.begin(panel, &times_);
+      if (++desk_->ahead == 2) takePanel();
+    }
   }
   if (abandoned_) return;
+  while (desk_->ahead > 0) takePanel();
   times_.start("end files");
   desk_->outputs.finish();
   times_.stop();
   encoding_ = desk_->outputs.encoding();
+}
+
+void Artist::takePanel() {
+  Desk& desk = *desk_;
+  const int count = static_cast<int>(options_->view.panels.size()), room = loaded_->scene.width - panelWidth_;
+  desk.renderer.take(count == 1 ? desk.image : desk.panel, &times_);
+  --desk.ahead;
+  if (count > 1) copyInto(desk.panel, desk.taken * room / (count - 1), desk.image);
+  if (++desk.taken < count) return;
+  desk.taken = 0;
+  std::unique_ptr<Sheet> sheet = std::move(desk.begun.front());
+  desk.begun.pop_front();
+  times_.start("letters");
+  if (sheet->chart) drawStripChart(*sheet->chart, desk.image);
+  if (!sheet->caption.empty()) drawCaption(sheet->caption, desk.image);
+  times_.start("hand over");
+  desk.outputs.write(sheet->number, desk.image);
+  ++drawn_;
+  giveBack(std::move(sheet));
+}
+
+// Back to the caller.
+void Artist::giveBack(std::unique_ptr<Sheet> sheet) {
+  desk_->progress.update(++desk_->done);
+  {
+    const std::lock_guard lock(mutex_);
+    spare_.push_back(std::move(sheet));
+  }
+  changed_.notify_all();
 }
 
 // nullptr: there are no more.
@@ -148,21 +171,6 @@ std::unique_ptr<Artist::Sheet> Artist::next() {
   std::unique_ptr<Sheet> sheet = std::move(waiting_.front());
   waiting_.pop_front();
   return sheet;
-}
-
-void Artist::drawSheet(const Sheet& sheet) {
-  Desk& desk = *desk_;
-  const int count = static_cast<int>(sheet.panels.size()), room = loaded_->scene.width - panelWidth_;
-  for (int k = 0; k < count; ++k) {
-    desk.renderer.render(sheet.panels[k], count == 1 ? desk.image : desk.panel, &times_);
-    if (count > 1) copyInto(desk.panel, k * room / (count - 1), desk.image);
-  }
-  times_.start("letters");
-  if (sheet.chart) drawStripChart(*sheet.chart, desk.image);
-  if (!sheet.caption.empty()) drawCaption(sheet.caption, desk.image);
-  times_.start("hand over");
-  desk.outputs.write(sheet.number, desk.image);
-  ++drawn_;
 }
 
 void Artist::rethrow() {

@@ -50,14 +50,13 @@ class Artist {
   void work(const DynamicsFrame& rest);
   std::unique_ptr<Sheet> next();
   void drawAll();
-  void drawSheet(const Sheet& sheet);
-  double ownCpuSeconds() const;
+  void takePanel();
+  void giveBack(std::unique_ptr<Sheet> sheet);
   void rethrow();
 
   const LoadedScene* loaded_;
   const RenderOptions* options_;
   int first_, count_, panelWidth_;  // panelWidth_: px
-  pthread_t caller_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<std::unique_ptr<Sheet>> waiting_, spare_;
