@@ -24,16 +24,16 @@ static void requireFile(const Scene& scene, int line, const std::string& what, c
 
 // As the build's command line says it.
 static std::string regionText(const NodeChoice& choice) {
-  const auto text = [](const Eigen::Vector3d& a) { return fmt::format("{} {} {}", a.x(), a.y(), a.z()); };
+  const auto text = [](const Eigen::Vector3d& a) { return fmt::format("{},{},{}", a.x(), a.y(), a.z()); };
   if (!choice.verticesPath.empty()) return "vertices=" + choice.verticesPath;
   const Region& r = choice.region;
   switch (r.shape) {
     case Region::Shape::box:
-      return fmt::format("box={} {}", text(r.box.min()), text(r.box.max()));
+      return fmt::format("box={},{}", text(r.box.min()), text(r.box.max()));
     case Region::Shape::ball:
-      return fmt::format("sphere={} {}", text(r.centre), r.radius);
+      return fmt::format("sphere={},{}", text(r.centre), r.radius);
     case Region::Shape::halfSpace:
-      return fmt::format("plane={} {}", text(r.normal), r.distance);
+      return fmt::format("plane={},{}", text(r.normal), r.distance);
   }
   return {};
 }
@@ -42,7 +42,7 @@ static std::string regionText(const NodeChoice& choice) {
 static std::string identifyingCommand(const SoftBodyModel& model, const SceneBody& body) {
   std::string out = model.settings.substr(0, model.settings.find(" --identify"));
   out += fmt::format(" --identify --poisson {}", body.tissue.poisson);
-  for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix \"{}\"", regionText(fix.nodes));
+  for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix {}", regionText(fix.nodes));
   return out;
 }
 

@@ -78,6 +78,58 @@ TEST(IdentifiedSurface, ForcesOnNodesAndSpheresAreMinusTheEnergyGradient) {
   }
 }
 
+// Where the definition (identified_network.h) puts a node.
+static Vector3d defined(const WorldData& d, int node) {
+  const SoftBodyModel& m = *d.bodies[0].model;
+  const IdentifiedNetwork& n = *m.identified;
+  const auto log = [](const Quaterniond& q) -> Vector3d {
+    const Eigen::AngleAxisd a(q);
+    return a.angle() * a.axis();
+  };
+  const auto exp = [](const Vector3d& w) { return Quaterniond(Eigen::AngleAxisd(w.norm(), w.normalized())); };
+  const std::vector<SkinFrame>& skin = n.skin[node];
+  std::vector<Vector3d> x;
+  std::vector<Quaterniond> q;
+  Vector3d mean = Vector3d::Zero(), restMean = mean, turn = mean;
+  for (const SkinFrame& f : skin) {
+    const Vector3d arm = n.frames[f.frame].restPosition - m.spheres[f.frame].restFrame;
+    q.push_back(orientation(d, f.frame));
+    x.push_back(vectorOf(d.spheres.position[f.frame]) + q.back() * arm);
+    mean += f.weight * x.back();
+    restMean += f.weight * f.restPoint;
+    turn += f.weight * log(q[0].conjugate() * q.back());
+  }
+  const Quaterniond blend = q[0] * exp(turn);
+  Vector3d offset = m.restNodes[node] - restMean;
+  for (std::size_t k = 0; k < skin.size(); ++k) {
+    Eigen::Matrix<double, 6, 1> z;
+    z << blend.conjugate() * (x[k] - mean) - (skin[k].restPoint - restMean),
+        n.lengthScale * log(blend.conjugate() * q[k]);
+    offset += skin[k].map * z;
+  }
+  return mean + blend * offset;
+}
+
+// To first order in how far neighbours are turned whatever the maps, to second without or with isotropic ones.
+TEST(IdentifiedSurface, NodesAreWhereTheDefinitionPutsThem) {
+  for (const double uneven : {0.0, 0.3}) {
+    const auto farthest = [&](double share) {
+      World world(weightless(), {chain(SurfaceMode::skin, false, 0, uneven)});
+      WorldData& d = world.data();
+      shake(d, 6, share, 0.01 * share, 0);
+      placeCarriedNodes(d);
+      double most = 0;
+      for (std::size_t i = 0; i < d.ranges[0].node.size(); ++i)
+        most =
+            std::max(most, (vectorAt(d.nodes.position, d.ranges[0].node[i]) - defined(d, static_cast<int>(i))).norm());
+      return most;
+    };
+    const double coarse = farthest(0.1), fine = farthest(0.05);
+    EXPECT_LT(coarse, uneven > 0 ? 2e-4 : 1e-5);  // of nodes 12 mm from the axis
+    EXPECT_NEAR(std::log2(coarse / fine), uneven > 0 ? 2 : 3, 0.3);
+  }
+}
+
 TEST(IdentifiedSurface, FollowsARigidMotionRigidly) {
   for (const SurfaceMode surface : {SurfaceMode::skin, SurfaceMode::full}) {
     World world(weightless(), {chain(surface, false)});

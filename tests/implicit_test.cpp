@@ -1,7 +1,6 @@
 #include "physics/dynamics/implicit_stages.h"
 #include "tests/contact_bodies.h"
-#include "tests/dynamics_states.h"
-#include "tests/synthetic_model.h"
+#include "tests/identified_model.h"
 
 // The implicit step: its matrix, its order, what it keeps and what it may only lose, loads and contact inside.
 namespace medulla {
@@ -18,16 +17,25 @@ static WorldSettings implicitly(double step, int order = 1, const Vector3d& grav
   return s;
 }
 
-static BodyDescription tube(SurfaceMode surface, bool held, double damping = 0.1) {
+static BodyDescription tube(SurfaceMode surface, bool held, double damping = 0.1, LinkModel links = LinkModel::beam) {
   BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
+  std::vector<int> heldNodes;
+  if (held)
+    for (int i = 0; i < 11; ++i) heldNodes.push_back(i);
+  if (links == LinkModel::identified) {
+    b = synthetic::identifiedBody(synthetic::withNetwork(*b.model, {.held = heldNodes, .uneven = 0.1}), 6e3);
+  } else if (held) {
+    b.fixed = {{0, FixedFreedom::all}};
+    b.fixedNodes = heldNodes;
+  }
   b.surface = surface;
   b.tissue.damping = damping;
-  if (held) {
-    b.fixed = {{0, FixedFreedom::all}};
-    for (int i = 0; i < 11; ++i) b.fixedNodes.push_back(i);
-  }
   return b;
 }
+
+struct ImplicitLinks : testing::TestWithParam<LinkModel> {};
+INSTANTIATE_TEST_SUITE_P(All, ImplicitLinks, testing::Values(LinkModel::beam, LinkModel::identified),
+                         [](const auto& links) { return links.param == LinkModel::beam ? "beam" : "identified"; });
 
 static double energyOf(const World& world) {
   const Energies e = world.energies();
@@ -50,10 +58,10 @@ static double farthest(const World& a, const World& b) {
 }
 
 // At rest the matrix is exact: M + T^2 K + T C against differences of the forces themselves.
-TEST(Implicit, TheMatrixIsTheForcesDerivativeAtRest) {
+TEST_P(ImplicitLinks, TheMatrixIsTheForcesDerivativeAtRest) {
   for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
     const double duration = 0.01, tiny = 1e-6;
-    World world(implicitly(duration), {tube(surface, true)});
+    World world(implicitly(duration), {tube(surface, true, 0.1, GetParam())});
     world.advance({});  // lays everything out; nothing moves
     WorldData& d = world.data();
     ImplicitData& s = *d.implicit.at(0);
@@ -65,7 +73,7 @@ TEST(Implicit, TheMatrixIsTheForcesDerivativeAtRest) {
     hold(s.freedom, x);
     applySystem(d, s, x, y);
     // Forces after `tiny` of a step at the motion x, with damping at that motion.
-    World moved(implicitly(duration), {tube(surface, true)});
+    World moved(implicitly(duration), {tube(surface, true, 0.1, GetParam())});
     WorldData& m = moved.data();
     for (int i = 0; i < m.spheres.count; ++i) {
       m.spheres.position[i] = quadOf(vectorOf(m.spheres.position[i]) + tiny * duration * vectorOf(x[2 * i]));
@@ -97,9 +105,10 @@ TEST(Implicit, TheMatrixIsTheForcesDerivativeAtRest) {
   }
 }
 
-TEST(Implicit, RestsWhereTheExplicitStepRests) {
+TEST_P(ImplicitLinks, RestsWhereTheExplicitStepRests) {
   for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
-    BodyDescription body = tube(surface, true, 1);
+    BodyDescription body = tube(surface, true, 1, GetParam());
+    if (GetParam() == LinkModel::identified) body.tissue.young *= 40;  // its patch holds it by a single link
     DeadLoad load;
     load.node = static_cast<int>(body.model->restNodes.size()) - 1;
     load.force = {0.002, 0.004, -0.001};
@@ -115,10 +124,10 @@ TEST(Implicit, RestsWhereTheExplicitStepRests) {
 }
 
 // A bending tube, let go: errors against a far finer run shrink as the step and as its square.
-TEST(Implicit, ConvergesWithItsOrder) {
+TEST_P(ImplicitLinks, ConvergesWithItsOrder) {
   const auto end = [](double step, int order) {
-    auto world =
-        std::make_unique<World>(implicitly(step, order, {0, -2, 0.5}), std::vector{tube(SurfaceMode::full, true, 0.3)});
+    auto world = std::make_unique<World>(implicitly(step, order, {0, -2, 0.5}),
+                                         std::vector{tube(SurfaceMode::full, true, 0.3, GetParam())});
     run(*world, 0.16);
     return world;
   };
@@ -129,10 +138,10 @@ TEST(Implicit, ConvergesWithItsOrder) {
   }
 }
 
-TEST(Implicit, EnergyNeverGrowsInOrderOne) {
+TEST_P(ImplicitLinks, EnergyNeverGrowsInOrderOne) {
   for (const double damping : {0.0, 0.2}) {
     for (const double step : {0.001, 0.01, 0.05}) {
-      World world(implicitly(step), {tube(SurfaceMode::full, false, damping)});
+      World world(implicitly(step), {tube(SurfaceMode::full, false, damping, GetParam())});
       shake(world.data(), 3, 1.5, 0.01, 1);
       double before = energyOf(world);
       const double start = before;
@@ -146,9 +155,9 @@ TEST(Implicit, EnergyNeverGrowsInOrderOne) {
   }
 }
 
-TEST(Implicit, OrderTwoStaysBounded) {
+TEST_P(ImplicitLinks, OrderTwoStaysBounded) {
   for (const double step : {0.001, 0.01, 0.05}) {
-    World world(implicitly(step, 2), {tube(SurfaceMode::full, true, 0)});
+    World world(implicitly(step, 2), {tube(SurfaceMode::full, true, 0, GetParam())});
     shake(world.data(), 3, 1, 0.01, 1);
     // What is held does not move.
     world.data().spheres.velocity[0] = world.data().spheres.angularMomentum[0] = {};
@@ -163,8 +172,8 @@ TEST(Implicit, OrderTwoStaysBounded) {
   }
 }
 
-TEST(Implicit, AFreeBodyKeepsItsMomentum) {
-  World world(implicitly(0.005), {tube(SurfaceMode::full, false)});
+TEST_P(ImplicitLinks, AFreeBodyKeepsItsMomentum) {
+  World world(implicitly(0.005), {tube(SurfaceMode::full, false, 0.1, GetParam())});
   shake(world.data(), 5, 0.2, 0.001, 0.2);
   const Momentum before = momentum(world.data());
   run(world, 1);

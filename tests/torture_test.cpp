@@ -6,8 +6,8 @@
 #include <filesystem>
 
 #include "app/files/stability_file.h"
+#include "tests/identified_model.h"
 #include "tests/program_run.h"
-#include "tests/synthetic_model.h"
 #include "tests/temporary_folder.h"
 
 // Stability where methods fail: trials in the library, `medulla stability` around them.
@@ -21,21 +21,38 @@ BodyDescription heldTube() {
   return body;
 }
 
+// The same of an identified network, held by its patch.
+BodyDescription identifiedTube() {
+  const auto tube = synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 6, 8));
+  synthetic::NetworkSettings settings;
+  settings.uneven = 0.1;
+  for (int i = 0; i < 9; ++i) settings.held.push_back(i);
+  BodyDescription body = synthetic::identifiedBody(synthetic::withNetwork(*tube, settings), 6e3);
+  body.tissue.damping = 0.4;
+  return body;
+}
+
 class Torture : public testing::TestWithParam<std::string> {};
 
 // The whole set at the steps where explicit methods have long failed.
-TEST_P(Torture, ImplicitStepsSurviveAndComeBackToRest) {
-  const BodyDescription body = heldTube();
+void expectSurvival(const BodyDescription& body, const std::string& trial) {
   for (const TortureMethod& method : tortureMethods()) {
     if (method.integrator != Integrator::implicit) continue;
     for (const double step : {0.01, 0.05}) {
-      const TortureOutcome outcome = torture(body, method, GetParam(), step);
+      const TortureOutcome outcome = torture(body, method, trial, step);
       EXPECT_TRUE(outcome.survived) << method.name << ' ' << step;
       EXPECT_TRUE(outcome.recoveredAt) << method.name << ' ' << step << " after " << outcome.duration << " s";
       EXPECT_LE(outcome.largestEnergy, (method.order == 1 ? 1 + 1e-12 : 1.5) * outcome.startEnergy)
           << method.name << ' ' << step;
     }
   }
+}
+
+TEST_P(Torture, ImplicitStepsSurviveAndComeBackToRest) {
+  expectSurvival(heldTube(), GetParam());
+}
+TEST_P(Torture, OfIdentifiedLinksLikewise) {
+  expectSurvival(identifiedTube(), GetParam());
 }
 
 INSTANTIATE_TEST_SUITE_P(Trials, Torture, testing::ValuesIn(tortureTrials()), [](const auto& trial) {

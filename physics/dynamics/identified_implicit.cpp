@@ -122,6 +122,15 @@ void returnImpulsesToFrames(WorldData& d, const HostRange& range, const std::vec
   back.finish();
 }
 
+void stiffenNormals(const WorldData& d, ImplicitData& s, const HostRange& range) {
+  const Lanes scale = splat(s.duration * (s.duration + range.relaxation));
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const Lanes excess = d.identified.skin[d.identified.ofNodeGroup[g]].normalExcess;
+    const Lanes lifted = scale * excess * dot(d.nodes.area[g], gatherFour(s.carried, 4 * g));
+    storeFour(fma(lifted, d.nodes.area[g], gatherFour(s.given, 4 * g)), s.given, 4 * g);
+  }
+}
+
 void returnFrameImpulses(const WorldData& d, Motion& motion) {
   const Identified& s = d.identified;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {

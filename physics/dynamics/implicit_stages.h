@@ -37,6 +37,8 @@ void listIdentifiedPairs(const WorldData& d, std::vector<std::array<int, 2>>& pa
 void setFrameRates(WorldData& d, const Motion& motion);
 void carryOnFrames(WorldData& d, const HostRange& range, std::vector<Quad>& carried);
 void returnImpulsesToFrames(WorldData& d, const HostRange& range, const std::vector<Quad>& impulses);
+// Adds to the impulses `given` of what stands in `carried` what attachments are stiffer along the normals.
+void stiffenNormals(const WorldData& d, ImplicitData& s, const HostRange& range);
 void returnFrameImpulses(const WorldData& d, Motion& motion);
 void addCarriedMassOnFrames(const WorldData& d, const HostRange& range, const std::vector<double>& mass,
                             std::vector<Block6>& diagonal);

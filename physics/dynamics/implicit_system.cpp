@@ -40,6 +40,7 @@ void applyPressure(const WorldData& d, ImplicitData& s) {
       const Lanes pressure = splat(h2 * range.bulk * sumOfLanes(volume));
       for (int g = range.firstGroup; g < range.endGroup; ++g)
         storeFour(fma(pressure, d.nodes.area[g], gatherFour(s.given, 4 * g)), s.given, 4 * g);
+      if (range.onFrames) stiffenNormals(d, s, range);
     }
   }
 }
