@@ -175,17 +175,18 @@ glm::vec4 DepthFade::operator()(glm::vec4 colour, float depth) const {
   return {glm::mix(glm::vec3(colour), kBackdropColour, share), colour.a};
 }
 
+// A thing on its own keeps its colour.
 static DepthFade fadeOf(const Viewpoint& v, const Drawing& drawing) {
   DepthFade fade{1e30f, -1e30f};
-  const auto add = [&](glm::vec3 p, float radius) {
+  const auto add = [&](glm::vec3 p) {
     const float depth = pictureFromWorld(v, p).z;
-    fade.near = std::min(fade.near, depth - radius);
-    fade.far = std::max(fade.far, depth + radius);
+    fade.near = std::min(fade.near, depth);
+    fade.far = std::max(fade.far, depth);
   };
-  for (const DrawnBall& b : drawing.balls) add(b.centre, b.radius);
+  for (const DrawnBall& b : drawing.balls) add(b.centre);
   for (const Segment& s : drawing.segments) {
-    add(s.a, s.radius);
-    add(s.b, s.radius);
+    add(s.a);
+    add(s.b);
   }
   return fade;
 }

@@ -115,7 +115,7 @@ TEST(Renderer, BallInTheModelViewCoversItsProjectedCircle) {
   p.view = ViewKind::model;
   renderer.render(p, empty);
   for (const float radius : {0.004f, 0.02f, 0.05f}) {
-    p.balls = {{vec3(0), radius, glm::vec4(0.8f, 0, 0, 1)}};
+    p.model.balls = {{vec3(0), radius, glm::vec4(0.8f, 0, 0, 1)}};
     renderer.render(p, image);
     long covered = 0;
     for (std::size_t i = 0; i < image.pixels.size(); i += 4)
@@ -131,7 +131,7 @@ TEST(Renderer, PictureIsUprightAndNotMirrored) {
   Renderer renderer(settingsOf(64, 64));
   Picture p = viewFromFront(0.2f);
   p.view = ViewKind::model;
-  p.balls = {{vec3(0.03f, 0.02f, 0), 0.008f, glm::vec4(0, 0, 0, 1)}};  // right and up
+  p.model.balls = {{vec3(0.03f, 0.02f, 0), 0.008f, glm::vec4(0, 0, 0, 1)}};  // right and up
   Image image;
   renderer.render(p, image);
   const auto dark = [&](int x, int y) { return red(image, x, y) < 140; };
@@ -256,6 +256,59 @@ TEST(Renderer, SamePictureTwiceIsTheSameToTheByte) {
   EXPECT_TRUE(compareImages(first, second).equal);
 }
 
+// Also where the picture after it was begun before it was read back.
+TEST(Renderer, PicturesBegunAheadAreThoseDrawnOneByOne) {
+  for (const int supersample : {1, 2}) {
+    RendererSettings settings = settingsOf(96, 64);
+    settings.supersample = supersample;
+    Renderer renderer(settings);
+    renderer.addSurface(sphere("liver", {0, 0, 0}, 0.05f));
+    std::vector<Picture> pictures(4);
+    std::vector<Image> alone(4), ahead(4);
+    for (std::size_t k = 0; k < 4; ++k) {
+      pictures[k].camera.position = {0.01f * float(k), 0, 0.3f};
+      pictures[k].endoscopeMask = k % 2 == 0;
+      renderer.render(pictures[k], alone[k]);
+    }
+    renderer.begin(pictures[0]);
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (k < 3) renderer.begin(pictures[k + 1]);
+      renderer.take(ahead[k]);
+      EXPECT_EQ(ahead[k].pixels, alone[k].pixels) << k;
+    }
+    EXPECT_NE(alone[0].pixels, alone[1].pixels);
+  }
+}
+
+// Of two rods of one colour the farther is nearer to the backdrop's, and none is thinner than a pixel.
+TEST(Renderer, FarAndThinThingsOfTheModelAreReadable) {
+  RendererSettings settings = settingsOf(160, 120);
+  Renderer renderer(settings);
+  Picture picture;
+  picture.view = ViewKind::model;
+  picture.camera = {{0, 0, 0.3f}, {0, 0, 0}, {0, 1, 0}, 40};
+  Image empty, image;
+  renderer.render(picture, empty);
+  picture.model.segments = {{{-0.05f, 0.02f, 0.1f}, {0.05f, 0.02f, 0.1f}, 1e-6f, {0, 0, 0, 1}},
+                            {{-0.05f, -0.02f, -0.1f}, {0.05f, -0.02f, -0.1f}, 1e-6f, {0, 0, 0, 1}}};
+  renderer.render(picture, image);
+  // Per half the darkest pixel of every column.
+  int darkest[2] = {255, 255}, columns[2] = {0, 0};
+  for (int half = 0; half < 2; ++half)
+    for (int x = 70; x < 90; ++x) {
+      int column = 255;
+      for (int y = 60 * half; y < 60 * half + 60; ++y) {
+        const std::size_t at = 4 * (std::size_t(y) * 160 + x);
+        if (image.pixels[at] + 8 < empty.pixels[at]) column = std::min<int>(column, image.pixels[at]);
+      }
+      columns[half] += column < 255;
+      darkest[half] = std::min(darkest[half], column);
+    }
+  EXPECT_EQ(columns[0], 20);
+  EXPECT_EQ(columns[1], 20);
+  EXPECT_LT(darkest[0] + 20, darkest[1]);
+}
+
 TEST(Renderer, EglDrawsTheSameAsOsmesa) {
   Image images[2];
   const char* names[] = {"osmesa", "egl"};
@@ -370,7 +423,7 @@ TEST(Renderer, MovingSkinIsSeenThroughInBothAndStaticSkinIsNot) {
   const SurfaceShape skin = sphere("matte", {0, 0, 0}, 0.03f);
   renderer.addSurface(skin);
   Picture p = viewFromFront(0.2f);
-  p.balls = {{vec3(0), 0.02f, glm::vec4(0.9f, 0, 0, 1)}};
+  p.model.balls = {{vec3(0), 0.02f, glm::vec4(0.9f, 0, 0, 1)}};
   const auto redness = [&] {
     Image image;
     renderer.render(p, image);

@@ -16,6 +16,7 @@
 #include "app/files/trajectory_file.h"
 #include "app/force_comparison.h"
 #include "app/interrupt.h"
+#include "app/motion_sources.h"
 
 namespace medulla {
 
@@ -284,7 +285,7 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
 // The scene counts by what it says, the files that it names by their bytes: where they lie does not matter.
 std::uint64_t runHash(const LoadedScene& loaded, bool whole) {
   const std::uint64_t scene = whole ? loaded.scene.contentHash : loaded.scene.motionHash;
-  std::uint64_t hash = contentHash(fmt::format("{} {:016x}", MEDULLA_VERSION, scene));
+  std::uint64_t hash = contentHash(fmt::format("{} {} {:016x}", MEDULLA_VERSION, MEDULLA_MOTION_SOURCES, scene));
   for (const std::string& path : inputFiles(loaded.scene))
     if (path != loaded.scene.path && std::filesystem::exists(path)) hash = contentHash(readTextFile(path), hash);
   return hash;

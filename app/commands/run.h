@@ -68,8 +68,8 @@ class PictureTimes {
 std::vector<double> pictureTimes(const Scene& scene, int first, int last);
 int pictureCount(const Scene& scene);
 
-// What tells one run from another: everything that its motion follows from, this program's version included; or with
-// `whole` everything that its pictures do, but for options of the drawing.
+// What tells one run from another: everything that its motion follows from, this program's version and the sources of
+// its physics included; or with `whole` everything that its pictures do, but for options of the drawing.
 std::uint64_t runHash(const LoadedScene& loaded, bool whole);
 
 // Of a cache of this run.
