@@ -12,8 +12,9 @@ SceneMesh sheet(std::uint32_t cells, float spacing) {
   SceneMesh mesh;
   const std::uint32_t n = cells + 1;
   mesh.resizeVertices(std::size_t(n) * n);
-  for (std::uint32_t i = 0; i < n * n; ++i)
-    mesh.position[i] = spacing * vec3(float(i % n) - 0.5f * float(cells), float(i / n) - 0.5f * float(cells), 0);
+  for (std::uint32_t j = 0; j < n; ++j)
+    for (std::uint32_t i = 0; i < n; ++i)
+      mesh.position[j * n + i] = spacing * vec3(float(i) - 0.5f * float(cells), float(j) - 0.5f * float(cells), 0);
   for (std::uint32_t j = 0; j < cells; ++j)
     for (std::uint32_t i = 0; i < cells; ++i) {
       const std::uint32_t a = j * n + i;
