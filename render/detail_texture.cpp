@@ -8,6 +8,22 @@
 namespace medulla {
 namespace {
 
+// Arithmetic of IEEE 754 alone: where mathematical libraries differ in a last digit, a vessel would meet another or
+// not, and the whole tree behind it differ.
+float sineOf(float angle) {  // within 0.001; two parabolas, corrected once
+  const float turns = angle * 0.15915494f, t = turns - std::floor(turns + 0.5f);
+  const float s = 8 * t - 16 * t * std::abs(t);
+  return s + 0.225f * (s * std::abs(s) - s);
+}
+glm::vec2 directionOf(float angle) {
+  return {sineOf(angle + 1.57079633f), sineOf(angle)};
+}
+float cubeRoot(float x) {  // of 0.3 to 1, by Newton's method
+  float y = 1;
+  for (int k = 0; k < 6; ++k) y -= (y * y * y - x) / (3 * y * y);
+  return y;
+}
+
 // Vessel trees grown on the torus of texels, the widest tip first, so that trunks have their room before twigs fill
 // what is left. A vessel keeps its heading, winds about it, thins at each fork after Murray (1926), r0^3 = r1^3 + r2^3,
 // and turns away from, or ends before, any other: vessels of one layer do not cross.
@@ -65,23 +81,25 @@ class VesselPainter {
     return std::size_t(py < 0 ? py + side_ : py) * side_ + (px < 0 ? px + side_ : px);
   }
   bool taken(const Tip& t, float angle, float ahead) const {
-    const std::uint16_t owner = owner_[texelAt(t.x + ahead * std::cos(angle), t.y + ahead * std::sin(angle))];
+    const glm::vec2 d = ahead * directionOf(angle);
+    const std::uint16_t owner = owner_[texelAt(t.x + d.x, t.y + d.y)];
     return owner != 0 && owner != t.id;
   }
 
   // From fork to fork, or to the end.
   void grow(Tip t) {
     const float thick = t.width / unit_;
-    const float length = (22 + 34 * random_.next()) * unit_ * (0.45f + 0.5f * thick);
+    const int length = int((22 + 34 * random_.next()) * unit_ * (0.45f + 0.5f * thick));
     // Thin vessels wind more, and in shorter waves.
     const float amplitude = bend_ * 1.25f / (0.7f + 0.4f * thick), wave = (26 + 16 * thick) * unit_;
     float drift = 0;
-    for (float s = 0; s < length; s += 1) {
+    for (int s = 0; s < length; ++s) {
       drift += -0.05f * drift + (random_.next() - 0.5f) * 0.09f;
-      const float angle = t.heading + drift + amplitude * std::sin(t.phase + 2 * kPi * t.age / wave);
+      const float angle = t.heading + drift + amplitude * sineOf(t.phase + 2 * kPi * t.age / wave);
       if (t.clear <= 0 && !steer(t, angle)) t.width *= 0.93f;
-      t.x += std::cos(angle);
-      t.y += std::sin(angle);
+      const glm::vec2 step = directionOf(angle);
+      t.x += step.x;
+      t.y += step.y;
       t.age += 1;
       t.clear -= 1;
       // A trunk fades in as if it surfaced from the depth.
@@ -111,7 +129,7 @@ class VesselPainter {
     branch.trunk = false;
     branch.clear = 2.2f * t.width + 2.5f * kClearance * unit_;
     t.heading -= turn * 0.55f * share * share;
-    t.width *= std::cbrt(1 - share * share * share);
+    t.width *= cubeRoot(1 - share * share * share);
     t.clear = branch.clear;
     if (branch.width > kThinnest * unit_) {
       branch.phase = 2 * kPi * random_.next();

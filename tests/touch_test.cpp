@@ -1,0 +1,91 @@
+#include "render/touch.h"
+
+#include <gtest/gtest.h>
+
+namespace medulla {
+namespace {
+
+using glm::vec3;
+
+// A sheet of `cells`^2 quads in the plane z = 0, facing +z, spacing in m, with normals.
+SceneMesh sheet(std::uint32_t cells, float spacing) {
+  SceneMesh mesh;
+  const std::uint32_t n = cells + 1;
+  mesh.resizeVertices(std::size_t(n) * n);
+  for (std::uint32_t j = 0; j < n; ++j)
+    for (std::uint32_t i = 0; i < n; ++i)
+      mesh.position[j * n + i] = spacing * vec3(float(i) - 0.5f * float(cells), float(j) - 0.5f * float(cells), 0);
+  for (std::uint32_t j = 0; j < cells; ++j)
+    for (std::uint32_t i = 0; i < cells; ++i) {
+      const std::uint32_t a = j * n + i;
+      for (const std::uint32_t v : {a, a + 1, a + n + 1, a, a + n + 1, a + n}) mesh.index.push_back(v);
+    }
+  MeshPart part;
+  part.look = &findLook("stomach");
+  part.vertexCount = n * n;
+  part.indexCount = std::uint32_t(mesh.index.size());
+  part.moving = true;
+  mesh.parts.push_back(part);
+  computeNormals(mesh, part);
+  return mesh;
+}
+
+std::size_t middleOf(const SceneMesh& mesh) {
+  return mesh.position.size() / 2;
+}
+
+TEST(Touch, StretchPalesAndSqueezeReddens) {
+  const SceneMesh rest = sheet(10, 0.003f);
+  for (const float factor : {0.8f, 1.f, 1.2f}) {
+    SceneMesh mesh = rest;
+    for (vec3& p : mesh.position) p *= factor;
+    computeNormals(mesh, mesh.parts[0]);
+    applyStrain(rest, mesh, mesh.parts[0]);
+    const float blanch = mesh.blanch[middleOf(mesh)];
+    if (factor == 1)
+      EXPECT_NEAR(blanch, 0, 1e-5);
+    else
+      EXPECT_GT(blanch * (factor - 1), 0.02f);
+    EXPECT_NEAR(mesh.openness[middleOf(mesh)], 1, 1e-5) << "a flat sheet has no fold";
+  }
+}
+
+TEST(Touch, AFoldIsDarkAndARidgeIsNot) {
+  const SceneMesh rest = sheet(10, 0.003f);
+  for (const float side : {1.f, -1.f}) {
+    SceneMesh mesh = rest;
+    for (vec3& p : mesh.position) p.z = side * 0.6f * std::abs(p.x);
+    computeNormals(mesh, mesh.parts[0]);
+    applyStrain(rest, mesh, mesh.parts[0]);
+    if (side > 0)
+      EXPECT_LT(mesh.openness[middleOf(mesh)], 0.8f);
+    else
+      EXPECT_EQ(mesh.openness[middleOf(mesh)], 1);
+  }
+}
+
+TEST(Touch, PressedTissueGivesWayAndHeldTissueComesBetweenTheJaws) {
+  const SceneMesh rest = sheet(30, 0.002f);
+  Instrument tool;
+  tool.tip = {0, 0, 0.004f};  // its shaft along +z, away from the sheet
+  tool.touching = true;
+  SceneMesh pressed = rest;
+  applyTouch(tool, pressed);
+  EXPECT_LT(pressed.position[middleOf(rest)].z, -0.0005f);
+  EXPECT_GT(pressed.blanch[middleOf(rest)], 0.3f);
+  tool.holding = true;
+  SceneMesh held = rest;
+  applyTouch(tool, held);
+  EXPECT_GT(held.position[middleOf(rest)].z, tool.tip.z + 0.002f);
+  EXPECT_NEAR(held.blanch[middleOf(rest)], 1, 1e-5);
+  // Far away nothing moves.
+  EXPECT_EQ(held.position[0], rest.position[0]);
+  EXPECT_EQ(pressed.position[0], rest.position[0]);
+  // The normals are those of the surface drawn: against triangles, within what a first-order rule and facets differ.
+  SceneMesh check = pressed;
+  computeNormals(check, check.parts[0]);
+  for (std::size_t i = 0; i < check.normal.size(); ++i) EXPECT_GT(glm::dot(check.normal[i], pressed.normal[i]), 0.98f);
+}
+
+}  // namespace
+}  // namespace medulla
