@@ -103,8 +103,8 @@ static Vector3d defined(const WorldData& d, int node) {
   Vector3d offset = m.restNodes[node] - restMean;
   for (std::size_t k = 0; k < skin.size(); ++k) {
     Eigen::Matrix<double, 6, 1> z;
-    z << blend.conjugate() * (x[k] - mean) - (skin[k].restPoint - restMean),
-        n.lengthScale * log(blend.conjugate() * q[k]);
+    z.head<3>() = blend.conjugate() * (x[k] - mean) - (skin[k].restPoint - restMean);
+    z.tail<3>() = n.lengthScale * log(blend.conjugate() * q[k]);
     offset += skin[k].map * z;
   }
   return mean + blend * offset;
