@@ -451,11 +451,16 @@ MatrixXd skeletonResponse(const BodyDescription& body, const BodyMechanics& mech
       if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) free.push_back(6 * static_cast<int>(i) + k);
   }
   if (!held) throw std::runtime_error("no sphere is fixed: forces have no answer at rest");
-  const MatrixXd loads = model.onSpheres(forces);
-  MatrixXd motions = MatrixXd::Zero(loads.rows(), loads.cols());
-  const MatrixXd stiffness = model.linkStiffness()(free, free), some = loads(free, Eigen::all);
+  const MatrixXd all = model.linkStiffness(), loads = model.onSpheres(forces);
+  const auto count = static_cast<Eigen::Index>(free.size());
+  MatrixXd stiffness(count, count), some(count, loads.cols());
+  for (Eigen::Index i = 0; i < count; ++i) {
+    some.row(i) = loads.row(free[i]);
+    for (Eigen::Index j = 0; j < count; ++j) stiffness(i, j) = all(free[i], free[j]);
+  }
   const MatrixXd solved = stiffness.llt().solve(some);
-  motions(free, Eigen::all) = solved;
+  MatrixXd motions = MatrixXd::Zero(loads.rows(), loads.cols());
+  for (Eigen::Index i = 0; i < count; ++i) motions.row(free[i]) = solved.row(i);
   MatrixXd out = model.carried(motions);
   for (const int n : body.fixedNodes) out.middleRows<3>(3 * static_cast<Eigen::Index>(n)).setZero();
   return out;

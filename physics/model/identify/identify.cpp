@@ -32,15 +32,43 @@ struct CellSize {
   std::string neck;  // where the mesh asks for it; empty where the spheres do
 };
 
-// Cells of the spheres span three cells of the grid or more, necks between them two; six hundred for the whole body
-// hold a few spheres' accuracy and cost a second.
+// Volume (m3) on the smaller side of each link where it alone joins two parts of the body, 0 where others join them
+// too.
+std::vector<double> volumesBehind(const SoftBodyModel& model) {
+  std::vector<double> out;
+  double total = 0;
+  for (const FillingSphere& s : model.spheres) total += s.volume;
+  for (std::size_t cut = 0; cut < model.links.size(); ++cut) {
+    std::vector<bool> reached(model.spheres.size(), false);
+    reached[model.links[cut].sphere0] = true;
+    for (bool more = true; more;) {
+      more = false;
+      for (std::size_t l = 0; l < model.links.size(); ++l) {
+        const int a = model.links[l].sphere0, b = model.links[l].sphere1;
+        if (l == cut || reached[a] == reached[b]) continue;
+        reached[a] = reached[b] = more = true;
+      }
+    }
+    double volume = 0;
+    for (std::size_t i = 0; i < reached.size(); ++i) volume += reached[i] ? model.spheres[i].volume : 0;
+    out.push_back(reached[model.links[cut].sphere1] ? 0 : std::min(volume, total - volume));
+  }
+  return out;
+}
+
+// Cells of the spheres span three cells of the grid or more, necks between parts of the body two; six hundred for the
+// whole body hold a few spheres' accuracy and cost a second.
 CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const Vector3d&)>& held) {
   constexpr double perSphere = 3, perNeck = 2, perBody = 600;
+  constexpr double partMin = 0.02;  // of the body: what hangs on a thinner neck moves with it alone
   double volume = 0;
   for (const FillingSphere& s : model.spheres) volume += s.volume;
   const double spheres = std::cbrt(volume / static_cast<double>(model.spheres.size())) / perSphere;
   CellSize out{std::min(spheres, std::cbrt(volume / perBody)), ""};
-  for (const ElasticLink& link : model.links) {
+  const std::vector<double> behind = volumesBehind(model);
+  for (std::size_t l = 0; l < model.links.size(); ++l) {
+    if (behind[l] < partMin * volume) continue;
+    const ElasticLink& link = model.links[l];
     const Vector3d from = model.spheres[link.sphere0].restFrame, to = model.spheres[link.sphere1].restFrame;
     // The outer sections of a link may lie in the body's rounded end.
     for (int k = 2; k + 2 < ElasticLink::kSections; ++k) {
@@ -64,7 +92,7 @@ VoxelSolid makeSolid(const SoftBodyModel& model, const TriangleMesh& mesh, const
   } catch (const std::runtime_error& error) {
     const std::string why = cell.neck.empty()
                                 ? fmt::format("fewer spheres than {} would do with larger ones", model.spheres.size())
-                                : "the mesh is too thin there: " + cell.neck;
+                                : "it is too thin for its size: " + cell.neck;
     throw std::runtime_error(fmt::format("{}; {}", error.what(), why));
   }
 }
