@@ -45,9 +45,9 @@ inline void shakeNetwork(IdentifiedNetwork& n, double share) {
   states::Random random(11);
   for (IdentifiedLink& l : n.links) {
     const Matrix6d root = l.stiffness.cwiseSqrt();
-    const Matrix6d mixed =
-        root * (Matrix6d::Identity() + share * Matrix6d::NullaryExpr([&](auto, auto) { return random.uniform(); }));
-    l.stiffness = mixed * mixed.transpose();
+    Matrix6d mixed = Matrix6d::Identity();
+    for (int i = 0; i < 36; ++i) mixed(i / 6, i % 6) += share * random.uniform();
+    l.stiffness = root * mixed * mixed.transpose() * root;
   }
   for (std::vector<SkinFrame>& of : n.skin)
     for (SkinFrame& f : of)
@@ -88,6 +88,7 @@ inline std::shared_ptr<SoftBodyModel> withNetwork(const SoftBodyModel& model, co
   auto network = std::make_shared<IdentifiedNetwork>();
   IdentifiedNetwork& n = *network;
   n.poisson = poisson;
+  n.voxel = 1e-3;
   n.lengthScale = 0.5 * (model.spheres[1].restFrame - model.spheres[0].restFrame).norm();
   for (const FillingSphere& s : model.spheres) n.frames.push_back({s.restFrame + arm, s.volume, s.secondMoment});
   const LinkSection section = model.links[0].sections[0];

@@ -117,7 +117,8 @@ TEST_P(ImplicitLinks, RestsWhereTheExplicitStepRests) {
     WorldSettings explicitly;
     World a(explicitly, {body}), b(implicitly(0.02, 1, explicitly.gravity), {body}),
         c(implicitly(0.02, 2, explicitly.gravity), {body});
-    for (World* world : {&a, &b, &c}) run(*world, 12);
+    // Torsion, which alpha does not slow, takes longer to die where nothing is held by number.
+    for (World* world : {&a, &b, &c}) run(*world, GetParam() == LinkModel::identified ? 24 : 12);
     EXPECT_LT(farthest(a, b), 2e-7);
     EXPECT_LT(farthest(a, c), 2e-7);
   }

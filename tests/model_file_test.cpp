@@ -209,6 +209,103 @@ TEST_F(ModelFile, ArraysThatDoNotFitEachOther) {
   EXPECT_NE(complaint(textOf(m)).find("nodes of a stencil that are not ascending"), std::string::npos);
 }
 
+// What medulla build --identify adds: a link between the two spheres and one to a patch.
+SoftBodyModel identifiedModel() {
+  SoftBodyModel m = smallModel();
+  auto network = std::make_shared<IdentifiedNetwork>();
+  network->poisson = 0.3 + 0.1;
+  network->lengthScale = 1. / 3;
+  network->voxel = 0.01;
+  for (const FillingSphere& s : m.spheres) network->frames.push_back({s.restFrame, s.volume, s.secondMoment});
+  network->patches = {{"box=0,0,0,1,1,\"<1", {0, 3}}};
+  IdentifiedLink link;
+  link.frame1 = 1;
+  link.restPoint0 = m.spheres[0].restFrame;
+  link.restPoint1 = m.spheres[1].restFrame;
+  link.axes << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  link.stiffness.diagonal() << 1. / 3, 0.1, 0.2, 0.3, 1e-300, 0;
+  link.stiffness(1, 0) = link.stiffness(0, 1) = 0.1 / 7;
+  network->links = {link, link};
+  network->links[1].frame1 = 2;
+  network->links[1].restPoint1 = m.restNodes[3];
+  for (std::size_t n = 0; n < m.restNodes.size(); ++n) {
+    SkinFrame own{1, 0.75, m.spheres[1].restFrame}, held{2, 0.25, m.restNodes[n]};
+    own.map.setConstant(1. / 7);
+    held.map.leftCols<3>().setIdentity();
+    network->skin.push_back({own, held});
+  }
+  network->layer = {100. / 3, 20, 1e-4};
+  network->bulk = {2.5, 0.1};
+  network->poke = {3. / 7, 0};
+  network->ofFiniteElements = {1, 0.5};
+  m.identified = network;
+  return m;
+}
+
+TEST_F(ModelFile, WhatWasIdentifiedIsReadToTheBit) {
+  const SoftBodyModel model = identifiedModel();
+  const std::string text = textOf(model);
+  const SoftBodyModel again = read(text);
+  EXPECT_EQ(textOf(again), text);
+  ASSERT_TRUE(again.identified);
+  const IdentifiedNetwork &a = *model.identified, &b = *again.identified;
+  EXPECT_EQ(a.poisson, b.poisson);
+  EXPECT_EQ(a.lengthScale, b.lengthScale);
+  EXPECT_EQ(a.patches[0].region, b.patches[0].region);
+  EXPECT_EQ(a.patches[0].nodes, b.patches[0].nodes);
+  ASSERT_EQ(b.links.size(), 2u);
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_EQ(a.links[k].frame1, b.links[k].frame1);
+    EXPECT_TRUE(sameBits(a.links[k].restPoint0, b.links[k].restPoint0));
+    EXPECT_TRUE(sameBits(a.links[k].restPoint1, b.links[k].restPoint1));
+    EXPECT_TRUE(sameBits(a.links[k].axes, b.links[k].axes));
+    EXPECT_TRUE(sameBits(a.links[k].stiffness, b.links[k].stiffness));
+  }
+  ASSERT_EQ(b.skin.size(), 4u);
+  for (std::size_t n = 0; n < 4; ++n) {
+    for (int k = 0; k < 2; ++k) {
+      EXPECT_EQ(a.skin[n][k].frame, b.skin[n][k].frame);
+      EXPECT_TRUE(sameBits(a.skin[n][k].weight, b.skin[n][k].weight));
+      EXPECT_TRUE(sameBits(a.skin[n][k].restPoint, b.skin[n][k].restPoint));
+      EXPECT_TRUE(sameBits(a.skin[n][k].map, b.skin[n][k].map));
+    }
+  }
+  EXPECT_EQ(a.layer.normal, b.layer.normal);
+  EXPECT_EQ(a.bulk.maximum, b.bulk.maximum);
+  EXPECT_FALSE(b.usesFormulas);
+}
+
+TEST_F(ModelFile, MistakesInWhatWasIdentified) {
+  const std::string text = textOf(identifiedModel());
+  const struct {
+    std::string from, to, complaint;
+  } mistakes[] = {
+      {" poisson=\"0.4\"", " poisson=\"0.5\"", "<identified> poisson=\"0.5\": "},
+      {" formulas=\"no\"", " formulas=\"yes\"", "<identified_skin>: no skin expected where formulas are used"},
+      {"layer=\"33", "layer=\"-33", "<identified> layer="},
+      {"<identified_frames rows=\"2\"", "<identified_frames rows=\"1\"", "<identified_frames>: more numbers than"},
+      {"0 1 0.1 0.2 0.5 0", "0 0 0.1 0.2 0.5 0", "<identified_links>: the same index twice"},
+      {"0 1 0.1 0.2 0.5 0", "0 3 0.1 0.2 0.5 0", "<identified_links>: an index out of range"},
+      {"0 1 0.1 0.2 0.5 0", "0 1 0.1 0.2 0.6 0", "<identified_links>: a second end that is not its frame's"},
+      {"0 1 0.1 0.2 0.5 0", "0 1 0.1 0.2 0.5 0.1", "<identified_links>: axes that are not unit"},
+      {"0.3333333333333333 0.01", "-0.3333333333333333 0.01", "<identified_links>: a stiffness that is not positive"},
+      {"2 1 0.75", "2 1 0.8", "<identified_skin>: weights whose sum is not 1"},
+      {"2 1 0.75", "2 5 0.75", "<identified_skin>: an index out of range"},
+      {"2 1 0.75", "9 1 0.75", "<identified_skin>: an index out of range"},
+      {"<identified_patch rows=\"2\"", "<identified_patch rows=\"3\"", "<identified_patch>: fewer numbers"},
+  };
+  for (const auto& m : mistakes) {
+    std::string wrong = text;
+    const std::size_t at = wrong.find(m.from, wrong.find("<identified"));
+    if (at == std::string::npos) {
+      ADD_FAILURE() << m.from;
+      continue;
+    }
+    const std::string said = complaint(wrong.replace(at, m.from.size(), m.to));
+    EXPECT_NE(said.find(m.complaint), std::string::npos) << m.from << " -> " << m.to << ": " << said;
+  }
+}
+
 TEST_F(ModelFile, AMissingFileIsNamed) {
   try {
     readModel(temporary / "none.model.xml");

@@ -183,6 +183,36 @@ TEST(Program, BuildsToAGap) {
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"m.xml"});
 }
 
+TEST(Program, IdentifiesTheSameNetworkEachTime) {
+  const TemporaryFolder folder;
+  const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
+  const auto build = [&](const std::string& output, std::vector<std::string> more) {
+    more.insert(more.begin(), {"build", mesh, "-o", folder / output, "--spheres", "5", "--render-levels", "0"});
+    return runProgram(more);
+  };
+  const ProgramResult r = build("a.xml", {"--identify", "--fix", "plane=1,0,0,0.001"});
+  EXPECT_EQ(r.exitCode, 0) << r.err;
+  for (const char* name : {"identified_voxel", "identified_error_max", "identified_error_rms",
+                           "identified_poke_error_max", "finite_elements_error_max", "formulas_error_rms"})
+    EXPECT_NE(r.out.find(name), std::string::npos) << name;
+  EXPECT_EQ(build("b.xml", {"--identify", "--fix", "plane=1,0,0,0.001"}).exitCode, 0);
+  const std::string model = readFile(folder / "a.xml");
+  EXPECT_EQ(model, readFile(folder / "b.xml"));
+  EXPECT_NE(model.find("--identify --poisson 0.45 --link-form full --fix plane=1,0,0,0.001"), std::string::npos);
+
+  const auto refused = [&](const std::vector<std::string>& more, int exitCode, const std::vector<std::string>& says) {
+    expectRefusal(build("c.xml", more), exitCode, says);
+    EXPECT_FALSE(std::filesystem::exists(folder / "c.xml"));
+  };
+  refused({"--identify", "--fix", "box=1,1,1,2,2,2"}, 1, {"cylinder.obj", "box=1,1,1,2,2,2", "no node"});
+  refused({"--identify", "--fix", "box=0,0,0,1,1"}, 1, {"--fix box=0,0,0,1,1", "x0,y0,z0,x1,y1,z1"});
+  refused({"--identify", "--fix", "cone=0,0,0,1"}, 1, {"--fix cone=", "vertices=FILE.csv"});
+  refused({"--identify", "--fix", "vertices=none.csv"}, 1, {"none.csv"});
+  refused({"--identify", "--poisson", "0.5"}, 1, {"0.5", "less than 0.5"});
+  refused({"--identify", "--poisson", "-0.1"}, 1, {"-0.1", "0 or more"});
+  refused({"--fix", "plane=1,0,0,0.001"}, 2, {"--identify"});
+}
+
 TEST(Program, BuildsSeveralBodiesAsEachAlone) {
   const TemporaryFolder folder;
   const std::string assets = std::string(MEDULLA_SOURCE_DIR) + "/assets/";

@@ -45,16 +45,20 @@ std::vector<Result> buildResults(const BuildReport& r) {
           {"seconds", numberText(r.seconds), "s"}};
 }
 
-std::vector<Result> identifiedResults(const IdentifiedNetwork& n) {
-  return {{"identified_voxel", numberText(n.voxel), "m"},
-          {"identified_links", numberText(n.links.size()), ""},
-          {"identified_patches", numberText(n.patches.size()), ""},
-          {"identified_error_max", numberText(n.bulk.maximum), "%"},
-          {"identified_error_rms", numberText(n.bulk.rms), "%"},
-          {"identified_poke_error_max", numberText(n.poke.maximum), "%"},
-          {"identified_poke_error_rms", numberText(n.poke.rms), "%"},
-          {"finite_elements_error_max", numberText(n.ofFiniteElements.maximum), "%"},
-          {"finite_elements_error_rms", numberText(n.ofFiniteElements.rms), "%"}};
+std::vector<Result> identifiedResults(const IdentifiedNetwork& n, const std::optional<IdentifiedError>& formulas) {
+  std::vector<Result> results = {{"identified_voxel", numberText(n.voxel), "m"},
+                                 {"identified_links", numberText(n.links.size()), ""},
+                                 {"identified_patches", numberText(n.patches.size()), ""}};
+  const auto add = [&](const std::string& name, const IdentifiedError& error) {
+    results.push_back({name + "_max", numberText(error.maximum), "%"});
+    results.push_back({name + "_rms", numberText(error.rms), "%"});
+  };
+  add("identified_error", n.bulk);
+  add("identified_poke_error", n.poke);
+  add("finite_elements_error", n.ofFiniteElements);
+  if (formulas) add("formulas_error", *formulas);
+  results.push_back({"identified_used", n.usesFormulas ? "0" : "1", ""});
+  return results;
 }
 
 std::vector<Result> totalResults(const std::vector<BuildReport>& reports) {

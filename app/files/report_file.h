@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,8 @@ struct Result {
 std::vector<Result> buildResults(const BuildReport& report);
 
 // Sums over the bodies of one build; the cover is that of all volumes together, the gap the largest in metres.
-std::vector<Result> identifiedResults(const IdentifiedNetwork& network);
+// `formulas`: of the beams' formulas on the bulk loads, where they were tried.
+std::vector<Result> identifiedResults(const IdentifiedNetwork& network, const std::optional<IdentifiedError>& formulas);
 std::vector<Result> totalResults(const std::vector<BuildReport>& reports);
 
 // CSV with the header name,value,unit. Errors are those of OutputFile.

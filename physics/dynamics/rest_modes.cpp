@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "physics/dynamics/identified_mechanics.h"
 
@@ -183,6 +184,25 @@ class RestModel {
       mass.block<3, 3>(6 * i + 3, 6 * i + 3) += mechanics_.sphereInertia[i];
     }
     return mass;
+  }
+
+  // Where the spheres' motions (6 spheres x loads) carry the nodes, and what forces on the nodes do to the spheres.
+  MatrixXd carried(const MatrixXd& motions) const {
+    MatrixXd out(3 * static_cast<Eigen::Index>(mechanics_.attachments.size()), motions.cols());
+    for (Eigen::Index load = 0; load < out.cols(); ++load) {
+      const VectorXd x = motions.col(load);
+      for (int i = 0; 3 * i < out.rows(); ++i) out.block<3, 1>(3 * i, load) = anchorRate(i, x);
+    }
+    return out;
+  }
+  MatrixXd onSpheres(const MatrixXd& forces) const {
+    MatrixXd out(6 * spheres_, forces.cols());
+    for (Eigen::Index load = 0; load < out.cols(); ++load) {
+      VectorXd y = VectorXd::Zero(6 * spheres_);
+      for (int i = 0; 3 * i < forces.rows(); ++i) addAnchorLoad(i, forces.block<3, 1>(3 * i, load), y);
+      out.col(load) = y;
+    }
+    return out;
   }
 
   // A repeatable, structureless start vector: the fractional parts of multiples of the golden ratio.
@@ -475,6 +495,31 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
     (rest.largestEigenvalue(square + 2 * h * linkBeta, square + 2 * h * surfaceBeta) < 4 ? stable : unstable) = h;
   }
   return stable;
+}
+
+MatrixXd skeletonResponse(const BodyDescription& body, const BodyMechanics& mechanics, const MatrixXd& forces) {
+  const RestModel model(body, mechanics);
+  std::vector<int> free;
+  bool held = false;
+  for (std::size_t i = 0; i < mechanics.moves.size(); ++i) {
+    held = held || !(mechanics.moves[i] || mechanics.turns[i]);
+    for (int k = 0; k < 6; ++k)
+      if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) free.push_back(6 * static_cast<int>(i) + k);
+  }
+  if (!held) throw std::runtime_error("no sphere is fixed: forces have no answer at rest");
+  const MatrixXd all = model.linkStiffness(), loads = model.onSpheres(forces);
+  const auto count = static_cast<Eigen::Index>(free.size());
+  MatrixXd stiffness(count, count), some(count, loads.cols());
+  for (Eigen::Index i = 0; i < count; ++i) {
+    some.row(i) = loads.row(free[i]);
+    for (Eigen::Index j = 0; j < count; ++j) stiffness(i, j) = all(free[i], free[j]);
+  }
+  const MatrixXd solved = stiffness.llt().solve(some);
+  MatrixXd motions = MatrixXd::Zero(loads.rows(), loads.cols());
+  for (Eigen::Index i = 0; i < count; ++i) motions.row(free[i]) = solved.row(i);
+  MatrixXd out = model.carried(motions);
+  for (const int n : body.fixedNodes) out.middleRows<3>(3 * static_cast<Eigen::Index>(n)).setZero();
+  return out;
 }
 
 }  // namespace medulla

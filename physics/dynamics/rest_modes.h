@@ -19,4 +19,9 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
 // Dense matrices: memory grows with the square of the spheres, time with the cube.
 std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMechanics& mechanics, int count);
 
+// m, 3 nodes x loads: where small forces on the surface's nodes (N, 3 nodes x loads) bring them through links and
+// spheres, the surface itself giving way nowhere. Throws std::runtime_error where no sphere is fixed in all six.
+Eigen::MatrixXd skeletonResponse(const BodyDescription& body, const BodyMechanics& mechanics,
+                                 const Eigen::MatrixXd& forces);
+
 }  // namespace medulla

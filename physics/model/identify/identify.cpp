@@ -5,9 +5,11 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 #include "physics/model/identify/layer_fit.h"
+#include "physics/model/identify/reduction.h"
 #include "physics/model/identify/skin_fit.h"
 
 namespace medulla {
@@ -25,39 +27,84 @@ void checkSettings(const IdentifySettings& s) {
     throw std::runtime_error(fmt::format("a Poisson's ratio of {}; expected 0 or more and less than 0.5", s.poisson));
 }
 
-double chosenSize(const CellFrames*, const SoftBodyModel& model) {
-  double volume = 0;
-  for (const FillingSphere& s : model.spheres) volume += s.volume;
-  return std::cbrt(volume / static_cast<double>(model.spheres.size())) / 2.4;
-}
-
-// Solutions under unit loads on the frames, as their frames and the mesh's nodes see them.
-struct Responses {
-  MatrixXd frames, nodes;  // 6 frames and 3 nodes x 6 frames
+struct CellSize {
+  double size = 0;   // m
+  std::string neck;  // where the mesh asks for it; empty where the spheres do
 };
 
-Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const Progress& progress) {
-  constexpr Index block = 48;
-  const Index n = cells.motion.rows();
-  Responses out{MatrixXd(n, n), MatrixXd(solid.surface.rows(), n)};
-  for (Index first = 0; first < n; first += block) {
-    const Index count = std::min(block, n - first);
-    RowMatrix x = RowMatrix(cells.motion.middleRows(first, count)).transpose();
-    solve(solid.plan, solid.factors, x);
-    out.frames.middleCols(first, count) = cells.motion * x;
-    out.nodes.middleCols(first, count) = solid.surface * x;
-    if (progress) progress(static_cast<double>(first + count) / static_cast<double>(n));
+// Volume (m3) on the smaller side of each link where it alone joins two parts of the body, 0 where others join them
+// too.
+std::vector<double> volumesBehind(const SoftBodyModel& model) {
+  std::vector<double> out;
+  double total = 0;
+  for (const FillingSphere& s : model.spheres) total += s.volume;
+  for (std::size_t cut = 0; cut < model.links.size(); ++cut) {
+    std::vector<bool> reached(model.spheres.size(), false);
+    reached[model.links[cut].sphere0] = true;
+    for (bool more = true; more;) {
+      more = false;
+      for (std::size_t l = 0; l < model.links.size(); ++l) {
+        const int a = model.links[l].sphere0, b = model.links[l].sphere1;
+        if (l == cut || reached[a] == reached[b]) continue;
+        reached[a] = reached[b] = more = true;
+      }
+    }
+    double volume = 0;
+    for (std::size_t i = 0; i < reached.size(); ++i) volume += reached[i] ? model.spheres[i].volume : 0;
+    out.push_back(reached[model.links[cut].sphere1] ? 0 : std::min(volume, total - volume));
   }
-  out.frames = (out.frames + out.frames.transpose()).eval() / 2;
   return out;
 }
 
-// What the network makes of forces on nodes: the frames' part and the layer's.
-MatrixXd framesResponse(const IdentifiedNetwork& n, const RowMatrix& forces) {
+// Cells of the spheres span three cells of the grid or more, necks between parts of the body two; six hundred for the
+// whole body hold a few spheres' accuracy and cost a second.
+CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const Vector3d&)>& held) {
+  constexpr double perSphere = 3, perNeck = 2, perBody = 600;
+  constexpr double partMin = 0.02;  // of the body: what hangs on a thinner neck moves with it alone
+  double volume = 0;
+  for (const FillingSphere& s : model.spheres) volume += s.volume;
+  const double spheres = std::cbrt(volume / static_cast<double>(model.spheres.size())) / perSphere;
+  CellSize out{std::min(spheres, std::cbrt(volume / perBody)), ""};
+  const std::vector<double> behind = volumesBehind(model);
+  for (std::size_t l = 0; l < model.links.size(); ++l) {
+    if (behind[l] < partMin * volume) continue;
+    const ElasticLink& link = model.links[l];
+    const Vector3d from = model.spheres[link.sphere0].restFrame, to = model.spheres[link.sphere1].restFrame;
+    // The outer sections of a link may lie in the body's rounded end.
+    for (int k = 2; k + 2 < ElasticLink::kSections; ++k) {
+      const double neck = 2 * std::sqrt(link.sections[k].area / std::numbers::pi);
+      const Vector3d place = from + (k + 0.5) / ElasticLink::kSections * (to - from);
+      if (neck / perNeck >= out.size || (held && held(place))) continue;
+      out = {neck / perNeck,
+             fmt::format("the neck of {:.2g} mm between spheres {} and {}, near ({:.3g}, {:.3g}, {:.3g})", 1e3 * neck,
+                         link.sphere0, link.sphere1, place.x(), place.y(), place.z())};
+    }
+  }
+  return out;
+}
+
+VoxelSolid makeSolid(const SoftBodyModel& model, const TriangleMesh& mesh, const IdentifySettings& settings,
+                     const SolidSettings& solid, const Progress& progress) {
+  if (settings.cellSize > 0) return makeVoxelSolid(mesh, settings.cellSize, solid, progress);
+  const CellSize cell = chooseSize(model, solid.heldSpace);
+  try {
+    return makeVoxelSolid(mesh, cell.size, solid, progress);
+  } catch (const std::runtime_error& error) {
+    const std::string why = cell.neck.empty()
+                                ? fmt::format("fewer spheres than {} would do with larger ones", model.spheres.size())
+                                : "it is too thin for its size: " + cell.neck;
+    throw std::runtime_error(fmt::format("{}; {}", error.what(), why));
+  }
+}
+
+// What the network makes of forces on nodes, without the layer.
+MatrixXd framesResponse(const IdentifiedNetwork& n, const MatrixXd& grounding, const RowMatrix& forces) {
   const int frames = static_cast<int>(n.frames.size());
   const RowSparse skin = skinMatrix(n.skin, frames);
   const MatrixXd loads = skin.transpose() * forces;
-  return skin * MatrixXd(networkStiffness(n.links, n.lengthScale, frames).llt().solve(loads));
+  MatrixXd stiffness = networkStiffness(n.links, n.lengthScale, frames);
+  if (grounding.size() > 0) stiffness += grounding;
+  return skin * MatrixXd(stiffness.llt().solve(loads));
 }
 
 VectorXd largestOf(const MatrixXd& displacements) {
@@ -69,45 +116,85 @@ VectorXd largestOf(const MatrixXd& displacements) {
   return out;
 }
 
-// Fits the layer to loads of its own, and measures the network on others and on bulk loads, which nothing was fitted
-// to; then solves those again in cells a third larger.
-void fitLayerAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const SolidSettings& settings,
-                        IdentifiedNetwork& out, const Progress& progress) {
-  constexpr int fitted = 16, checked = 16;
-  const NodeSurface surface = measureNodes(mesh, out.patches);
-  const auto exact = [&](const VoxelSolid& s, const RowMatrix& forces) -> MatrixXd {
-    return s.surface * displacementsUnder(s, forces);
-  };
-  RowMatrix teaching(3 * static_cast<Index>(mesh.vertices.size()), 2 * fitted);
-  teaching << randomLoads(mesh, surface, LoadKind::bulk, out.lengthScale, fitted, 1),
-      randomLoads(mesh, surface, LoadKind::poke, out.lengthScale, fitted, 1);
-  const MatrixXd under = exact(solid, teaching);
-  out.layer =
-      fitLayer(mesh, surface, teaching, under - framesResponse(out, teaching), largestOf(under), out.lengthScale);
-  progress(0.4);
-  SolidSettings coarse = settings;
-  const VoxelSolid other = makeVoxelSolid(mesh, 4. / 3 * solid.grid.size, coarse);
-  progress(0.8);
-  IdentifiedError ofGrids;
-  for (const LoadKind kind : {LoadKind::bulk, LoadKind::poke}) {
-    const RowMatrix forces = randomLoads(mesh, surface, kind, out.lengthScale, checked, 2);
-    const MatrixXd expected = exact(solid, forces);
-    const MatrixXd found = framesResponse(out, forces) + layerResponse(mesh, surface, out.layer, forces);
-    (kind == LoadKind::bulk ? out.bulk : out.poke) = errorOf(found, expected);
-    const IdentifiedError grids = errorOf(exact(other, forces), expected);
-    ofGrids = {std::max(ofGrids.maximum, grids.maximum), std::max(ofGrids.rms, grids.rms)};
+// Random loads; of a free body with forces, spread by area, that balance them, and displacements without their rigid
+// part, in which two answers may differ at will.
+class Trials {
+ public:
+  Trials(const TriangleMesh& mesh, const IdentifiedNetwork& network, const MatrixXd& grounding)
+      : surface(measureNodes(mesh, network.patches)), mesh_(mesh), network_(network), grounding_(grounding) {
+    if (grounding.size() == 0) return;
+    rigid_ = rigidMotions(mesh.vertices, network.frames[0].restPosition, 3, network.lengthScale);
+    VectorXd areas(rigid_.rows());
+    for (Index k = 0; k < areas.size(); ++k) areas[k] = surface.areas[k / 3];
+    weighted_ = areas.asDiagonal() * rigid_;
   }
-  out.ofFiniteElements = ofGrids;
+
+  RowMatrix loads(LoadKind kind, int count, std::uint64_t seed) const {
+    RowMatrix forces = randomLoads(mesh_, surface, kind, network_.lengthScale, count, seed);
+    if (rigid_.size() > 0)
+      forces -= weighted_ * (rigid_.transpose() * weighted_).ldlt().solve(MatrixXd(rigid_.transpose() * forces));
+    return forces;
+  }
+  MatrixXd exact(const VoxelSolid& solid, const RowMatrix& forces) const {
+    return deformation(solid.surface * displacementsUnder(solid, forces));
+  }
+  MatrixXd ofFrames(const RowMatrix& forces) const { return deformation(framesResponse(network_, grounding_, forces)); }
+  MatrixXd ofNetwork(const RowMatrix& forces) const {
+    return deformation(framesResponse(network_, grounding_, forces) +
+                       layerResponse(mesh_, surface, network_.layer, forces));
+  }
+
+  const NodeSurface surface;
+
+ private:
+  MatrixXd deformation(MatrixXd displacements) const {
+    if (rigid_.size() > 0) {
+      displacements -= rigid_ * (rigid_.transpose() * weighted_).ldlt().solve(weighted_.transpose() * displacements);
+    }
+    return displacements;
+  }
+
+  const TriangleMesh& mesh_;
+  const IdentifiedNetwork& network_;
+  const MatrixXd& grounding_;
+  MatrixXd rigid_, weighted_;  // of a free body: 3 nodes x 6, and times the nodes' areas
+};
+
+// Fits the layer to loads of its own, and measures the network on others, which nothing was fitted to; then solves
+// those again in cells a third larger.
+void fitLayerAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const SolidSettings& settings,
+                        const MatrixXd& grounding, Identification& result, const Progress& progress) {
+  constexpr int count = 16;
+  IdentifiedNetwork& out = result.network;
+  const Trials trials(mesh, out, grounding);
+  RowMatrix teaching(3 * static_cast<Index>(mesh.vertices.size()), 2 * count);
+  teaching << trials.loads(LoadKind::bulk, count, 1), trials.loads(LoadKind::poke, count, 1);
+  const MatrixXd under = trials.exact(solid, teaching);
+  out.layer =
+      fitLayer(mesh, trials.surface, teaching, under - trials.ofFrames(teaching), largestOf(under), out.lengthScale);
+  progress(0.4);
+  const VoxelSolid other = makeVoxelSolid(mesh, 4. / 3 * solid.grid.size, settings);
+  progress(0.8);
+  const RowMatrix bulk = trials.loads(LoadKind::bulk, count, 2), poke = trials.loads(LoadKind::poke, count, 2);
+  const MatrixXd bulkExact = trials.exact(solid, bulk), pokeExact = trials.exact(solid, poke);
+  out.bulk = errorOf(trials.ofNetwork(bulk), bulkExact);
+  out.poke = errorOf(trials.ofNetwork(poke), pokeExact);
+  const IdentifiedError ofBulk = errorOf(trials.exact(other, bulk), bulkExact),
+                        ofPoke = errorOf(trials.exact(other, poke), pokeExact);
+  out.ofFiniteElements = {std::max(ofBulk.maximum, ofPoke.maximum), std::max(ofBulk.rms, ofPoke.rms)};
+  result.forces = bulk;
+  result.displacements = bulkExact;
   progress(1);
 }
 
 }  // namespace
 
-IdentifiedNetwork identifyNetwork(const SoftBodyModel& model, const std::vector<HeldRegion>& held,
-                                  const IdentifySettings& settings, const Progress& progress) {
+Identification identifyNetwork(const SoftBodyModel& model, const std::vector<HeldRegion>& held,
+                               const IdentifySettings& settings, const Progress& progress) {
   checkSettings(settings);
   const TriangleMesh mesh{model.restNodes, model.triangles};
-  IdentifiedNetwork out;
+  Identification result;
+  IdentifiedNetwork& out = result.network;
   out.poisson = settings.poisson;
   SolidSettings solidSettings{settings.poisson, {}, {}, settings.memoryMax};
   std::vector<std::vector<int>> patchTriangles;
@@ -125,18 +212,18 @@ IdentifiedNetwork identifyNetwork(const SoftBodyModel& model, const std::vector<
   };
   std::vector<Ball> balls;
   for (const FillingSphere& s : model.spheres) balls.push_back({s.restBallCentre, s.radius});
-  const VoxelSolid solid = makeVoxelSolid(mesh, settings.cellSize > 0 ? settings.cellSize : chosenSize(nullptr, model),
-                                          solidSettings, stage(0, 0.2));
-  CellFrames cells = makeCellFrames(mesh, balls, solid);
-  const Responses responses = solveFrames(solid, cells, stage(0.2, 0.4));
+  const VoxelSolid solid = makeSolid(model, mesh, settings, solidSettings, stage(0, 0.2));
+  const CellFrames cells = makeCellFrames(mesh, balls, solid);
+  Responses responses = solveFrames(solid, cells, stage(0.2, 0.4));
+  if (held.empty()) responses = balancedResponses(mesh, cells, responses);
   out.voxel = solid.grid.size;
   out.lengthScale = cells.lengthScale;
   out.links = layOutLinks(mesh, cells, out.patches, patchTriangles);
-  fitLinks(responses.frames, {}, out.lengthScale, settings.links, out.links, stage(0.4, 0.85));
+  fitLinks(responses.frames, responses.grounding, out.lengthScale, settings.links, out.links, stage(0.4, 0.85));
   out.skin = fitSkin(mesh, cells, out.patches, responses.frames, responses.nodes);
-  out.frames = std::move(cells.frames);
-  fitLayerAndMeasure(mesh, solid, solidSettings, out, stage(0.85, 1));
-  return out;
+  out.frames = cells.frames;
+  fitLayerAndMeasure(mesh, solid, solidSettings, responses.grounding, result, stage(0.85, 1));
+  return result;
 }
 
 }  // namespace medulla

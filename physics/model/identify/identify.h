@@ -14,13 +14,19 @@ struct IdentifySettings {
   double poisson = 0.45;  // 0 <= poisson < 0.5
   LinkForm links = LinkForm::full;
   double memoryMax = 3e9;  // bytes of the finite elements' factors
-  double cellSize = 0;     // m; 0: chosen from the spheres' cells and the links' sections
+  double cellSize = 0;     // m; 0: a third of the spheres' cells, half of the thinnest neck between spheres
+};
+
+struct Identification {
+  IdentifiedNetwork network;
+  // Bulk loads that nothing was fitted to, and what finite elements make of them at 1 Pa: 3 nodes x loads, N and m.
+  Eigen::MatrixXd forces, displacements;
 };
 
 // Finds the network of `model` by finite elements of its own mesh, solved once. `progress`, if given, is called with
 // 0..1. Deterministic. Throws std::runtime_error on a region without a whole triangle, on settings out of range, and
 // where finite elements of the size that the mesh needs would not fit.
-IdentifiedNetwork identifyNetwork(const SoftBodyModel& model, const std::vector<HeldRegion>& held,
-                                  const IdentifySettings& settings, const std::function<void(double)>& progress = {});
+Identification identifyNetwork(const SoftBodyModel& model, const std::vector<HeldRegion>& held,
+                               const IdentifySettings& settings, const std::function<void(double)>& progress = {});
 
 }  // namespace medulla

@@ -21,7 +21,7 @@ using Matrix6x12d = Eigen::Matrix<double, 6, 12>;
 
 namespace {
 
-constexpr double kContactMin = 0.1;  // of the smaller cell's face: less is a corner or an edge
+constexpr double kContactMin = 0.03;  // of the smaller cell's face: less is a corner or an edge
 
 IdentifiedLink linkBetween(int frame0, int frame1, const Vector3d& from, const Vector3d& to) {
   IdentifiedLink link;

@@ -170,6 +170,12 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
                           const std::function<void(double)>& progress) {
   VoxelSolid solid;
   const double volume = massProperties(mesh).volume, voxel = cellSize / HexGrid::kVoxels;
+  // Beyond, even the plan would take long; what fits has a tenth of these.
+  constexpr double cellsMax = 1e5;
+  if (volume / (cellSize * cellSize * cellSize) > cellsMax) {
+    throw std::runtime_error(fmt::format("finite elements of {:.3g} mm would be {:.2g}, expected at most {:.2g}",
+                                         1e3 * cellSize, volume / (cellSize * cellSize * cellSize), cellsMax));
+  }
   solid.voxels = voxelise(mesh, volume, static_cast<int>(volume / (voxel * voxel * voxel)));
   solid.grid = makeHexGrid(solid.voxels);
   const HexGrid& grid = solid.grid;

@@ -1,0 +1,58 @@
+#include "physics/model/identify/reduction.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+
+namespace medulla {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+
+Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const std::function<void(double)>& progress) {
+  constexpr Index block = 48;
+  const Index n = cells.motion.rows();
+  Responses out{MatrixXd(n, n), MatrixXd(solid.surface.rows(), n), {}};
+  for (Index first = 0; first < n; first += block) {
+    const Index count = std::min(block, n - first);
+    RowMatrix x = RowMatrix(cells.motion.middleRows(first, count)).transpose();
+    solve(solid.plan, solid.factors, x);
+    out.frames.middleCols(first, count) = cells.motion * x;
+    out.nodes.middleCols(first, count) = solid.surface * x;
+    if (progress) progress(static_cast<double>(first + count) / static_cast<double>(n));
+  }
+  out.frames = (out.frames + out.frames.transpose()).eval() / 2;
+  return out;
+}
+
+MatrixXd rigidMotions(const std::vector<Vector3d>& points, const Vector3d& centre, int rows, double lengthScale) {
+  MatrixXd out = MatrixXd::Zero(rows * static_cast<Index>(points.size()), 6);
+  for (std::size_t p = 0; p < points.size(); ++p) {
+    const Index row = rows * static_cast<Index>(p);
+    out.block<3, 3>(row, 0).setIdentity();
+    for (int k = 0; k < 3; ++k) out.block<3, 1>(row, 3 + k) = Vector3d::Unit(k).cross(points[p] - centre) / lengthScale;
+    if (rows == 6) out.block<3, 3>(row + 3, 3).setIdentity();
+  }
+  return out;
+}
+
+Responses balancedResponses(const TriangleMesh& mesh, const CellFrames& cells, const Responses& pinned) {
+  std::vector<Vector3d> places;
+  for (const IdentifiedFrame& f : cells.frames) places.push_back(f.restPosition);
+  const MatrixXd rigid = rigidMotions(places, places[0], 6, cells.lengthScale),
+                 nodesRigid = rigidMotions(mesh.vertices, places[0], 3, cells.lengthScale);
+  const Index n = rigid.rows();
+  const MatrixXd inverse = pinned.frames.llt().solve(MatrixXd::Identity(n, n)), carried = inverse * rigid;
+  MatrixXd stiffness = inverse - carried * (rigid.transpose() * carried).ldlt().solve(carried.transpose());
+  stiffness = (stiffness + stiffness.transpose()).eval() / 2;
+  const MatrixXd basis = rigid.householderQr().householderQ() * MatrixXd::Identity(n, 6);
+  Responses out;
+  out.grounding = stiffness.trace() / static_cast<double>(n) * basis * basis.transpose();
+  out.frames = (stiffness + out.grounding).llt().solve(MatrixXd::Identity(n, n));
+  // Nodes under unit motions of the frames: the pinned solution, and the rigid motion that it lacks.
+  const MatrixXd lacking = rigid.colPivHouseholderQr().solve(MatrixXd::Identity(n, n) - pinned.frames * stiffness);
+  out.nodes = (pinned.nodes * stiffness + nodesRigid * lacking) * out.frames;
+  return out;
+}
+
+}  // namespace medulla

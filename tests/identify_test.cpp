@@ -1,0 +1,327 @@
+#include "physics/model/identify/identify.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <Eigen/SparseCholesky>
+#include <numbers>
+
+#include "physics/model/build.h"
+#include "physics/model/identify/check_loads.h"
+#include "physics/model/identify/hex_stiffness.h"
+#include "physics/model/identify/lbfgs.h"
+#include "physics/model/identify/reduction.h"
+#include "physics/model/identify/skin_fit.h"
+#include "tests/test_shapes.h"
+
+// What `medulla build --identify` finds: finite elements against analytic answers, the reduction against finite
+// elements, the network against both.
+namespace medulla {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+VoxelBody voxelsOf(const TriangleMesh& mesh, double cellSize) {
+  const double volume = massProperties(mesh).volume, voxel = cellSize / HexGrid::kVoxels;
+  return voxelise(mesh, volume, static_cast<int>(volume / (voxel * voxel * voxel)));
+}
+
+std::vector<int> trianglesWhere(const TriangleMesh& mesh, const std::function<bool(const Vector3d&)>& held) {
+  std::vector<int> out;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    if (held(mesh.vertices[a]) && held(mesh.vertices[b]) && held(mesh.vertices[c])) out.push_back(static_cast<int>(t));
+  }
+  return out;
+}
+
+HeldRegion endOfCylinder(const TriangleMesh& mesh) {
+  HeldRegion region{"plane=1,0,0,0.001", {}, [](const Vector3d& x) { return x.x() <= 1e-3; }};
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
+    if (mesh.vertices[n].x() <= 1e-3) region.nodes.push_back(static_cast<int>(n));
+  return region;
+}
+
+TriangleMesh cylinder() {
+  return cylinderMesh(0.1, 0.01, 18, 20);
+}
+
+const SoftBodyModel& cylinderModel() {
+  static const SoftBodyModel model = [] {
+    BuildSettings settings;
+    settings.spheres = 5;
+    settings.overshoot = 0;
+    settings.renderLevels = 0;
+    BuildReport report;
+    return buildModel(asRepaired(cylinder()), nullptr, settings, report);
+  }();
+  return model;
+}
+
+const Identification& heldCylinder() {
+  static const Identification found = identifyNetwork(cylinderModel(), {endOfCylinder(cylinder())}, {});
+  return found;
+}
+
+const Identification& freeCylinder() {
+  static const Identification found = identifyNetwork(cylinderModel(), {}, {});
+  return found;
+}
+
+// The patch test on cells that the surface cuts: a field of constant strain stores its energy density times what is
+// inside of the cell, and a thousandth of the cell.
+TEST(HexGrid, CutCellsStoreWhatConstantStrainSays) {
+  const HexGrid grid = makeHexGrid(voxelsOf(ellipsoidMesh(3, {0.05, 0.04, 0.03}), 0.012));
+  const double poisson = 0.3, lambda = poisson / ((1 + poisson) * (1 - 2 * poisson)), mu = 1 / (2 * (1 + poisson));
+  Matrix3d gradient;
+  gradient << 0.3, -0.1, 0.2, 0.4, 0.25, -0.3, 0.1, 0.6, -0.2;
+  const Matrix3d strain = (gradient + gradient.transpose()) / 2;
+  const double density = lambda / 2 * strain.trace() * strain.trace() + mu * strain.squaredNorm();
+  const MatrixXd perPoint = stiffnessPerPoint(poisson);
+  int cut = 0;
+  for (int c = 0; c < static_cast<int>(grid.cells.size()); ++c) {
+    const MatrixXd k = hexStiffness(grid, perPoint, std::array{c}).reshaped(kHexFreedoms, kHexFreedoms);
+    VectorXd u(kHexFreedoms), rigid(kHexFreedoms);
+    for (int a = 0; a < kHexNodes; ++a) {
+      const Vector3d x = grid.nodes[grid.cellNodes[c][a]];
+      u.segment<3>(3 * a) = gradient * x;
+      rigid.segment<3>(3 * a) = Vector3d(0.2, -0.1, 0.5).cross(x) + Vector3d(1, 2, 3);
+    }
+    const double volume = (grid.fractions[c] + 1e-3) * std::pow(grid.size, 3);
+    EXPECT_NEAR(u.dot(k * u) / 2 / (density * volume), 1, 1e-9) << grid.fractions[c];
+    EXPECT_LT((k * rigid).norm(), 1e-12 * k.norm() * rigid.norm());
+    cut += grid.fractions[c] < 0.99;
+  }
+  EXPECT_GT(cut, 30);
+}
+
+TEST(VoxelSolid, UniformTractionStrainsAFreeBodyUniformly) {
+  const TriangleMesh mesh = ellipsoidMesh(4, {0.05, 0.04, 0.03});
+  const double poisson = 0.3;
+  const VoxelSolid solid = makeVoxelSolid(mesh, 0.01, {poisson, {}, {}});
+  // Pulled along x by 1 Pa: strain 1 along, -nu across.
+  RowMatrix forces = RowMatrix::Zero(3 * static_cast<Index>(mesh.vertices.size()), 1);
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vector3d area = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]) / 2;
+    for (const int n : {a, b, c}) forces(3 * n, 0) += area.x() / 3;
+  }
+  const MatrixXd found = solid.surface * displacementsUnder(solid, forces);
+  const MatrixXd rigid = rigidMotions(mesh.vertices, Vector3d::Zero(), 3, 0.05);
+  VectorXd expected(found.rows());
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
+    expected.segment<3>(3 * static_cast<Index>(n)) = mesh.vertices[n].cwiseProduct(Vector3d(1, -poisson, -poisson));
+  const VectorXd off = found.col(0) - expected;
+  const VectorXd deformation = off - rigid * rigid.colPivHouseholderQr().solve(off);
+  EXPECT_LT(deformation.cwiseAbs().maxCoeff(), 0.01 * 0.05);
+}
+
+// Timoshenko's beam without Poisson's ratio, which leaves the clamped end free to be plane: F L^3 / 3 E I + F L / k G
+// A.
+TEST(VoxelSolid, ACantileverBendsAsABeam) {
+  const int sides = 18;
+  const double length = 0.1, radius = 0.01, turn = 2 * std::numbers::pi / sides;
+  const TriangleMesh mesh = cylinder();
+  const double area = sides / 2. * radius * radius * std::sin(turn);
+  const double moment = sides / 24. * std::pow(radius, 4) * std::sin(turn) * (2 + std::cos(turn));
+  const double expected = length * length * length / (3 * moment) + length / (6. / 7 * 0.5 * area);
+  const std::vector<int> held = trianglesWhere(mesh, [](const Vector3d& x) { return x.x() < 1e-6; });
+  const NodeSurface surface = measureNodes(mesh, {});
+  std::vector<double> errors;
+  for (const double size : {0.01, 0.005}) {
+    const VoxelSolid solid = makeVoxelSolid(mesh, size, {0, held, {}});
+    RowMatrix forces = RowMatrix::Zero(3 * static_cast<Index>(mesh.vertices.size()), 1);
+    double total = 0;
+    for (const int t : trianglesWhere(mesh, [&](const Vector3d& x) { return x.x() > length - 1e-6; })) {
+      const auto& [a, b, c] = mesh.triangles[t];
+      const double part = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).norm() / 6;
+      for (const int n : {a, b, c}) {
+        forces(3 * n + 1, 0) += part;
+        total += part;
+      }
+    }
+    forces /= total;
+    const MatrixXd found = solid.surface * displacementsUnder(solid, forces);
+    const auto tip = static_cast<Index>(mesh.vertices.size()) - 1;
+    errors.push_back(std::abs(found(3 * tip + 1, 0) / expected - 1));
+  }
+  EXPECT_LT(errors[1], 0.01);
+  EXPECT_LT(errors[1], errors[0]);
+}
+
+TEST(Multifrontal, SolvesAsAnySparseCholesky) {
+  const TriangleMesh mesh = ellipsoidMesh(3, {0.05, 0.04, 0.03});
+  const HexGrid grid = makeHexGrid(voxelsOf(mesh, 0.014));
+  const DissectionPlan plan = planDissection(grid);
+  const MatrixXd perPoint = stiffnessPerPoint(0.4);
+  const auto stiffness = [&](int cell, MatrixXd& k) {
+    k = hexStiffness(grid, perPoint, std::array{cell}).reshaped(kHexFreedoms, kHexFreedoms);
+    k.diagonal().array() += 1e-3 * grid.size;
+  };
+  const Index n = 3 * static_cast<Index>(grid.nodes.size());
+  std::vector<Eigen::Triplet<double>> entries;
+  MatrixXd k;
+  for (int c = 0; c < static_cast<int>(grid.cells.size()); ++c) {
+    stiffness(c, k);
+    for (int i = 0; i < kHexFreedoms; ++i) {
+      for (int j = 0; j < kHexFreedoms; ++j)
+        entries.emplace_back(3 * grid.cellNodes[c][i / 3] + i % 3, 3 * grid.cellNodes[c][j / 3] + j % 3, k(i, j));
+    }
+  }
+  Eigen::SparseMatrix<double> whole(n, n);
+  whole.setFromTriplets(entries.begin(), entries.end());
+  RowMatrix x = RowMatrix::Zero(n, 2);
+  for (Index i = 0; i < n; ++i) x.row(i) << std::sin(i), std::cos(3 * i);
+  const MatrixXd expected = Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>(whole).solve(MatrixXd(x));
+  solve(plan, factorise(plan, grid, stiffness), x);
+  EXPECT_LT((x - expected).norm(), 1e-9 * expected.norm());
+  EXPECT_GT(plan.fronts.size(), 5u);
+}
+
+TEST(Lbfgs, FindsTheEndOfACurvedValley) {  // Rosenbrock 1960
+  VectorXd x = Eigen::Vector2d(-1.2, 1);
+  const double value = descend(
+      [](const VectorXd& at, VectorXd& gradient) {
+        const double a = 1 - at[0], b = at[1] - at[0] * at[0];
+        gradient[0] = -2 * a - 400 * at[0] * b;
+        gradient[1] = 200 * b;
+        return a * a + 100 * b * b;
+      },
+      {200, 1e-15, 10}, x);
+  EXPECT_LT(value, 1e-12);
+  EXPECT_NEAR(x[0], 1, 1e-5);
+  EXPECT_NEAR(x[1], 1, 1e-5);
+}
+
+struct Reduced {
+  TriangleMesh mesh;
+  VoxelSolid solid;
+  CellFrames cells;
+  Responses responses;
+};
+
+Reduced reduce(bool held) {
+  Reduced r;
+  r.mesh = cylinder();
+  SolidSettings settings;
+  if (held) settings.heldTriangles = trianglesWhere(r.mesh, [](const Vector3d& x) { return x.x() < 1e-6; });
+  r.solid = makeVoxelSolid(r.mesh, 0.007, settings);
+  std::vector<Ball> balls;
+  for (const FillingSphere& s : cylinderModel().spheres) balls.push_back({s.restBallCentre, s.radius});
+  r.cells = makeCellFrames(r.mesh, balls, r.solid);
+  r.responses = solveFrames(r.solid, r.cells, {});
+  return r;
+}
+
+std::vector<Vector3d> placesOf(const CellFrames& cells) {
+  std::vector<Vector3d> places;
+  for (const IdentifiedFrame& f : cells.frames) places.push_back(f.restPosition);
+  return places;
+}
+
+TEST(CellFrames, FollowRigidMotionAndHaveTheMeshsMass) {
+  const Reduced r = reduce(true);
+  const Vector3d centre(0.03, -0.2, 0.1);
+  const MatrixXd grid = rigidMotions(r.solid.grid.nodes, centre, 3, r.cells.lengthScale),
+                 frames = rigidMotions(placesOf(r.cells), centre, 6, r.cells.lengthScale);
+  EXPECT_LT((r.cells.motion * grid - frames).norm(), 1e-10 * frames.norm());
+  double volume = 0;
+  for (const IdentifiedFrame& f : r.cells.frames) volume += f.volume;
+  EXPECT_NEAR(volume / massProperties(r.mesh).volume, 1, 1e-12);
+}
+
+TEST(Reduction, StiffnessIsThatOfTheDirectSolution) {
+  const Reduced r = reduce(true);
+  VectorXd load(r.responses.frames.rows());
+  for (Index k = 0; k < load.size(); ++k) load[k] = std::sin(2. * static_cast<double>(k) + 1);
+  RowMatrix x = r.cells.motion.transpose() * load;
+  solve(r.solid.plan, r.solid.factors, x);
+  const VectorXd moved = r.cells.motion * x;
+  EXPECT_LT((r.responses.frames.llt().solve(moved) - load).norm(), 1e-8 * load.norm());
+  EXPECT_LT((r.responses.nodes * load - r.solid.surface * x).norm(), 1e-10 * x.norm());
+}
+
+TEST(Reduction, AFreeBodyResistsNoRigidMotion) {
+  const Reduced r = reduce(false);
+  const Responses free = balancedResponses(r.mesh, r.cells, r.responses);
+  const Index n = free.frames.rows();
+  const MatrixXd stiffness = free.frames.llt().solve(MatrixXd::Identity(n, n)) - free.grounding;
+  const MatrixXd rigid = rigidMotions(placesOf(r.cells), {0, 0, 0}, 6, r.cells.lengthScale);
+  EXPECT_LT((stiffness * rigid).norm(), 1e-8 * stiffness.norm() * rigid.norm());
+  const VectorXd own = Eigen::SelfAdjointEigenSolver<MatrixXd>(stiffness, Eigen::EigenvaluesOnly).eigenvalues();
+  EXPECT_LT(std::abs(own[5]), 1e-8 * own[n - 1]);
+  EXPECT_GT(own[6], 1e-6 * own[n - 1]) << "six rigid motions and no more";
+  // Whatever the pins: nodes ride rigidly along.
+  const MatrixXd nodes = free.nodes * free.frames.llt().solve(rigid);
+  EXPECT_LT((nodes - rigidMotions(r.mesh.vertices, {0, 0, 0}, 3, r.cells.lengthScale)).norm(), 1e-8 * nodes.norm());
+}
+
+TEST(IdentifiedNetwork, LinksAndSkinFollowRigidMotion) {
+  for (const Identification* found : {&heldCylinder(), &freeCylinder()}) {
+    const IdentifiedNetwork& n = found->network;
+    std::vector<Vector3d> places;
+    for (const IdentifiedFrame& f : n.frames) places.push_back(f.restPosition);
+    for (const IdentifiedLink& link : n.links) {
+      const MatrixXd rigid = rigidMotions({link.restPoint0, link.restPoint1}, {0.1, 0.2, 0.3}, 6, n.lengthScale);
+      EXPECT_LT((linkMeasures(link, n.lengthScale) * rigid).norm(), 1e-12 * rigid.norm());
+      EXPECT_GE(Eigen::SelfAdjointEigenSolver<Matrix6d>(link.stiffness).eigenvalues()[0],
+                -1e-12 * link.stiffness.norm());
+    }
+    const TriangleMesh mesh = cylinder();
+    const MatrixXd expected = rigidMotions(mesh.vertices, {0, 0, 0}, 3, n.lengthScale);
+    for (std::size_t node = 0; node < n.skin.size(); ++node) {
+      MatrixXd moved = MatrixXd::Zero(3, 6);
+      double weights = 0;
+      for (const SkinFrame& f : n.skin[node]) {
+        moved += f.map * rigidMotions({f.restPoint}, {0, 0, 0}, 6, n.lengthScale);
+        weights += f.weight;
+      }
+      EXPECT_LT((moved - expected.middleRows<3>(3 * static_cast<Index>(node))).norm(), 1e-10);
+      EXPECT_NEAR(weights, 1, 1e-12);
+    }
+  }
+}
+
+TEST(IdentifiedNetwork, AnswersLoadsAsFiniteElementsDo) {
+  const IdentifiedNetwork& held = heldCylinder().network;
+  EXPECT_LT(held.bulk.rms, 1.5);
+  EXPECT_LT(held.poke.rms, 1.5);
+  EXPECT_LT(held.ofFiniteElements.rms, 1);
+  EXPECT_GT(held.bulk.rms, 0);
+  EXPECT_LT(freeCylinder().network.bulk.rms, 8);
+  ASSERT_EQ(held.patches.size(), 1u);
+  EXPECT_EQ(held.patches[0].nodes.size(), 19u);
+  for (const int n : held.patches[0].nodes) EXPECT_EQ(held.skin[n].front().frame, static_cast<int>(held.frames.size()));
+}
+
+std::string refusal(const std::vector<HeldRegion>& regions, const IdentifySettings& settings) {
+  try {
+    identifyNetwork(cylinderModel(), regions, settings);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(IdentifiedNetwork, WhatCannotBeIsRefused) {
+  IdentifySettings settings;
+  for (const double poisson : {-0.1, 0.5, std::nan("")}) {
+    settings.poisson = poisson;
+    EXPECT_NE(refusal({}, settings).find("less than 0.5"), std::string::npos) << poisson;
+  }
+  EXPECT_EQ(refusal({{"box=1", {}, {}}}, {}), "box=1 holds no node of the surface");
+  EXPECT_EQ(refusal({{"box=1", {0, 100}, {}}}, {}),
+            "box=1 holds 2 nodes but no whole triangle of the surface; expected one at least");
+  settings = {};
+  settings.memoryMax = 1e6;
+  EXPECT_NE(refusal({endOfCylinder(cylinder())}, settings).find("GB, expected at most 0.0 GB"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace medulla
