@@ -100,14 +100,15 @@ static Vector3d defined(const WorldData& d, int node) {
     turn += f.weight * log(q[0].conjugate() * q.back());
   }
   const Quaterniond blend = q[0] * exp(turn);
+  const Eigen::Matrix3d rotation = blend.toRotationMatrix();
   Vector3d offset = m.restNodes[node] - restMean;
   for (std::size_t k = 0; k < skin.size(); ++k) {
     Eigen::Matrix<double, 6, 1> z;
-    z.head<3>() = blend.conjugate() * (x[k] - mean) - (skin[k].restPoint - restMean);
+    z.head<3>() = rotation.transpose() * (x[k] - mean) - (skin[k].restPoint - restMean);
     z.tail<3>() = n.lengthScale * log(blend.conjugate() * q[k]);
     offset += skin[k].map * z;
   }
-  return mean + blend * offset;
+  return mean + rotation * offset;
 }
 
 // To first order in how far neighbours are turned whatever the maps, to second without or with isotropic ones.
