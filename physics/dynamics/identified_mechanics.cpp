@@ -154,6 +154,7 @@ std::vector<SkinRow> skinRows(const SoftBodyModel& model, const std::vector<Skin
     ofTurn += way * crossMatrix(f.restPoint - mean) - turn;
   }
   std::vector<SkinRow> out;
+  out.reserve(frames.size());
   for (const SkinFrame& f : frames)
     out.push_back({f.weight * ofMean + f.map.leftCols<3>(), f.weight * ofTurn + scale * f.map.rightCols<3>()});
   return out;

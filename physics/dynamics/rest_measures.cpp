@@ -1,0 +1,59 @@
+#include "physics/dynamics/rest_measures.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include "physics/dynamics/identified_mechanics.h"
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+// Of identified links, along the eigenvectors of each one's stiffness.
+static std::vector<MeasureRow> identifiedRows(const SoftBodyModel& m, const BodyMechanics& b) {
+  std::vector<MeasureRow> rows;
+  const int spheres = static_cast<int>(m.spheres.size());
+  for (std::size_t k = 0; k < b.identifiedLinks.size(); ++k) {
+    const IdentifiedLink& l = m.identified->links[k];
+    const RestMeasures measures = restMeasures(m, l);
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(b.identifiedLinks[k]);
+    for (int i = 0; i < 6; ++i) {
+      if (!(eigen.eigenvalues()[i] > 0)) continue;
+      const Eigen::Matrix<double, 1, 6> e = eigen.eigenvectors().col(i).transpose();
+      rows.push_back({l.frame0, l.frame1 < spheres ? l.frame1 : -1, (e * measures.line).transpose(),
+                      (e * measures.turn0).transpose(), (e * measures.turn1).transpose(), eigen.eigenvalues()[i]});
+    }
+  }
+  return rows;
+}
+
+std::vector<MeasureRow> measureRows(const SoftBodyModel& m, const BodyMechanics& b) {
+  if (!b.identifiedLinks.empty()) return identifiedRows(m, b);
+  std::vector<MeasureRow> rows;
+  const Vector3d none = Vector3d::Zero();
+  for (std::size_t k = 0; k < b.spans.size(); ++k) {
+    const ElasticLink& l = m.links[k];
+    const Vector3d d = b.spans[k].end1 - b.spans[k].end0;
+    const Vector3d arm0 = b.spans[k].end0 - m.spheres[l.sphere0].restFrame,
+                   arm1 = b.spans[k].end1 - m.spheres[l.sphere1].restFrame;
+    const double length = d.norm();
+    const Vector3d t = d / length, u = (l.restU - t * t.dot(l.restU)).normalized(), v = t.cross(u);
+    const LinkStiffness& s = b.links[k];
+    const auto add = [&](const Vector3d& line, const Vector3d& turn0, const Vector3d& turn1, double stiffness) {
+      rows.push_back({l.sphere0, l.sphere1, line, turn0 - arm0.cross(line), turn1 + arm1.cross(line), stiffness});
+    };
+    add(t, none, none, s.elongation);
+    // k0 a0^2 + 2 c a0 a1 + k1 a1^2 as squares: k0 (a0 + c/k0 a1)^2 + (k1 - c^2/k0) a1^2
+    const auto addFlexion = [&](const Vector3d& across, const Vector3d& turn, const FlexionStiffness& f) {
+      const double ratio = f.couple / f.end0;
+      add((1 + ratio) / length * across, turn, ratio * turn, f.end0);
+      add(across / length, none, turn, f.end1 - ratio * f.couple);
+    };
+    addFlexion(u, -v, s.flexionV);
+    addFlexion(v, u, s.flexionU);
+    add(none, -t, t, s.torsion);
+  }
+  return rows;
+}
+
+}  // namespace medulla
