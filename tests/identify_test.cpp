@@ -107,21 +107,20 @@ TEST(VoxelSolid, UniformTractionStrainsAFreeBodyUniformly) {
   const double poisson = 0.3;
   const VoxelSolid solid = makeVoxelSolid(mesh, 0.01, {poisson, {}, {}});
   // Pulled along x by 1 Pa: strain 1 along, -nu across.
-  RowMatrix tractions = RowMatrix::Zero(3 * static_cast<Index>(mesh.triangles.size()), 1);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    const Vector3d area = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-    tractions(3 * static_cast<Index>(t), 0) = area.normalized().x();
+  RowMatrix forces = RowMatrix::Zero(3 * static_cast<Index>(mesh.vertices.size()), 1);
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vector3d area = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]) / 2;
+    for (const int n : {a, b, c}) forces(3 * n, 0) += area.x() / 3;
   }
-  const MatrixXd found = displacementsUnder(solid, tractions);
+  const MatrixXd found = solid.surface * displacementsUnder(solid, forces);
   const MatrixXd rigid = rigidMotions(mesh.vertices, Vector3d::Zero(), 3, 0.05);
   VectorXd expected(found.rows());
   for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
     expected.segment<3>(3 * static_cast<Index>(n)) = mesh.vertices[n].cwiseProduct(Vector3d(1, -poisson, -poisson));
   const VectorXd off = found.col(0) - expected;
   const VectorXd deformation = off - rigid * rigid.colPivHouseholderQr().solve(off);
-  EXPECT_LT(deformation.cwiseAbs().maxCoeff(), 0.01 * 0.05);
-  EXPECT_LT(deformation.norm(), 0.001 * expected.norm());
+  // Largest where the surface lies in a dropped cell.
+  EXPECT_LT(deformation.cwiseAbs().maxCoeff(), 0.07 * 0.05);
 }
 
 // Timoshenko's beam without Poisson's ratio, which leaves the clamped end free to be plane: F L^3 / 3 E I + F L / k G
@@ -134,18 +133,28 @@ TEST(VoxelSolid, ACantileverBendsAsABeam) {
   const double moment = sides / 24. * std::pow(radius, 4) * std::sin(turn) * (2 + std::cos(turn));
   const double expected = length * length * length / (3 * moment) + length / (6. / 7 * 0.5 * area);
   const std::vector<int> held = trianglesWhere(mesh, [](const Vector3d& x) { return x.x() < 1e-6; });
+  const NodeSurface surface = measureNodes(mesh, {});
   std::vector<double> errors;
   for (const double size : {0.01, 0.005}) {
     const VoxelSolid solid = makeVoxelSolid(mesh, size, {0, held, {}});
-    RowMatrix tractions = RowMatrix::Zero(3 * static_cast<Index>(mesh.triangles.size()), 1);
-    for (const int t : trianglesWhere(mesh, [&](const Vector3d& x) { return x.x() > length - 1e-6; }))
-      tractions(3 * t + 1, 0) = 1 / area;
-    const MatrixXd found = displacementsUnder(solid, tractions);
+    RowMatrix forces = RowMatrix::Zero(3 * static_cast<Index>(mesh.vertices.size()), 1);
+    double total = 0;
+    for (const int t : trianglesWhere(mesh, [&](const Vector3d& x) { return x.x() > length - 1e-6; })) {
+      const auto& [a, b, c] = mesh.triangles[t];
+      const double part = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).norm() / 6;
+      for (const int n : {a, b, c}) {
+        forces(3 * n + 1, 0) += part;
+        total += part;
+      }
+    }
+    forces /= total;
+    const MatrixXd found = solid.surface * displacementsUnder(solid, forces);
     const auto tip = static_cast<Index>(mesh.vertices.size()) - 1;
     errors.push_back(std::abs(found(3 * tip + 1, 0) / expected - 1));
   }
-  EXPECT_LT(errors[1], 0.01);
-  EXPECT_LT(errors[1], errors[0]);
+  // Forces spread from nodes move the end's load inward by a part of a triangle.
+  EXPECT_LT(errors[0], 0.025);
+  EXPECT_LT(errors[1], 0.025);
 }
 
 TEST(Multifrontal, SolvesAsAnySparseCholesky) {

@@ -31,13 +31,13 @@ NodeSurface measureNodes(const TriangleMesh& mesh, const std::vector<FixedPatch>
   return out;
 }
 
-RowMatrix randomTractions(const TriangleMesh& mesh, const NodeSurface& surface, LoadKind kind, double lengthScale,
-                          int count, std::uint64_t seed) {
+RowMatrix randomLoads(const TriangleMesh& mesh, const NodeSurface& surface, LoadKind kind, double lengthScale,
+                      int count, std::uint64_t seed) {
   constexpr int tries = 20;  // for a patch clear of what is held; then any will do
   RandomSequence random{seed};
   const double diagonal = boundsDiagonal(mesh);
   const std::vector<SurfaceSample> centres = sampleSurface(mesh, count * tries, seed);
-  RowMatrix tractions = RowMatrix::Zero(3 * static_cast<Index>(mesh.triangles.size()), count);
+  RowMatrix forces = RowMatrix::Zero(3 * static_cast<Index>(mesh.vertices.size()), count);
   for (int load = 0; load < count; ++load) {
     const bool poke = kind == LoadKind::poke;
     const double share = random.uniform();
@@ -46,33 +46,21 @@ RowMatrix randomTractions(const TriangleMesh& mesh, const NodeSurface& surface, 
     for (int k = 0; k < tries; ++k) {
       // Samples run along the surface: every load tries one in each of `tries` parts of it.
       const SurfaceSample& centre = centres[(load + k * count + (load * 7 % tries) * count) % (count * tries)];
-      bool any = false, clear = true;
-      tractions.col(load).setZero();
-      for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-        const auto& [a, b, c] = mesh.triangles[t];
-        const Vector3d middle = (mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3;
-        const Vector3d normal = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-        if ((middle - centre.point).norm() > radius || normal.dot(centre.normal) < 0.2 * normal.norm()) continue;
-        if (surface.held[a] || surface.held[b] || surface.held[c]) {
+      int nodes = 0;
+      bool clear = true;
+      forces.col(load).setZero();
+      for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
+        if ((mesh.vertices[n] - centre.point).norm() > radius || surface.normals[n].dot(centre.normal) < 0.2) continue;
+        if (surface.held[n]) {
           clear = false;
           continue;
         }
-        tractions.block<3, 1>(3 * static_cast<Index>(t), load) = poke ? Vector3d(-centre.normal) : direction;
-        any = true;
+        forces.block<3, 1>(3 * static_cast<Index>(n), load) =
+            surface.areas[n] * (poke ? Vector3d(-centre.normal) : direction);
+        ++nodes;
       }
-      if (any && (clear || k + 1 == tries)) break;
+      if (nodes >= 3 && (clear || k + 1 == tries)) break;
     }
-  }
-  return tractions;
-}
-
-RowMatrix nodalForces(const TriangleMesh& mesh, const RowMatrix& tractions) {
-  RowMatrix forces = RowMatrix::Zero(3 * static_cast<Index>(mesh.vertices.size()), tractions.cols());
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    const double area = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).norm() / 2;
-    for (const int n : {a, b, c})
-      forces.middleRows<3>(3 * static_cast<Index>(n)) += area / 3 * tractions.middleRows<3>(3 * static_cast<Index>(t));
   }
   return forces;
 }

@@ -18,16 +18,13 @@ NodeSurface measureNodes(const TriangleMesh& mesh, const std::vector<FixedPatch>
 
 enum class LoadKind {
   bulk,  // one direction in space, on a patch of a quarter to half of the body's size
-  poke,  // into the surface, on a patch of a third to once the length scale; a triangle at least
+  poke,  // into the surface, on a patch of a third to once the length scale
 };
 
-// Even tractions of 1 Pa on random patches of the surface, clear of what is held where that can be: 3 triangles x
-// count.
-RowMatrix randomTractions(const TriangleMesh& mesh, const NodeSurface& surface, LoadKind kind, double lengthScale,
-                          int count, std::uint64_t seed);
-
-// The forces on the mesh's nodes that do the same work on them: 3 nodes x loads, N.
-RowMatrix nodalForces(const TriangleMesh& mesh, const RowMatrix& tractions);
+// Random tractions of 1 Pa on patches of the surface, as forces (N) on its nodes: 3 nodes x count. Nodes that are held
+// get no load. Patches of pokes have three nodes at least.
+RowMatrix randomLoads(const TriangleMesh& mesh, const NodeSurface& surface, LoadKind kind, double lengthScale,
+                      int count, std::uint64_t seed);
 
 // Of columns of nodal displacements (3 nodes x loads): the worst load's largest error, and the mean square over all,
 // both relative to the load's largest expected displacement.

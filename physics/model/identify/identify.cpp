@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -117,32 +116,27 @@ VectorXd largestOf(const MatrixXd& displacements) {
   return out;
 }
 
-// Random loads; of a free body with tractions, linear in place, that balance them, and displacements without their
-// rigid part, in which two answers may differ at will.
+// Random loads; of a free body with forces, spread by area, that balance them, and displacements without their rigid
+// part, in which two answers may differ at will.
 class Trials {
  public:
   Trials(const TriangleMesh& mesh, const IdentifiedNetwork& network, const MatrixXd& grounding)
       : surface(measureNodes(mesh, network.patches)), mesh_(mesh), network_(network), grounding_(grounding) {
     if (grounding.size() == 0) return;
-    const Vector3d centre = network.frames[0].restPosition;
-    std::vector<Vector3d> middles;
-    for (const auto& [a, b, c] : mesh.triangles)
-      middles.push_back((mesh.vertices[a] + mesh.vertices[b] + mesh.vertices[c]) / 3);
-    rigid_ = rigidMotions(mesh.vertices, centre, 3, network.lengthScale);
-    pushes_ = rigidMotions(middles, centre, 3, network.lengthScale);
-    pushed_ = nodalForces(mesh, pushes_);
+    rigid_ = rigidMotions(mesh.vertices, network.frames[0].restPosition, 3, network.lengthScale);
+    VectorXd areas(rigid_.rows());
+    for (Index k = 0; k < areas.size(); ++k) areas[k] = surface.areas[k / 3];
+    weighted_ = areas.asDiagonal() * rigid_;
   }
 
-  RowMatrix tractions(LoadKind kind, int count, std::uint64_t seed) const {
-    RowMatrix out = randomTractions(mesh_, surface, kind, network_.lengthScale, count, seed);
-    if (rigid_.size() > 0) {
-      const MatrixXd resultants = rigid_.transpose() * nodalForces(mesh_, out), each = rigid_.transpose() * pushed_;
-      out -= pushes_ * each.partialPivLu().solve(resultants);
-    }
-    return out;
+  RowMatrix loads(LoadKind kind, int count, std::uint64_t seed) const {
+    RowMatrix forces = randomLoads(mesh_, surface, kind, network_.lengthScale, count, seed);
+    if (rigid_.size() > 0)
+      forces -= weighted_ * (rigid_.transpose() * weighted_).ldlt().solve(MatrixXd(rigid_.transpose() * forces));
+    return forces;
   }
-  MatrixXd exact(const VoxelSolid& solid, const RowMatrix& tractions) const {
-    return deformation(displacementsUnder(solid, tractions));
+  MatrixXd exact(const VoxelSolid& solid, const RowMatrix& forces) const {
+    return deformation(solid.surface * displacementsUnder(solid, forces));
   }
   MatrixXd ofFrames(const RowMatrix& forces) const { return deformation(framesResponse(network_, grounding_, forces)); }
   MatrixXd ofNetwork(const RowMatrix& forces) const {
@@ -155,8 +149,7 @@ class Trials {
  private:
   MatrixXd deformation(MatrixXd displacements) const {
     if (rigid_.size() > 0) {
-      displacements -=
-          rigid_ * (pushed_.transpose() * rigid_).partialPivLu().solve(pushed_.transpose() * displacements);
+      displacements -= rigid_ * (rigid_.transpose() * weighted_).ldlt().solve(weighted_.transpose() * displacements);
     }
     return displacements;
   }
@@ -164,8 +157,7 @@ class Trials {
   const TriangleMesh& mesh_;
   const IdentifiedNetwork& network_;
   const MatrixXd& grounding_;
-  MatrixXd rigid_;             // of a free body: the nodes' rigid motions, 3 nodes x 6,
-  RowMatrix pushes_, pushed_;  // tractions like these, 3 triangles x 6, and the nodes' forces under them
+  MatrixXd rigid_, weighted_;  // of a free body: 3 nodes x 6, and times the nodes' areas
 };
 
 // Fits the layer to loads of its own, and measures the network on others, which nothing was fitted to; then solves
@@ -175,22 +167,22 @@ void fitLayerAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const
   constexpr int count = 16;
   IdentifiedNetwork& out = result.network;
   const Trials trials(mesh, out, grounding);
-  RowMatrix teaching(3 * static_cast<Index>(mesh.triangles.size()), 2 * count);
-  teaching << trials.tractions(LoadKind::bulk, count, 1), trials.tractions(LoadKind::poke, count, 1);
+  RowMatrix teaching(3 * static_cast<Index>(mesh.vertices.size()), 2 * count);
+  teaching << trials.loads(LoadKind::bulk, count, 1), trials.loads(LoadKind::poke, count, 1);
   const MatrixXd under = trials.exact(solid, teaching);
-  out.layer = fitLayer(mesh, trials.surface, nodalForces(mesh, teaching), under - trials.ofFrames(teaching),
-                       largestOf(under), out.lengthScale);
+  out.layer =
+      fitLayer(mesh, trials.surface, teaching, under - trials.ofFrames(teaching), largestOf(under), out.lengthScale);
   progress(0.4);
   const VoxelSolid other = makeVoxelSolid(mesh, 4. / 3 * solid.grid.size, settings);
   progress(0.8);
-  const RowMatrix bulk = trials.tractions(LoadKind::bulk, count, 2), poke = trials.tractions(LoadKind::poke, count, 2);
+  const RowMatrix bulk = trials.loads(LoadKind::bulk, count, 2), poke = trials.loads(LoadKind::poke, count, 2);
   const MatrixXd bulkExact = trials.exact(solid, bulk), pokeExact = trials.exact(solid, poke);
   out.bulk = errorOf(trials.ofNetwork(bulk), bulkExact);
   out.poke = errorOf(trials.ofNetwork(poke), pokeExact);
   const IdentifiedError ofBulk = errorOf(trials.exact(other, bulk), bulkExact),
                         ofPoke = errorOf(trials.exact(other, poke), pokeExact);
   out.ofFiniteElements = {std::max(ofBulk.maximum, ofPoke.maximum), std::max(ofBulk.rms, ofPoke.rms)};
-  result.forces = nodalForces(mesh, bulk);
+  result.forces = bulk;
   result.displacements = bulkExact;
   progress(1);
 }

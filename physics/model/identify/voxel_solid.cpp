@@ -32,14 +32,14 @@ void holdPoint(const HexGrid& grid, const Vector3d& point, double stiffness, Hel
       stiffness * shape * shape.transpose();
 }
 
-// Calls use(point, area) for points of a triangle a third of a cell apart.
+// Calls use(point, shapes, area) for points of a triangle a third of a cell apart, with linear shapes of its corners.
 template <typename Use>
 void overTriangle(const TriangleMesh& mesh, const std::array<int, 3>& corners, double cellSize, const Use& use) {
   const Vector3d o = mesh.vertices[corners[0]], u = mesh.vertices[corners[1]] - o, v = mesh.vertices[corners[2]] - o;
   const double longest = std::max({u.norm(), v.norm(), (u - v).norm()});
   const int parts = std::max(1, static_cast<int>(std::ceil(longest / (cellSize / 3))));
   const double area = u.cross(v).norm() / 2 / (parts * parts);
-  const auto at = [&](double a, double b) { use(o + a * u + b * v, area); };
+  const auto at = [&](double a, double b) { use(o + a * u + b * v, Vector3d(1 - a - b, a, b), area); };
   for (int i = 0; i < parts; ++i) {
     for (int j = 0; i + j < parts; ++j) {
       at((i + 1. / 3) / parts, (j + 1. / 3) / parts);
@@ -50,7 +50,7 @@ void overTriangle(const TriangleMesh& mesh, const std::array<int, 3>& corners, d
 
 void holdTriangles(const TriangleMesh& mesh, const std::vector<int>& triangles, const HexGrid& grid, HeldCells& held) {
   for (const int t : triangles) {
-    overTriangle(mesh, mesh.triangles[t], grid.size, [&](const Vector3d& point, double area) {
+    overTriangle(mesh, mesh.triangles[t], grid.size, [&](const Vector3d& point, const Vector3d&, double area) {
       holdPoint(grid, point, kPenalty / grid.size * area, held);
     });
   }
@@ -71,18 +71,30 @@ void addHeld(const Eigen::Matrix<double, kHexNodes, kHexNodes>& springs, MatrixX
   }
 }
 
-RowSparse tractionLoads(const TriangleMesh& mesh, const HexGrid& grid) {
+RowSparse tractions(const TriangleMesh& mesh, const HexGrid& grid) {
+  std::vector<double> areas(mesh.vertices.size(), 0);
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    overTriangle(mesh, t, grid.size, [&](const Vector3d&, const Vector3d& shapes, double area) {
+      for (int c = 0; c < 3; ++c) areas[t[c]] += shapes[c] * area;
+    });
+  }
   std::vector<Eigen::Triplet<double>> entries;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    overTriangle(mesh, mesh.triangles[t], grid.size, [&](const Vector3d& point, double area) {
+  std::vector<std::map<int, double>> shares(mesh.vertices.size());  // by grid node
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    overTriangle(mesh, t, grid.size, [&](const Vector3d& point, const Vector3d& shapes, double area) {
       const HexPoint at = locate(grid, point);
-      for (int a = 0; a < kHexNodes; ++a) {
-        for (int k = 0; k < 3; ++k)
-          entries.emplace_back(3 * grid.cellNodes[at.cell][a] + k, static_cast<int>(3 * t) + k, area * at.shape[a]);
+      for (int c = 0; c < 3; ++c) {
+        const double share = shapes[c] * area / areas[t[c]];
+        for (int a = 0; a < kHexNodes; ++a) shares[t[c]][grid.cellNodes[at.cell][a]] += share * at.shape[a];
       }
     });
   }
-  RowSparse out(3 * static_cast<Index>(grid.nodes.size()), 3 * static_cast<Index>(mesh.triangles.size()));
+  for (std::size_t n = 0; n < shares.size(); ++n) {
+    for (const auto& [node, share] : shares[n]) {
+      for (int k = 0; k < 3; ++k) entries.emplace_back(3 * node + k, static_cast<int>(3 * n) + k, share);
+    }
+  }
+  RowSparse out(3 * static_cast<Index>(grid.nodes.size()), 3 * static_cast<Index>(mesh.vertices.size()));
   out.setFromTriplets(entries.begin(), entries.end());
   return out;
 }
@@ -195,14 +207,14 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
   };
   solid.factors = factorise(solid.plan, grid, cellStiffness, progress);
   solid.surface = interpolation(grid, mesh.vertices);
-  solid.loading = tractionLoads(mesh, grid);
+  solid.loading = tractions(mesh, grid);
   return solid;
 }
 
-RowMatrix displacementsUnder(const VoxelSolid& solid, const RowMatrix& tractions) {
-  RowMatrix x = solid.loading * tractions;
+RowMatrix displacementsUnder(const VoxelSolid& solid, const RowMatrix& forces) {
+  RowMatrix x = solid.loading * forces;
   solve(solid.plan, solid.factors, x);
-  return solid.surface * x;
+  return x;
 }
 
 }  // namespace medulla

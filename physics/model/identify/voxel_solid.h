@@ -21,7 +21,7 @@ struct VoxelSolid {
   DissectionPlan plan;
   FrontFactors factors;
   RowSparse surface;  // 3 mesh nodes x 3 grid nodes: displacement of the mesh's nodes
-  RowSparse loading;  // 3 grid nodes x 3 mesh triangles: forces of an even traction of 1 Pa on each, N
+  RowSparse loading;  // 3 grid nodes x 3 mesh nodes: a node's force as a traction that falls to 0 on its neighbours
 };
 
 struct SolidSettings {
@@ -35,7 +35,7 @@ struct SolidSettings {
 VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
                           const std::function<void(double)>& progress = {});
 
-// Displacements of the mesh's nodes (3 nodes x loads) under even tractions on its triangles (Pa, 3 triangles x loads).
-RowMatrix displacementsUnder(const VoxelSolid& solid, const RowMatrix& tractions);
+// Displacements of the grid's nodes under forces on the mesh's nodes (3 mesh nodes x loads).
+RowMatrix displacementsUnder(const VoxelSolid& solid, const RowMatrix& forces);
 
 }  // namespace medulla
