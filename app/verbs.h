@@ -27,6 +27,10 @@ struct RunArguments {
 void addSceneOptions(CLI::App& command, RunArguments& a);  // SCENE, --set, --trajectory
 RunOptions runOptions(const RunArguments& a);
 
+// model_verbs.cpp
+Verb addBuild(CLI::App& app);
+Verb addNew(CLI::App& app);
+
 // measuring_verbs.cpp
 Verb addGolden(CLI::App& app);
 Verb addCompare(CLI::App& app);

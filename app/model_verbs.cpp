@@ -1,0 +1,124 @@
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "app/commands/commands.h"
+#include "app/verbs.h"
+
+// The verbs that make models.
+namespace medulla {
+
+namespace {
+
+struct BuildArguments {
+  BuildOptions options;
+  std::string method = "cover", linkForm = "full";
+};
+
+BuildOptions buildOptions(const BuildArguments& a) {
+  BuildOptions options = a.options;
+  options.settings.method = a.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
+  const BuildSettings& s = options.settings;
+  for (const auto& [name, value] : {std::pair("--gap", s.gap), std::pair("--overshoot", s.overshoot.value_or(0))})
+    if (value > 0 && s.method != BuildMethod::cover)
+      usageError(name, fmt::format("{}", value), "together with --method cover");
+  if (!options.fine.empty() && options.fine.size() != options.meshes.size())
+    usageError("--fine", options.fine.back(),
+               fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
+  options.identification.links = a.linkForm == "full" ? LinkForm::full : LinkForm::diagonal;
+  if (options.identify && options.meshes.size() > 1)
+    usageError("--identify", "", fmt::format("a single mesh, not {}", options.meshes.size()));
+  return options;
+}
+
+void addIdentification(CLI::App& c, BuildArguments& a) {
+  CLI::Option* identify =
+      c.add_flag("--identify", a.options.identify,
+                 "find the links' stiffness by finite elements of the very mesh, held as --fix says, "
+                 "for bodies that are no network of beams; takes up to a minute");
+  c.add_option("--fix", a.options.fix,
+               "what scenes hold, as their <fix>: box=x0,y0,z0,x1,y1,z1, sphere=x,y,z,r, plane=nx,ny,nz,d (m) or "
+               "vertices=FILE.csv; may be given more than once")
+      ->type_name("REGION")
+      ->allow_extra_args(false)
+      ->needs(identify);
+  c.add_option("--poisson", a.options.identification.poisson, "Poisson's ratio of the tissue, 0 to less than 0.5")
+      ->needs(identify)
+      ->capture_default_str();
+  c.add_option("--link-form", a.linkForm, "six scalars per link, or any stiffness between its two frames")
+      ->check(CLI::IsMember({"diagonal", "full"}))
+      ->needs(identify)
+      ->capture_default_str();
+}
+
+}  // namespace
+
+Verb addBuild(CLI::App& app) {
+  const auto arguments = std::make_shared<BuildArguments>();
+  BuildArguments& a = *arguments;
+  CLI::App* c = app.add_subcommand("build", "make a model of filling spheres from each closed triangle mesh");
+  c->add_option("MESH", a.options.meshes, "closed surface: OBJ, OFF, STL, PLY, ...; one body each")->required();
+  c->add_option("-o,--output", a.options.output,
+                "model file to write; for several meshes a folder, where each becomes MESH.model.xml")
+      ->type_name("MODEL.xml|DIR")
+      ->required();
+  CLI::Option* spheres =
+      c->add_option(
+           "--spheres", a.options.settings.spheres,
+           "number of filling spheres; of several meshes together: shared out so that the largest gap, in metres, "
+           "is about the same for all")
+          ->check(CLI::Range(1, spheresMax))
+          ->capture_default_str();
+  c->add_option(
+       "--gap", a.options.settings.gap,
+       "instead of a number: the fewest spheres, of each mesh, that leave no wider gap between the surface and "
+       "the nearest sphere, in % of the bounding box's diagonal")
+      ->check(CLI::Range(0.01, 99.0))
+      ->type_name("PERCENT")
+      ->excludes(spheres);
+  c->add_option(
+       "--overshoot", a.options.settings.overshoot,
+       "how far spheres may stick out of the surface, in % of the bounding box's diagonal: they fill more, and "
+       "bodies touch by so much too early instead of sinking in by the gap [4.2 / sqrt(spheres), or half the gap, 5 at "
+       "most]")
+      ->check(CLI::Range(0.0, 5.0))
+      ->type_name("PERCENT");
+  c->add_option("--method", a.method, "cover: balls chosen to fill the body; skeleton: the raw edge collapse")
+      ->check(CLI::IsMember({"cover", "skeleton"}))
+      ->capture_default_str();
+  c->add_option("--unit", a.options.unit, "unit of the mesh files")
+      ->check(CLI::IsMember({"m", "cm", "mm", "inch"}))
+      ->capture_default_str();
+  c->add_option("--fine", a.options.fine, "detailed shape that the drawn surface follows; of several meshes one each")
+      ->type_name("MESH")
+      ->allow_extra_args(false);
+  c->add_option("--surface-mass", a.options.settings.surfaceMassFraction,
+                "share of the mass that surface nodes carry; more allows larger substeps")
+      ->check(CLI::Range(0.0, 0.4))
+      ->capture_default_str();
+  c->add_option("--render-levels", a.options.settings.renderLevels, "subdivisions of the mesh for the drawn surface")
+      ->check(CLI::Range(0, 4))
+      ->capture_default_str();
+  c->add_option("--report", a.options.reportPath, "write the quality report as CSV too")->type_name("FILE.csv");
+  addIdentification(*c, a);
+  return {c, [arguments] { return runBuild(buildOptions(*arguments)); }};
+}
+
+Verb addNew(CLI::App& app) {
+  const auto options = std::make_shared<NewOptions>();
+  NewOptions& o = *options;
+  CLI::App* c = app.add_subcommand("new", "make a scene, a model and a trajectory around a mesh, ready to render");
+  c->add_option("MESH", o.build.meshes, "closed surface: OBJ, OFF, STL, PLY, ...")->required()->expected(1);
+  c->add_option("-o,--output", o.folder, "folder for NAME.xml, NAME.model.xml and NAME.csv; made where missing")
+      ->type_name("DIR")
+      ->required();
+  c->add_option("--spheres", o.build.settings.spheres, "number of filling spheres")
+      ->check(CLI::Range(1, spheresMax))
+      ->capture_default_str();
+  c->add_option("--unit", o.build.unit, "unit of the mesh file")
+      ->check(CLI::IsMember({"m", "cm", "mm", "inch"}))
+      ->capture_default_str();
+  return {c, [options] { return runNew(*options); }};
+}
+
+}  // namespace medulla
