@@ -46,19 +46,25 @@ struct Contact {
   std::uint64_t key;  // which pair: what ties it to the substep before
   int ends = 0;
   std::array<std::uint32_t, 4> sphere;
-  std::array<double, 4> weight;  // < 0 on the side that the normal points away from
-  Lanes lever[4];                // m, from the sphere's frame to the point of contact, moved along with its side
-  Lanes normal, tangent0;        // unit, into the second side, and across; w = 0
-  double gap = 0;                // m
-  double smallerRadius = 0;      // m, of the two in contact
-  Lanes mobility;                // 1/kg: relative velocity per impulse along the normal
-  double normalMobility = 0;     // 1/kg: its part along the normal
+  std::array<double, 4> weight;          // < 0 on the side that the normal points away from
+  std::array<double, 4> reach;           // m, from the ball's centre to the point of contact, along the normal
+  Lanes normal, tangent0;                // unit, into the second side, and across; w = 0
+  Lanes mobility;                        // 1/kg: relative velocity per impulse along the normal
+  double gap = 0;                        // m
+  double smallerRadius = 0;              // m, of the two in contact
+  double normalMobility = 0;             // 1/kg: its part along the normal
   double inverseTangent[3] = {0, 0, 0};  // kg: inverse of the mobility in the tangent plane: 00, 11, 01
   double softness = 0;                   // 1/kg, gamma
   double bias = 0;                       // m/s
   double friction = 0;
   double normalImpulse = 0, tangentImpulse0 = 0, tangentImpulse1 = 0;  // N s
 };
+
+// m, from the frame of the contact's end `e` to the point of contact, moved along with its side. Not kept in the
+// contact: those of a heap outgrow a core's own cache, and all are read in every pass.
+MEDULLA_INLINE Lanes leverOf(const std::vector<Quad>& arms, const Contact& c, int e) {
+  return fma(splat(c.reach[e]), c.normal, load(arms[c.sphere[e]]));
+}
 
 struct CarriedImpulse {
   std::uint64_t key;
@@ -93,6 +99,7 @@ struct ContactData {
 
   // Of the current substep.
   std::vector<Quad> ball;  // m, per sphere: centre in the world, and radius
+  std::vector<Quad> arm;   // m, per sphere: from its frame to the ball's centre; w = 0
   std::vector<Contact> contacts;
   std::vector<WorldInertia> inertia;
 

@@ -7,19 +7,16 @@ namespace medulla {
 
 namespace {
 
-// Adds one side to a contact: the collider's ball at `along`, the point of contact `reach` from its centre along
-// `toPoint`. A cone's two spheres share by 1 - s and s; both carry the lever to their own ball's centre plus the same
+// Adds one side to a contact: the collider's ball at `along`, the point of contact `reach` from its centre along the
+// normal. A cone's two spheres share by 1 - s and s; both carry the lever to their own ball's centre plus the same
 // way to the point, so that the weighted points of application are the point of contact itself and torques of both
 // sides cancel.
-void addSide(const WorldData& d, const Collider& of, double along, double sign, Lanes toPoint, double reach,
-             Contact& contact) {
+void addSide(const Collider& of, double along, double sign, double reach, Contact& contact) {
   const auto add = [&](std::uint32_t sphere, double weight) {
     if (weight == 0) return;
-    const Lanes arm = load(d.contact.ball[sphere]) - load(d.spheres.position[sphere]);
-    const Lanes lever = fma(splat(reach), toPoint, arm);
     contact.sphere[contact.ends] = sphere;
     contact.weight[contact.ends] = sign * weight;
-    contact.lever[contact.ends] = _mm256_blend_pd(lever, splat(0), 8);
+    contact.reach[contact.ends] = reach;
     ++contact.ends;
   };
   add(of.sphere0, 1 - along);
@@ -50,8 +47,8 @@ void addContact(WorldData& d, std::uint32_t i, std::uint32_t j, double s, double
   // Two centres in one point know no direction: any will part them.
   contact.normal = distance > 1e-12 ? way / splat(distance) : Lanes{0, 1, 0, 0};
   contact.friction = c.rootFriction[a.body] * c.rootFriction[b.body];
-  addSide(d, a, s, -1, contact.normal, p.radius + 0.5 * contact.gap, contact);
-  addSide(d, b, t, 1, contact.normal, -(q.radius + 0.5 * contact.gap), contact);
+  addSide(a, s, -1, p.radius + 0.5 * contact.gap, contact);
+  addSide(b, t, 1, -(q.radius + 0.5 * contact.gap), contact);
 }
 
 }  // namespace

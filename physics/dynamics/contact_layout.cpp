@@ -40,6 +40,7 @@ void addBalls(WorldData& d) {
   c.freeMove = 0.5 * kMarginOverRadius * sum / std::max(1, count);
   c.margin = 2 * c.freeMove + kFastest * d.substep;
   c.ball = c.restBall;
+  c.arm.resize(c.ball.size());
   c.inertia.resize(d.spheres.position.size());
 }
 

@@ -71,7 +71,8 @@ MEDULLA_INLINE Lanes relativeVelocity(const WorldData& d, const Contact& c) {
   Lanes v = splat(0);
   for (int e = 0; e < c.ends; ++e) {
     const std::uint32_t i = c.sphere[e];
-    const Lanes ofEnd = load(d.spheres.velocity[i]) + crossProduct(load(d.spheres.angularVelocity[i]), c.lever[e]);
+    const Lanes ofEnd =
+        load(d.spheres.velocity[i]) + crossProduct(load(d.spheres.angularVelocity[i]), leverOf(d.contact.arm, c, e));
     v = fma(splat(c.weight[e]), ofEnd, v);
   }
   return v;
@@ -81,7 +82,7 @@ MEDULLA_INLINE void apply(WorldData& d, const Contact& c, Lanes impulse) {
   for (int e = 0; e < c.ends; ++e) {
     const std::uint32_t i = c.sphere[e];
     const SphereGroup& g = d.spheres.groups[i / 4];
-    const Lanes share = splat(c.weight[e]) * impulse, twist = crossProduct(c.lever[e], share);
+    const Lanes share = splat(c.weight[e]) * impulse, twist = crossProduct(leverOf(d.contact.arm, c, e), share);
     Quad &v = d.spheres.velocity[i], &l = d.spheres.angularMomentum[i], &omega = d.spheres.angularVelocity[i];
     store(v, fma(splat(g.inverseMass[i % 4]), share, load(v)));
     store(l, fma(splat(g.freeToTurn[i % 4]), twist, load(l)));
@@ -94,8 +95,9 @@ Lanes mobilityAlong(const WorldData& d, const Contact& c, Lanes a) {
   Lanes sum = splat(0);
   for (int e = 0; e < c.ends; ++e) {
     const std::uint32_t i = c.sphere[e];
-    const Lanes spin = timesInertia(d.contact.inertia[i], crossProduct(c.lever[e], a));
-    const Lanes ofEnd = fma(splat(d.spheres.groups[i / 4].inverseMass[i % 4]), a, crossProduct(spin, c.lever[e]));
+    const Lanes lever = leverOf(d.contact.arm, c, e);
+    const Lanes spin = timesInertia(d.contact.inertia[i], crossProduct(lever, a));
+    const Lanes ofEnd = fma(splat(d.spheres.groups[i / 4].inverseMass[i % 4]), a, crossProduct(spin, lever));
     sum = fma(splat(c.weight[e] * c.weight[e]), ofEnd, sum);
   }
   return sum;

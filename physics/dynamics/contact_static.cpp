@@ -131,9 +131,7 @@ void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int o
   contact.ends = 1;
   contact.sphere[0] = n.sphere;
   contact.weight[0] = 1;
-  const Lanes lever =
-      fma(splat(-(ball.v[3] + 0.5 * contact.gap)), contact.normal, load(ball) - load(d.spheres.position[n.sphere]));
-  contact.lever[0] = _mm256_blend_pd(lever, splat(0), 8);
+  contact.reach[0] = -(ball.v[3] + 0.5 * contact.gap);
 }
 
 }  // namespace
