@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "physics/dynamics/body_mechanics.h"
@@ -214,6 +215,62 @@ TEST(IdentifiedBody, StableAtTheEstimateAndUnstableWellAbove) {
     EXPECT_FALSE(grows(0.95 * stable));
     EXPECT_TRUE(grows(1.1 * stable));
   }
+}
+
+// Stiffer along the surface's normal than across: carried nodes hang where moving ones come to rest, and what is held
+// asks for nothing.
+TEST(IdentifiedBody, CarriedNodesHangWhereMovingOnesRest) {
+  BodyDescription body = chain(SurfaceMode::contact, true, 1, 0);
+  const auto network = std::make_shared<IdentifiedNetwork>(*body.model->identified);
+  network->layer.normal = 4 * network->layer.tangential;
+  network->layer.membrane = 1e-6;  // carried nodes feel no edges
+  const auto model = std::make_shared<SoftBodyModel>(*body.model);
+  model->identified = network;
+  body.model = model;
+  DynamicsFrame frames[2];
+  for (const SurfaceMode mode : {SurfaceMode::contact, SurfaceMode::full}) {
+    body.surface = mode;
+    WorldSettings settings;
+    settings.gravity = {0, 0, -1};
+    World world(settings, {body});
+    for (int k = 0; k < 400; ++k) world.advance({});
+    EXPECT_EQ(world.dynamicNodes(0) == 0, mode == SurfaceMode::contact);
+    world.readFrame(frames[mode == SurfaceMode::full]);
+  }
+  double sag = 0, apart = 0;
+  for (std::size_t i = 0; i < model->restNodes.size(); ++i) {
+    const Vector3d& full = frames[1].bodies[0].nodes[i];
+    sag = std::max(sag, (full - model->restNodes[i]).norm());
+    apart = std::max(apart, (full - frames[0].bodies[0].nodes[i]).norm());
+  }
+  EXPECT_GT(sag, 1e-4);
+  EXPECT_LT(apart, 0.02 * sag);
+}
+
+TEST(IdentifiedBody, NetworksThatCannotBeSimulatedAreRefused) {
+  const auto messageOf = [](const std::function<void(IdentifiedNetwork&)>& spoil) -> std::string {
+    BodyDescription body = chain(SurfaceMode::full, true);
+    const auto network = std::make_shared<IdentifiedNetwork>(*body.model->identified);
+    spoil(*network);
+    const auto model = std::make_shared<SoftBodyModel>(*body.model);
+    model->identified = network;
+    body.model = model;
+    try {
+      World(weightless(), {body});
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return {};
+  };
+  EXPECT_EQ(messageOf([](IdentifiedNetwork&) {}), "");
+  EXPECT_NE(messageOf([](IdentifiedNetwork& n) { n.links[0].stiffness *= 1e300; }).find("not finite"),
+            std::string::npos);
+  EXPECT_NE(messageOf([](IdentifiedNetwork& n) { n.skin[3][1].frame = n.skin[3][0].frame; }).find("twice"),
+            std::string::npos);
+  EXPECT_NE(messageOf([](IdentifiedNetwork& n) {
+              n.links[0].restPoint1 = n.links[0].restPoint0 + Vector3d(1e-200, 0, 0);
+            }).find("lie in one point"),
+            std::string::npos);
 }
 
 }  // namespace medulla

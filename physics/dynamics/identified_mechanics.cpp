@@ -39,7 +39,7 @@ void checkNetwork(const SoftBodyModel& m) {
             fmt::format("its model identifies a link between frames {} and {}: expected two of 0 to {}, the first of a "
                         "sphere",
                         l.frame0, l.frame1, frames - 1));
-    require(l.restPoint0 != l.restPoint1,
+    require((l.restPoint1 - l.restPoint0).norm() > 1e-9 * n.lengthScale,
             fmt::format("its model's frames {} and {} are linked and lie in one point", l.frame0, l.frame1));
   }
   for (std::size_t i = 0; i < n.skin.size(); ++i) {
@@ -51,6 +51,9 @@ void checkNetwork(const SoftBodyModel& m) {
       require(f.frame >= 0 && f.frame < frames,
               fmt::format("its model hangs node {} on frame {}: expected 0 to {}", i, f.frame, frames - 1));
       sum += f.weight;
+      const auto same = [&f](const SkinFrame& other) { return other.frame == f.frame; };
+      require(std::count_if(n.skin[i].begin(), n.skin[i].end(), same) == 1,
+              fmt::format("its model hangs node {} on frame {} twice: expected once", i, f.frame));
     }
     require(std::abs(sum - 1) < 1e-6, fmt::format("the weights of its model's node {} sum to {}: expected 1", i, sum));
   }

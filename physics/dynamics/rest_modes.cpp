@@ -96,6 +96,7 @@ class RestModel {
     double eigenvalue = 0;
     for (int k = 0; k < kIterations; ++k) {
       const double norm = std::sqrt(x.dot(timesMass(x)));
+      if (!std::isfinite(norm)) throw std::runtime_error("stiffness over mass is not finite");
       if (!(norm > 0)) return 0;
       x /= norm;
       const VectorXd force = stiffnessTimes(x, links, surface);

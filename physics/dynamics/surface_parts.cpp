@@ -25,9 +25,23 @@ const HostRange& rangeOf(const WorldData& d, std::size_t part) {
   return part < onLinks ? d.nodes.onLinks[part] : d.nodes.onSpheres[part - onLinks];
 }
 
+// An attachment's stiffness, N/m, along the surface and, what identified ones are more, along the node's normal.
+double stiffnessAlong(const WorldData& d, int node) {
+  return d.nodes.groups[node / 4].stiffness[node % 4];
+}
+double normalExcess(const WorldData& d, int node) {  // N/m5, times the node's area squared
+  const int skin = d.identified.ofNodeGroup[node / 4];
+  return skin < 0 ? 0 : d.identified.skin[skin].normalExcess[node % 4];
+}
+double stiffnessAcross(const WorldData& d, int node) {
+  return stiffnessAlong(d, node) + normalExcess(d, node) * vectorAt(d.nodes.area, node).squaredNorm();
+}
+
 Vector3d sagOf(const WorldData& d, int node) {  // m, without pressure
   if (d.nodes.inverseMass[node] == 0) return Vector3d::Zero();
-  return d.nodes.mass[node] / d.nodes.groups[node / 4].stiffness[node % 4] * vectorOf(d.gravity);
+  const Vector3d even = d.nodes.mass[node] / stiffnessAlong(d, node) * vectorOf(d.gravity);
+  const Vector3d area = vectorAt(d.nodes.area, node);
+  return even - normalExcess(d, node) * area.dot(even) / stiffnessAcross(d, node) * area;
 }
 
 double deepestSag(const WorldData& d, const HostRange& range) {
@@ -46,20 +60,18 @@ class StillNodes {
       if (d.nodes.inverseMass[i] == 0) continue;
       const Vector3d area = vectorAt(d.nodes.area, i);
       sunk += area.dot(sagOf(d, i));
-      give += area.squaredNorm() / stiffness(i);
+      give += area.squaredNorm() / stiffnessAcross(d, i);
     }
     pressure_ = range.bulk * sunk / (1 + range.bulk * give);
     swollen_ = range.bulk > 0 ? pressure_ / range.bulk : 0;
   }
   Vector3d displaced(int node) const {  // m
     if (d_->nodes.inverseMass[node] == 0) return Vector3d::Zero();
-    return sagOf(*d_, node) - pressure_ / stiffness(node) * vectorAt(d_->nodes.area, node);
+    return sagOf(*d_, node) - pressure_ / stiffnessAcross(*d_, node) * vectorAt(d_->nodes.area, node);
   }
   double swollen() const { return swollen_; }  // m3
 
  private:
-  double stiffness(int node) const { return d_->nodes.groups[node / 4].stiffness[node % 4]; }
-
   const WorldData* d_;
   double pressure_, swollen_;
 };
@@ -67,6 +79,7 @@ class StillNodes {
 // Nothing turns or moves what the part hangs on, so that nodes which hold it have nothing to hold.
 bool isHeld(const WorldData& d, const BodyMechanics& mechanics, std::size_t part) {
   const HostRange& range = rangeOf(d, part);
+  if (range.onFrames) return true;  // fixed nodes hang on what is held, and the spheres by links of their own
   const auto held = [&](int sphere) {
     const int own = sphere - d.ranges[range.body].firstSphere;
     return !mechanics.moves[own] && !mechanics.turns[own];

@@ -176,10 +176,10 @@ std::vector<BodyMechanics> mechanicsOf(const std::vector<BodyDescription>& bodie
     }
     try {
       mechanics.push_back(bodyMechanics(body));
+      stable = std::min(stable, dampBody(body, mechanics.back(), integrator));
     } catch (const std::runtime_error& e) {
       throw std::runtime_error(fmt::format("body '{}' cannot be simulated: {}", body.name, e.what()));
     }
-    stable = std::min(stable, dampBody(body, mechanics.back(), integrator));
   }
   return mechanics;
 }
