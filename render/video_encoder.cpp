@@ -106,6 +106,7 @@ void VideoEncoder::Data::open() {
   // A protocol of its own, or a colon in the name would be taken for one.
   const std::string url = "file:" + partial;
   checkedAv(avformat_alloc_output_context2(&muxer, nullptr, encoding.muxer, url.c_str()));
+  muxer->flags |= AVFMT_FLAG_BITEXACT;  // WebM would draw identifiers at random
   checkedAv(avio_open(&muxer->pb, url.c_str(), AVIO_FLAG_WRITE));
   packet = existing(av_packet_alloc(), "no memory for a packet");
   frame = existing(av_frame_alloc(), "no memory for a picture");

@@ -126,6 +126,26 @@ TEST_F(VideoWriterTest, EveryKindOfVideoHasEveryPicture) {
   EXPECT_EQ(pictures, 10);
 }
 
+TEST_F(VideoWriterTest, TheSamePicturesMakeTheSameBytes) {
+  for (const std::string kind : {".mp4", ".webm", ".gif", ".webp"}) {
+    const auto bytes = [&](const std::string& name) {
+      std::mt19937 random(1);
+      VideoWriter writer(path(name + kind), 64, 32, 25);
+      Image noise = flat(64, 32, 0, 0, 0);
+      for (int k = 0; k < 10; ++k) {
+        for (std::uint8_t& byte : noise.pixels) byte = static_cast<std::uint8_t>(random());
+        writer.write(noise);
+      }
+      writer.finish();
+      std::ifstream file(path(name + kind), std::ios::binary);
+      return std::string((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    };
+    const std::string first = bytes("first");
+    EXPECT_GT(first.size(), 100u) << kind;
+    EXPECT_TRUE(first == bytes("second")) << kind;
+  }
+}
+
 TEST_F(VideoWriterTest, WhatAKindCannotHoldIsRefused) {
   EXPECT_EQ(messageOf([&] { VideoWriter(path("a.mp4"), 65, 32, 30); }),
             path("a.mp4") + ": a video of 65x32 pixels, expected even numbers");
