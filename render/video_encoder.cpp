@@ -97,7 +97,7 @@ struct VideoEncoder::Data {
   void open();
   void openCodec(int pixelFormat);
   void describeFrame(AVFrame& f) const;
-  void encode(AVFrame* picture);
+  void encode(AVFrame* picture, const std::function<void()>& goOn);
 };
 
 // Opens the file too: one that cannot be written is told before anything is drawn.
@@ -155,9 +155,10 @@ void VideoEncoder::Data::openCodec(int pixelFormat) {
 }
 
 // nullptr: no more pictures.
-void VideoEncoder::Data::encode(AVFrame* picture) {
+void VideoEncoder::Data::encode(AVFrame* picture, const std::function<void()>& goOn) {
   checkedAv(avcodec_send_frame(codec, picture));
   for (;;) {
+    goOn();
     const int code = avcodec_receive_packet(codec, packet);
     if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) return;
     checkedAv(code);
@@ -193,18 +194,20 @@ void VideoEncoder::write(std::vector<std::uint8_t>& planes) {
   if (d.palette)
     d.palette->add(f);
   else
-    d.encode(&f);
+    d.encode(&f, [] {});
   av_buffer_unref(&f.buf[0]);
 }
 
-void VideoEncoder::finish() {
+void VideoEncoder::finish(const std::function<void()>& goOn) {
   Data& d = *data_;
-  if (d.palette)
-    d.palette->finish([&d](AVFrame& picture) {
+  if (d.palette) {
+    const auto take = [&](AVFrame& picture) {
       if (d.codec == nullptr) d.openCodec(picture.format);
-      d.encode(&picture);
-    });
-  d.encode(nullptr);
+      d.encode(&picture, goOn);
+    };
+    d.palette->finish(take, goOn);
+  }
+  d.encode(nullptr, goOn);
   checkedAv(av_write_trailer(d.muxer));
   checkedAv(avio_closep(&d.muxer->pb));
 }

@@ -170,6 +170,24 @@ TEST_F(VideoWriterTest, UnfinishedFilmLeavesNothingAndKeepsTheEarlierOne) {
   }
 }
 
+TEST_F(VideoWriterTest, FinishingCanBeBrokenOff) {
+  struct Stop {};
+  for (const char* name : {"a.mp4", "a.webm", "a.gif", "a.webp"}) {
+    int asked = 0;
+    {
+      VideoWriter writer(path(name), 64, 32, 30);
+      for (int k = 0; k < 5; ++k) writer.write(flat(64, 32, std::uint8_t(20 * k), 2, 3));
+      EXPECT_THROW(writer.finish([&] {
+        if (++asked == 2) throw Stop();
+      }),
+                   Stop)
+          << name;
+    }
+    EXPECT_EQ(asked, 2) << name;
+    EXPECT_EQ(filesInFolder(), 0u) << name;
+  }
+}
+
 // No file may grow beyond a limit meanwhile: what is then written fails as on a full disk.
 class FileSizeLimit {
  public:

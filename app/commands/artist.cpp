@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "app/files/content_hash.h"
+#include "app/interrupt.h"
 #include "app/progress.h"
 #include "render/caption.h"
 
@@ -115,6 +116,7 @@ void Artist::drawAll() {
     times_.start("idle");
     std::unique_ptr<Sheet> sheet = next();
     if (!sheet) break;
+    checkInterrupt();
     if (!sheet->needed) {
       giveBack(std::move(sheet));
       continue;
@@ -128,6 +130,7 @@ void Artist::drawAll() {
   }
   if (abandoned_) return;
   while (desk_->ahead > 0) takePanel();
+  checkInterrupt();
   times_.start("end files");
   desk_->outputs.finish();
   times_.stop();
