@@ -12,6 +12,7 @@
 
 #include "app/files/output_file.h"
 #include "app/files/text_file.h"
+#include "app/interrupt.h"
 
 namespace medulla {
 
@@ -145,7 +146,7 @@ StageTimes::Stage PictureOutputs::encoding() const {
 }
 
 void PictureOutputs::finish() {
-  for (VideoWriter& video : videos_) video.finish();
+  for (VideoWriter& video : videos_) video.finish(checkInterrupt);
   for (const auto& folder : folders_) folder->finish();
   for (const std::string& path : stills_) writePng(path, still_);
 }

@@ -51,7 +51,7 @@ class PictureOutputs {
   PictureOutputs(const std::vector<std::string>& paths, const Settings& settings);
   bool has(int number) const;  // nobody needs this picture any more
   void write(int number, const Image& image);
-  void finish();
+  void finish();                       // throws Interrupted too
   StageTimes::Stage encoding() const;  // of all videos, in threads of their own
 
  private:

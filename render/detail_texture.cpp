@@ -43,7 +43,9 @@ class VesselPainter {
       Tip t;
       t.x = (x + 0.06f * random_.next()) * float(side_);
       t.y = (y + 0.06f * random_.next()) * float(side_);
-      t.heading = pattern.vesselHeading + (random_.next() - 0.5f) * 1.1f + (random_.next() < 0.35f ? kPi : 0.f);
+      const float aside = (random_.next() - 0.5f) * 1.1f;
+      const float turned = random_.next() < 0.35f ? kPi : 0.f;
+      t.heading = pattern.vesselHeading + aside + turned;
       t.width = pattern.vesselWidth * (0.6f + 0.4f * random_.next()) * unit_;
       t.trunk = true;
       t.phase = 2 * kPi * random_.next();

@@ -36,36 +36,50 @@ FramePointer newFrame() {
   return frame;
 }
 
+struct FreeGraph {
+  void operator()(AVFilterGraph* g) const { avfilter_graph_free(&g); }
+};
+struct FreeMemory {
+  void operator()(void* p) const { av_free(p); }
+};
+struct CloseFile {
+  void operator()(std::FILE* f) const { std::fclose(f); }
+};
+using FilePointer = std::unique_ptr<std::FILE, CloseFile>;
+
+// Without a name from here on: it goes with its last handle, whatever fails.
+FilePointer openScratch(const std::string& path) {
+  FilePointer file(std::fopen(path.c_str(), "w+bx"));
+  if (!file) throw std::runtime_error(std::strerror(errno));
+  std::remove(path.c_str());
+  return file;
+}
+
 // One filter between as many sources as it has inputs, and a sink. Time is counted in pictures.
 class OneFilter {
  public:
   OneFilter(const char* name, const char* options, const std::vector<const AVFrame*>& inputs) {
-    if (graph_ == nullptr) throw std::runtime_error("no memory for a filter");
+    if (!graph_) throw std::runtime_error("no memory for a filter");
     graph_->nb_threads = 1;
     AVFilterContext* filter = nullptr;
-    checkedAv(avfilter_graph_create_filter(&filter, known(name), name, options, nullptr, graph_));
+    checkedAv(avfilter_graph_create_filter(&filter, known(name), name, options, nullptr, graph_.get()));
     for (std::size_t k = 0; k < inputs.size(); ++k) {
       AVFilterContext*& source = sources_.at(k);
-      source = avfilter_graph_alloc_filter(graph_, known("buffer"), nullptr);
-      AVBufferSrcParameters* p = av_buffersrc_parameters_alloc();
-      if (source == nullptr || p == nullptr) throw std::runtime_error("no memory for a filter");
+      source = avfilter_graph_alloc_filter(graph_.get(), known("buffer"), nullptr);
+      const std::unique_ptr<AVBufferSrcParameters, FreeMemory> p(av_buffersrc_parameters_alloc());
+      if (source == nullptr || !p) throw std::runtime_error("no memory for a filter");
       p->format = inputs[k]->format;
       p->width = inputs[k]->width;
       p->height = inputs[k]->height;
       p->time_base = {1, 1};
-      const int set = av_buffersrc_parameters_set(source, p);
-      av_free(p);
-      checkedAv(set);
+      checkedAv(av_buffersrc_parameters_set(source, p.get()));
       checkedAv(avfilter_init_str(source, nullptr));
       checkedAv(avfilter_link(source, 0, filter, static_cast<unsigned>(k)));
     }
-    checkedAv(avfilter_graph_create_filter(&sink_, known("buffersink"), nullptr, nullptr, nullptr, graph_));
+    checkedAv(avfilter_graph_create_filter(&sink_, known("buffersink"), nullptr, nullptr, nullptr, graph_.get()));
     checkedAv(avfilter_link(filter, 0, sink_, 0));
-    checkedAv(avfilter_graph_config(graph_, nullptr));
+    checkedAv(avfilter_graph_config(graph_.get(), nullptr));
   }
-  ~OneFilter() { avfilter_graph_free(&graph_); }
-  OneFilter(const OneFilter&) = delete;
-  OneFilter& operator=(const OneFilter&) = delete;
 
   void give(std::size_t source, AVFrame* frame) {  // nullptr: no more
     checkedAv(av_buffersrc_add_frame_flags(sources_.at(source), frame, AV_BUFFERSRC_FLAG_KEEP_REF));
@@ -84,7 +98,7 @@ class OneFilter {
     return filter;
   }
 
-  AVFilterGraph* graph_ = avfilter_graph_alloc();
+  std::unique_ptr<AVFilterGraph, FreeGraph> graph_{avfilter_graph_alloc()};
   std::array<AVFilterContext*, 2> sources_{};
   AVFilterContext* sink_ = nullptr;
 };
@@ -92,25 +106,20 @@ class OneFilter {
 }  // namespace
 
 struct FilmPalette::Data {
-  std::FILE* waiting;
+  FilePointer waiting;  // the pictures; before what may fail, so that its name is gone by then
   FramePointer like = newFrame();
   OneFilter generator;
   std::size_t bytes;  // of a picture
   int pictures = 0;
 
   Data(const AVFrame& frame, const std::string& scratch)
-      : waiting(std::fopen(scratch.c_str(), "w+bx")),
+      : waiting(openScratch(scratch)),
         generator("palettegen", "stats_mode=diff", {&frame}),
         bytes(std::size_t(frame.width) * frame.height * 3 / 2) {
-    if (waiting == nullptr) throw std::runtime_error(std::strerror(errno));
-    std::remove(scratch.c_str());
     checkedAv(av_frame_copy_props(like.get(), &frame));
     like->format = frame.format;
     like->width = frame.width;
     like->height = frame.height;
-  }
-  ~Data() {
-    if (waiting != nullptr) std::fclose(waiting);
   }
   // A buffer of a picture as those that were added.
   FramePointer pictureBuffer() const {
@@ -127,8 +136,8 @@ struct FilmPalette::Data {
       const int columns = plane == 0 ? frame.width : frame.width / 2,
                 rows = plane == 0 ? frame.height : frame.height / 2;
       for (int y = 0; y < rows; ++y)
-        requireFile(std::fread(frame.data[plane] + std::ptrdiff_t(y) * frame.linesize[plane], 1, columns, waiting) ==
-                    std::size_t(columns));
+        requireFile(std::fread(frame.data[plane] + std::ptrdiff_t(y) * frame.linesize[plane], 1, columns,
+                               waiting.get()) == std::size_t(columns));
     }
   }
   void requireFile(bool done) const {
@@ -142,24 +151,25 @@ FilmPalette::~FilmPalette() = default;
 
 void FilmPalette::add(AVFrame& frame) {
   errno = 0;
-  data_->requireFile(std::fwrite(frame.data[0], 1, data_->bytes, data_->waiting) == data_->bytes);
+  data_->requireFile(std::fwrite(frame.data[0], 1, data_->bytes, data_->waiting.get()) == data_->bytes);
   data_->generator.give(0, &frame);
   const FramePointer none = newFrame();
   data_->generator.take(*none);  // lets it look at the picture; its palette comes at the end
   ++data_->pictures;
 }
 
-void FilmPalette::finish(const std::function<void(AVFrame&)>& take) {
+void FilmPalette::finish(const std::function<void(AVFrame&)>& take, const std::function<void()>& goOn) {
   Data& d = *data_;
   const FramePointer palette = newFrame(), shown = newFrame();
   d.generator.give(0, nullptr);
   if (!d.generator.take(*palette)) throw std::runtime_error("a film without pictures");
   palette->pts = 0;
   errno = 0;
-  d.requireFile(std::fflush(d.waiting) == 0);
-  std::rewind(d.waiting);
+  d.requireFile(std::fflush(d.waiting.get()) == 0);
+  std::rewind(d.waiting.get());
   std::unique_ptr<OneFilter> mapper;
   for (int k = 0; k < d.pictures; ++k) {
+    goOn();
     const FramePointer frame = d.pictureBuffer();
     d.readInto(*frame);
     frame->pts = k;

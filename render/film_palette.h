@@ -15,8 +15,8 @@ class FilmPalette {
   FilmPalette(const AVFrame& frame, const std::string& scratch);
   ~FilmPalette();
   void add(AVFrame& frame);  // of 4:2:0 planes without gaps
-  // Hands on each picture in its turn, as palette and indices.
-  void finish(const std::function<void(AVFrame&)>& take);
+  // Hands on each picture in its turn, as palette and indices; before each it calls `goOn`, which may throw.
+  void finish(const std::function<void(AVFrame&)>& take, const std::function<void()>& goOn);
 
  private:
   struct Data;

@@ -26,7 +26,7 @@ class Ink {
 };
 
 // Letters of strokes, `height` px high from the line that they stand on to the top of capitals; a third of it more
-// below. Characters beyond ASCII and those that have no strokes are empty boxes.
+// below. Characters beyond ASCII are empty boxes.
 float textWidth(const std::string& text, float height);                             // px
 void writeText(const std::string& text, glm::vec2 corner, float height, Ink& ink);  // corner: upper left
 

@@ -97,7 +97,7 @@ struct VideoEncoder::Data {
   void open();
   void openCodec(int pixelFormat);
   void describeFrame(AVFrame& f) const;
-  void encode(AVFrame* picture);
+  void encode(AVFrame* picture, const std::function<void()>& goOn);
 };
 
 // Opens the file too: one that cannot be written is told before anything is drawn.
@@ -106,6 +106,7 @@ void VideoEncoder::Data::open() {
   // A protocol of its own, or a colon in the name would be taken for one.
   const std::string url = "file:" + partial;
   checkedAv(avformat_alloc_output_context2(&muxer, nullptr, encoding.muxer, url.c_str()));
+  muxer->flags |= AVFMT_FLAG_BITEXACT;  // WebM would draw identifiers at random
   checkedAv(avio_open(&muxer->pb, url.c_str(), AVIO_FLAG_WRITE));
   packet = existing(av_packet_alloc(), "no memory for a packet");
   frame = existing(av_frame_alloc(), "no memory for a picture");
@@ -154,9 +155,10 @@ void VideoEncoder::Data::openCodec(int pixelFormat) {
 }
 
 // nullptr: no more pictures.
-void VideoEncoder::Data::encode(AVFrame* picture) {
+void VideoEncoder::Data::encode(AVFrame* picture, const std::function<void()>& goOn) {
   checkedAv(avcodec_send_frame(codec, picture));
   for (;;) {
+    goOn();
     const int code = avcodec_receive_packet(codec, packet);
     if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) return;
     checkedAv(code);
@@ -192,18 +194,20 @@ void VideoEncoder::write(std::vector<std::uint8_t>& planes) {
   if (d.palette)
     d.palette->add(f);
   else
-    d.encode(&f);
+    d.encode(&f, [] {});
   av_buffer_unref(&f.buf[0]);
 }
 
-void VideoEncoder::finish() {
+void VideoEncoder::finish(const std::function<void()>& goOn) {
   Data& d = *data_;
-  if (d.palette)
-    d.palette->finish([&d](AVFrame& picture) {
+  if (d.palette) {
+    const auto take = [&](AVFrame& picture) {
       if (d.codec == nullptr) d.openCodec(picture.format);
-      d.encode(&picture);
-    });
-  d.encode(nullptr);
+      d.encode(&picture, goOn);
+    };
+    d.palette->finish(take, goOn);
+  }
+  d.encode(nullptr, goOn);
   checkedAv(av_write_trailer(d.muxer));
   checkedAv(avio_closep(&d.muxer->pb));
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,8 +18,8 @@ class VideoEncoder {
   VideoEncoder(VideoFormat format, const std::string& path, int width, int height, double fps);
   VideoEncoder(VideoEncoder&&) noexcept;
   ~VideoEncoder();
-  void write(std::vector<std::uint8_t>& planes);  // as rgbaToI420() makes them; not changed
-  void finish();
+  void write(std::vector<std::uint8_t>& planes);   // as rgbaToI420() makes them; not changed
+  void finish(const std::function<void()>& goOn);  // called before each picture that is left; may throw
 
  private:
   struct Data;

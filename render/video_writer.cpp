@@ -189,9 +189,13 @@ StageTimes::Stage VideoWriter::encoding() const {
   return out;
 }
 
-void VideoWriter::finish() {
+void VideoWriter::finish(const std::function<void()>& goOn) {
   data_->end();
-  if (data_->failure.empty()) data_->failure = reasonOf([this] { data_->encoder.finish(); });
+  try {
+    if (data_->failure.empty()) data_->encoder.finish(goOn);
+  } catch (const std::runtime_error& error) {
+    data_->failure = error.what();
+  }
   if (!data_->failure.empty()) data_->fail(data_->failure);
   std::error_code error;
   std::filesystem::rename(data_->partial, data_->path, error);

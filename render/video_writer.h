@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -22,7 +23,9 @@ class VideoWriter {
   ~VideoWriter();
   VideoWriter(VideoWriter&&) noexcept;
   void write(const Image& image);  // throws, with the reason, when an earlier one could not be written
-  void finish();
+  // Calls `goOn` before each picture that is still to be encoded: a GIF is from first to last. What it throws, any but
+  // a std::runtime_error, ends the film unfinished and comes through.
+  void finish(const std::function<void()>& goOn = [] {});
   StageTimes::Stage encoding() const;  // what its thread has taken so far
 
  private:

@@ -436,4 +436,20 @@ TEST(Program, InterruptLeavesNothingHalfWritten) {
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"video.mp4"});
 }
 
+// A GIF is encoded once its last picture is drawn, which takes as long as a film's drawing.
+TEST(Program, InterruptEndsAFilmThatIsBeingFinished) {
+  const TemporaryFolder folder;
+  ProgramOptions options;
+  options.interruptWhen = [&] {  // nothing is written before
+    for (const std::string& entry : folder.contents())
+      if (entry.find(".gif.partial") != std::string::npos && !readFile(folder / entry).empty()) return true;
+    return false;
+  };
+  const ProgramResult r = runProgram({"render", kScene, "-o", folder / "film.gif", "--set", "clock.duration=3",
+                                      "output.golden=1", "--size", "640x480", "--quality", "draft"},
+                                     options);
+  EXPECT_EQ(r.exitCode, 130) << r.err;
+  EXPECT_TRUE(folder.contents().empty());
+}
+
 }  // namespace medulla

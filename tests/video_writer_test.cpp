@@ -126,6 +126,26 @@ TEST_F(VideoWriterTest, EveryKindOfVideoHasEveryPicture) {
   EXPECT_EQ(pictures, 10);
 }
 
+TEST_F(VideoWriterTest, TheSamePicturesMakeTheSameBytes) {
+  for (const std::string kind : {".mp4", ".webm", ".gif", ".webp"}) {
+    const auto bytes = [&](const std::string& name) {
+      std::mt19937 random(1);
+      VideoWriter writer(path(name + kind), 64, 32, 25);
+      Image noise = flat(64, 32, 0, 0, 0);
+      for (int k = 0; k < 10; ++k) {
+        for (std::uint8_t& byte : noise.pixels) byte = static_cast<std::uint8_t>(random());
+        writer.write(noise);
+      }
+      writer.finish();
+      std::ifstream file(path(name + kind), std::ios::binary);
+      return std::string((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    };
+    const std::string first = bytes("first");
+    EXPECT_GT(first.size(), 100u) << kind;
+    EXPECT_TRUE(first == bytes("second")) << kind;
+  }
+}
+
 TEST_F(VideoWriterTest, WhatAKindCannotHoldIsRefused) {
   EXPECT_EQ(messageOf([&] { VideoWriter(path("a.mp4"), 65, 32, 30); }),
             path("a.mp4") + ": a video of 65x32 pixels, expected even numbers");
@@ -147,6 +167,24 @@ TEST_F(VideoWriterTest, UnfinishedFilmLeavesNothingAndKeepsTheEarlierOne) {
     std::getline(std::ifstream(path(name)), text);
     EXPECT_EQ(text, "earlier");
     fs::remove(path(name));
+  }
+}
+
+TEST_F(VideoWriterTest, FinishingCanBeBrokenOff) {
+  struct Stop {};
+  for (const char* name : {"a.mp4", "a.webm", "a.gif", "a.webp"}) {
+    int asked = 0;
+    {
+      VideoWriter writer(path(name), 64, 32, 30);
+      for (int k = 0; k < 5; ++k) writer.write(flat(64, 32, std::uint8_t(20 * k), 2, 3));
+      EXPECT_THROW(writer.finish([&] {
+        if (++asked == 2) throw Stop();
+      }),
+                   Stop)
+          << name;
+    }
+    EXPECT_EQ(asked, 2) << name;
+    EXPECT_EQ(filesInFolder(), 0u) << name;
   }
 }
 

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "app/files/content_hash.h"
+#include "app/interrupt.h"
+#include "app/picture_sources.h"
 #include "app/progress.h"
 #include "render/caption.h"
 
@@ -34,8 +36,9 @@ std::string captionAt(const Scene& scene, double time) {
 PictureOutputs::Settings outputSettings(const LoadedScene& loaded, const RenderOptions& options, int first, int count,
                                         const std::string& renderer) {
   const Scene& scene = loaded.scene;
-  std::string drawing = fmt::format("{}x{} {} {} {} {}", scene.width, scene.height, scene.fps,
-                                    namesOf(options.view.shown), static_cast<int>(options.quality), renderer);
+  std::string drawing =
+      fmt::format("{} {}x{} {} {} {} {}", MEDULLA_PICTURE_SOURCES, scene.width, scene.height, scene.fps,
+                  namesOf(options.view.shown), static_cast<int>(options.quality), renderer);
   for (const ViewKind panel : options.view.panels) drawing += fmt::format(" {}", static_cast<int>(panel));
   const std::uint64_t run = contentHash(drawing, runHash(loaded, true));
   return {scene.width, scene.height, scene.fps, options.still.has_value(), {first, first + count, run, options.resume}};
@@ -115,6 +118,7 @@ void Artist::drawAll() {
     times_.start("idle");
     std::unique_ptr<Sheet> sheet = next();
     if (!sheet) break;
+    checkInterrupt();
     if (!sheet->needed) {
       giveBack(std::move(sheet));
       continue;
@@ -128,6 +132,7 @@ void Artist::drawAll() {
   }
   if (abandoned_) return;
   while (desk_->ahead > 0) takePanel();
+  checkInterrupt();
   times_.start("end files");
   desk_->outputs.finish();
   times_.stop();

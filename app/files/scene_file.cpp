@@ -378,6 +378,9 @@ void readCaptions(const XmlElement& output, Scene& scene) {
     SceneCaption caption{readNumber(*e, "from", 0, notNegative), readNumber(*e, "to", 0, notNegative),
                          readText(*e, "text")};
     if (caption.text.empty()) refuse(*e, "text", "expected words");
+    const auto drawable = [](char c) { return ' ' <= c && c <= '~'; };  // others would be boxes
+    if (!std::all_of(caption.text.begin(), caption.text.end(), drawable))
+      refuse(*e, "text", "expected characters of ASCII alone");
     if (caption.to <= caption.from) refuse(*e, "to", "expected a later time than from");
     if (!scene.captions.empty() && caption.from < scene.captions.back().to)
       refuse(*e, "from", "expected no earlier time than the end of the caption before it");
