@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <Eigen/SparseCholesky>
+#include <limits>
 #include <numbers>
 
 #include "physics/model/build.h"
@@ -201,6 +202,41 @@ TEST(Lbfgs, FindsTheEndOfACurvedValley) {  // Rosenbrock 1960
   EXPECT_NEAR(x[1], 1, 1e-5);
 }
 
+TEST(Lbfgs, RefusesAStartOutsideTheDomain) {
+  VectorXd x = VectorXd::Ones(2);
+  EXPECT_THROW(descend([](const VectorXd&, VectorXd&) { return std::numeric_limits<double>::infinity(); }, {}, x),
+               std::runtime_error);
+}
+
+TEST(CheckLoads, WhatIsNotFiniteIsNoErrorOfZero) {
+  const MatrixXd expected = MatrixXd::Ones(3, 2);
+  MatrixXd found = expected;
+  found(1, 1) = std::nan("");
+  EXPECT_THROW(errorOf(found, expected), std::runtime_error);
+}
+
+TEST(CheckLoads, LoadsThatMoveNothingDoNotCount) {
+  MatrixXd expected = MatrixXd::Zero(3, 2), found = expected;
+  expected(0, 0) = 2;
+  found(0, 0) = 1;
+  EXPECT_DOUBLE_EQ(errorOf(found, expected).rms, 50);
+}
+
+TEST(CheckLoads, EveryLoadHasThreeFreeNodesHoweverFewAreFree) {
+  const TriangleMesh mesh = cylinder();
+  NodeSurface surface = measureNodes(mesh, {});
+  for (std::size_t n = 3; n < surface.held.size(); ++n) surface.held[n] = true;
+  for (const LoadKind kind : {LoadKind::bulk, LoadKind::poke}) {
+    const RowMatrix forces = randomLoads(mesh, surface, kind, 1e-3, 8, 1);
+    for (Index load = 0; load < forces.cols(); ++load) {
+      for (Index n = 0; n < 3; ++n) EXPECT_GT((forces.block<3, 1>(3 * n, load).norm()), 0);
+    }
+    EXPECT_EQ(forces.bottomRows(forces.rows() - 9).norm(), 0);
+  }
+  surface.held[0] = true;
+  EXPECT_THROW(randomLoads(mesh, surface, LoadKind::bulk, 1e-3, 8, 1), std::runtime_error);
+}
+
 struct Reduced {
   TriangleMesh mesh;
   VoxelSolid solid;
@@ -320,6 +356,11 @@ TEST(IdentifiedNetwork, WhatCannotBeIsRefused) {
   EXPECT_EQ(refusal({{"box=1", {}, {}}}, {}), "box=1 holds no node of the surface");
   EXPECT_EQ(refusal({{"box=1", {0, 100}, {}}}, {}),
             "box=1 holds 2 nodes but no whole triangle of the surface; expected one at least");
+  SoftBodyModel model = cylinderModel();
+  model.spheres.resize(1);
+  EXPECT_THROW(identifyNetwork(model, {}, {}), std::runtime_error);
+  model.spheres.resize(301);
+  EXPECT_THROW(identifyNetwork(model, {endOfCylinder(cylinder())}, {}), std::runtime_error);
   settings = {};
   settings.memoryMax = 1e6;
   EXPECT_NE(refusal({endOfCylinder(cylinder())}, settings).find("GB, expected at most 0.0 GB"), std::string::npos);

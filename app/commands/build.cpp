@@ -34,8 +34,8 @@ struct BuildJob {
   std::optional<IdentifiedError> formulas;  // of the beams' formulas, where a network was identified
 };
 
-// The command that repeats the build, file names without folders: the model is the same wherever it is built, and the
-// same whether it is built alone or with others.
+// The command that repeats the build, file names without folders: the model is the same in whatever folder it is built,
+// and the same whether it is built alone or with others.
 std::string repeatingCommand(const BuildJob& job, const BuildOptions& options) {
   std::string command =
       fmt::format("medulla build {} {}", fs::path(job.meshPath).filename().string(), describeSettings(job.settings));
@@ -140,8 +140,8 @@ void buildAll(std::vector<BuildJob>& jobs) {
 }
 
 // Of the beams' formulas, on the loads that the identified network was measured on; both without regard to dents, which
-// formulas leave to the surface.
-IdentifiedError errorOfFormulas(const BuildJob& job, const Identification& found) {
+// formulas leave to the surface. None where what is held is too small to fix a sphere: beams then have no answer.
+std::optional<IdentifiedError> errorOfFormulas(const BuildJob& job, const Identification& found) {
   BodyDescription body;
   body.model = std::make_shared<SoftBodyModel>(job.model);
   body.tissue.young = 1;
@@ -151,6 +151,7 @@ IdentifiedError errorOfFormulas(const BuildJob& job, const Identification& found
   std::sort(body.fixedNodes.begin(), body.fixedNodes.end());
   body.fixedNodes.erase(std::unique(body.fixedNodes.begin(), body.fixedNodes.end()), body.fixedNodes.end());
   for (const int sphere : spheresHeldBy(job.model, body.fixedNodes)) body.fixed.push_back({sphere});
+  if (body.fixed.empty()) return std::nullopt;
   return errorOf(skeletonResponse(body, bodyMechanics(body), found.forces), found.displacements);
 }
 
@@ -158,7 +159,7 @@ IdentifiedError errorOfFormulas(const BuildJob& job, const Identification& found
 void chooseFormulasIfBetter(BuildJob& job, IdentifiedNetwork& network, const Identification& found) {
   if (network.patches.empty()) return;  // beams alone do not answer a free body's loads at rest
   job.formulas = errorOfFormulas(job, found);
-  if (job.formulas->rms >= network.bulk.rms) return;
+  if (!job.formulas || job.formulas->rms >= network.bulk.rms) return;
   fmt::print(stderr, "{}: note: beams' formulas are nearer to finite elements ({:.2g} against {:.2g} % RMS): kept\n",
              job.meshPath, job.formulas->rms, network.bulk.rms);
   network.usesFormulas = true;

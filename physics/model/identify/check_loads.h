@@ -22,12 +22,14 @@ enum class LoadKind {
 };
 
 // Random tractions of 1 Pa on patches of the surface, as forces (N) on its nodes: 3 nodes x count. Nodes that are held
-// get no load. Patches of pokes have three nodes at least.
+// get no load. Patches have three nodes at least: where none such is found, the three free nodes nearest to a random
+// place. Throws std::runtime_error where fewer are free.
 RowMatrix randomLoads(const TriangleMesh& mesh, const NodeSurface& surface, LoadKind kind, double lengthScale,
                       int count, std::uint64_t seed);
 
 // Of columns of nodal displacements (3 nodes x loads): the worst load's largest error, and the mean square over all,
-// both relative to the load's largest expected displacement.
+// both relative to the load's largest expected displacement; loads that should move nothing do not count. Throws
+// std::runtime_error on displacements that are not finite.
 IdentifiedError errorOf(const Eigen::MatrixXd& found, const Eigen::MatrixXd& expected);
 
 }  // namespace medulla

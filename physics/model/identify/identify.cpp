@@ -27,6 +27,43 @@ void checkSettings(const IdentifySettings& s) {
     throw std::runtime_error(fmt::format("a Poisson's ratio of {}; expected 0 or more and less than 0.5", s.poisson));
 }
 
+// Each evaluation of the links' fit inverts a dense matrix of order 6 spheres, some four hundred times over.
+void checkModel(const SoftBodyModel& model, bool held) {
+  constexpr std::size_t spheresMax = 300;
+  if (model.spheres.size() > spheresMax)
+    throw std::runtime_error(
+        fmt::format("{} spheres are too many to identify: the time grows with their cube; expected at most {}",
+                    model.spheres.size(), spheresMax));
+  if (model.spheres.size() < 2 && !held)
+    throw std::runtime_error(
+        "a single sphere that nothing holds has nothing to identify; expected --fix or more spheres");
+}
+
+// Anything that is not a number would reach the model file.
+void requireFinite(const IdentifiedNetwork& n) {
+  bool finite = true;
+  const auto check = [&](const auto& m) { finite = finite && m.allFinite(); };
+  for (const IdentifiedFrame& f : n.frames) {
+    check(f.restPosition);
+    check(f.secondMoment);
+    check(Vector3d::Constant(f.volume));
+  }
+  for (const IdentifiedLink& link : n.links) {
+    check(link.restPoint1);
+    check(link.axes);
+    check(link.stiffness);
+  }
+  for (const std::vector<SkinFrame>& node : n.skin) {
+    for (const SkinFrame& f : node) {
+      check(f.map);
+      check(Vector3d::Constant(f.weight));
+    }
+  }
+  check(Vector3d(n.layer.normal, n.layer.tangential, n.layer.membrane));
+  for (const IdentifiedError& e : {n.bulk, n.poke, n.ofFiniteElements}) check(Vector3d(e.maximum, e.rms, 0));
+  if (!finite) throw std::runtime_error("the identified network has numbers that are not finite");
+}
+
 struct CellSize {
   double size = 0;   // m
   std::string neck;  // where the mesh asks for it; empty where the spheres do
@@ -104,7 +141,7 @@ MatrixXd framesResponse(const IdentifiedNetwork& n, const MatrixXd& grounding, c
   const MatrixXd loads = skin.transpose() * forces;
   MatrixXd stiffness = networkStiffness(n.links, n.lengthScale, frames);
   if (grounding.size() > 0) stiffness += grounding;
-  return skin * MatrixXd(stiffness.llt().solve(loads));
+  return skin * solvePositive(stiffness, loads);
 }
 
 VectorXd largestOf(const MatrixXd& displacements) {
@@ -191,7 +228,10 @@ void fitLayerAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const
 
 Identification identifyNetwork(const SoftBodyModel& model, const std::vector<HeldRegion>& held,
                                const IdentifySettings& settings, const Progress& progress) {
+  // Eigen sums products in blocks fitted to the caches: with these sizes in the same order on every processor.
+  Eigen::setCpuCacheSizes(32768, 262144, 2097152);
   checkSettings(settings);
+  checkModel(model, !held.empty());
   const TriangleMesh mesh{model.restNodes, model.triangles};
   Identification result;
   IdentifiedNetwork& out = result.network;
@@ -223,6 +263,7 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   out.skin = fitSkin(mesh, cells, out.patches, responses.frames, responses.nodes);
   out.frames = cells.frames;
   fitLayerAndMeasure(mesh, solid, solidSettings, responses.grounding, result, stage(0.85, 1));
+  requireFinite(out);
   return result;
 }
 

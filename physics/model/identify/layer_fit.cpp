@@ -2,6 +2,7 @@
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -77,6 +78,7 @@ MatrixXd freeOnly(const RowMatrix& forces, const NodeSurface& surface) {
 
 MatrixXd layerResponse(const TriangleMesh& mesh, const NodeSurface& surface, const IdentifiedLayer& layer,
                        const RowMatrix& forces) {
+  assert(forces.rows() == 3 * static_cast<Index>(mesh.vertices.size()));
   const std::array<SparseMatrix, 3> parts = layerParts(mesh, surface);
   const SparseMatrix k =
       layer.normal * parts[0] + layer.tangential * parts[1] + layer.membrane * parts[2] + identityOfHeld(surface);
@@ -87,11 +89,12 @@ MatrixXd layerResponse(const TriangleMesh& mesh, const NodeSurface& surface, con
 
 IdentifiedLayer fitLayer(const TriangleMesh& mesh, const NodeSurface& surface, const RowMatrix& forces,
                          const MatrixXd& rest, const VectorXd& scales, double lengthScale) {
+  assert(forces.rows() == 3 * static_cast<Index>(mesh.vertices.size()));
   const std::array<SparseMatrix, 3> parts = layerParts(mesh, surface);
   const SparseMatrix held = identityOfHeld(surface);
   const MatrixXd loads = freeOnly(forces, surface);
   MatrixXd target = freeOnly(rest, surface);
-  const VectorXd weights = scales.cwiseAbs2().cwiseInverse();
+  const VectorXd weights = scales.unaryExpr([](double s) { return s > 0 ? 1 / (s * s) : 0.; });
   Eigen::SimplicialLLT<SparseMatrix> factors;
   factors.analyzePattern(SparseMatrix(parts[0] + parts[1] + parts[2] + held));
   const Vector3d units(1 / lengthScale, 1 / lengthScale, lengthScale);

@@ -11,8 +11,9 @@ Eigen::MatrixXd layerResponse(const TriangleMesh& mesh, const NodeSurface& surfa
                               const RowMatrix& forces);
 
 // The layer that best gives what the frames leave of the displacements under `forces`; `rest` is that (3 nodes x
-// loads), `scales` what each load's part is divided by. Springs are 1 to 1000 / lengthScale, the membrane 1e-3 to 0.1
-// lengthScale: softer would leave the frames' work to the layer, stiffer bound the time step for nothing.
+// loads), `scales` what each load's part is divided by (0: it does not count). Springs are 1 to 1000 / lengthScale, the
+// membrane 1e-3 to 0.1 lengthScale: softer would leave the frames' work to the layer, stiffer bound the time step for
+// nothing.
 IdentifiedLayer fitLayer(const TriangleMesh& mesh, const NodeSurface& surface, const RowMatrix& forces,
                          const Eigen::MatrixXd& rest, const Eigen::VectorXd& scales, double lengthScale);
 

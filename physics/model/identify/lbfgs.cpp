@@ -3,6 +3,7 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <stdexcept>
 
 namespace medulla {
 
@@ -33,8 +34,9 @@ VectorXd direction(const std::deque<Pair>& pairs, const VectorXd& gradient) {
 
 double descend(const Objective& objective, const DescentSettings& settings, VectorXd& x) {
   constexpr double decrease = 1e-4, curvature = 0.9;
-  VectorXd gradient(x.size()), trialGradient(x.size()), trial;
+  VectorXd gradient = VectorXd::Zero(x.size()), trialGradient = gradient, trial;
   double value = objective(x, gradient);
+  if (!std::isfinite(value)) throw std::runtime_error("a fit starts from a value that is not finite");
   std::deque<Pair> pairs;
   for (int iteration = 0; iteration < settings.iterations; ++iteration) {
     VectorXd d = direction(pairs, gradient);

@@ -15,7 +15,8 @@ struct DescentSettings {
 };
 
 // Minimises from x by limited-memory BFGS (Nocedal 1980) with steps that meet the weak Wolfe conditions, found by
-// bisection (Lewis and Overton 2013). Returns the value reached.
+// bisection (Lewis and Overton 2013). Returns the value reached. Throws
+// std::runtime_error where the value at x is not finite.
 double descend(const Objective& objective, const DescentSettings& settings, Eigen::VectorXd& x);
 
 }  // namespace medulla

@@ -2,12 +2,20 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <stdexcept>
 
 namespace medulla {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
+
+MatrixXd solvePositive(const MatrixXd& matrix, const MatrixXd& right) {
+  const Eigen::LLT<MatrixXd> factors(matrix);
+  if (factors.info() != Eigen::Success)
+    throw std::runtime_error("the stiffness between the spheres is not positive definite: nothing to identify");
+  return factors.solve(right);
+}
 
 Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const std::function<void(double)>& progress) {
   constexpr Index block = 48;
@@ -42,13 +50,13 @@ Responses balancedResponses(const TriangleMesh& mesh, const CellFrames& cells, c
   const MatrixXd rigid = rigidMotions(places, places[0], 6, cells.lengthScale),
                  nodesRigid = rigidMotions(mesh.vertices, places[0], 3, cells.lengthScale);
   const Index n = rigid.rows();
-  const MatrixXd inverse = pinned.frames.llt().solve(MatrixXd::Identity(n, n)), carried = inverse * rigid;
+  const MatrixXd inverse = solvePositive(pinned.frames, MatrixXd::Identity(n, n)), carried = inverse * rigid;
   MatrixXd stiffness = inverse - carried * (rigid.transpose() * carried).ldlt().solve(carried.transpose());
   stiffness = (stiffness + stiffness.transpose()).eval() / 2;
   const MatrixXd basis = rigid.householderQr().householderQ() * MatrixXd::Identity(n, 6);
   Responses out;
   out.grounding = stiffness.trace() / static_cast<double>(n) * basis * basis.transpose();
-  out.frames = (stiffness + out.grounding).llt().solve(MatrixXd::Identity(n, n));
+  out.frames = solvePositive(stiffness + out.grounding, MatrixXd::Identity(n, n));
   // Nodes under unit motions of the frames: the pinned solution, and the rigid motion that it lacks.
   const MatrixXd lacking = rigid.colPivHouseholderQr().solve(MatrixXd::Identity(n, n) - pinned.frames * stiffness);
   out.nodes = (pinned.nodes * stiffness + nodesRigid * lacking) * out.frames;

@@ -13,6 +13,9 @@ struct Responses {
   Eigen::MatrixXd grounding;      // of a free body: what has been added to its stiffness, 6 frames square
 };
 
+// Throws std::runtime_error where the matrix is not positive definite.
+Eigen::MatrixXd solvePositive(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
+
 Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const std::function<void(double)>& progress);
 
 // Of a free body from that of the pins it stands on, which its balanced loads do not feel. Its own stiffness is the
