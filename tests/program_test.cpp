@@ -445,7 +445,7 @@ TEST(Program, InterruptEndsAFilmThatIsBeingFinished) {
       if (entry.find(".gif.partial") != std::string::npos && !readFile(folder / entry).empty()) return true;
     return false;
   };
-  const ProgramResult r = runProgram({"render", kScene, "-o", folder / "film.gif", "--set", "clock.duration=3",
+  const ProgramResult r = runProgram({"render", kScene, "-o", folder / "film.gif", "--set", "clock.duration=3", "--set",
                                       "output.golden=1", "--size", "640x480", "--quality", "draft"},
                                      options);
   EXPECT_EQ(r.exitCode, 130) << r.err;
