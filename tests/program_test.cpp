@@ -213,6 +213,20 @@ TEST(Program, IdentifiesTheSameNetworkEachTime) {
   refused({"--fix", "plane=1,0,0,0.001"}, 2, {"--identify"});
 }
 
+TEST(Program, IdentifiesWhereFormulasHaveNoAnswer) {
+  const TemporaryFolder folder;
+  const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
+  const std::vector<std::string> command{"build", mesh, "--render-levels", "0", "--identify", "-o", folder / "a.xml"};
+  std::vector<std::string> small = command, single = command;
+  small.insert(small.end(), {"--spheres", "2", "--fix", "plane=1,0,0,0.001"});  // fixes neither sphere
+  single.insert(single.end(), {"--spheres", "1"});
+  expectRefusal(runProgram(single), 1, {"cylinder.obj", "single sphere", "--fix"});
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.xml"));
+  const ProgramResult r = runProgram(small);
+  EXPECT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_EQ(r.out.find("formulas_error"), std::string::npos);
+}
+
 TEST(Program, BuildsSeveralBodiesAsEachAlone) {
   const TemporaryFolder folder;
   const std::string assets = std::string(MEDULLA_SOURCE_DIR) + "/assets/";
