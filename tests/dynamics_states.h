@@ -55,7 +55,8 @@ inline double sphereMass(const WorldData& d, int i) {
   return d.spheres.groups[i / 4].mass[i % 4];
 }
 
-// Every sphere turned by up to `angle` (rad) and every sphere and free node moved by up to `shift` (m), spun and thrown.
+// Every sphere turned by up to `angle` (rad) and every sphere and free node moved by up to `shift` (m), spun and
+// thrown.
 inline void shake(WorldData& d, std::uint64_t seed, double angle, double shift, double speed) {
   Random random(seed);
   for (int i = 0; i < d.spheres.count; ++i) {
