@@ -54,14 +54,6 @@ bool factoriseBlock(Block6& a) {
   return true;
 }
 
-// b := b L^-T
-void solveFromRight(const Block6& l, Block6& b) {
-  for (int j = 0; j < 6; ++j) {
-    for (int k = 0; k < j; ++k) b.col(j) -= l(j, k) * b.col(k);
-    b.col(j) *= l(j, j);
-  }
-}
-
 void solveForward(const Block6& l, Vector6& x) {
   for (int j = 0; j < 6; ++j) {
     x[j] *= l(j, j);
@@ -130,11 +122,11 @@ void BlockCholesky::addBlock(int k, const Block6& block) {
 bool BlockCholesky::factorise() {
   for (std::size_t p = 0; p < diagonal_.size(); ++p) {
     if (!factoriseBlock(diagonal_[p])) return false;
-    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i) solveFromRight(diagonal_[p], entry_[i]);
+    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i) divideByTransposed(diagonal_[p], entry_[i]);
     for (int u = firstUpdate_[p]; u < firstUpdate_[p + 1]; ++u) {
       const Update& update = updates_[u];
       Block6& target = update.target < 0 ? diagonal_[-1 - update.target] : entry_[update.target];
-      target.noalias() -= entry_[update.i] * entry_[update.k].transpose();
+      subtractProductWithTransposed(entry_[update.i], entry_[update.k], target);
     }
   }
   return true;
@@ -145,11 +137,11 @@ void BlockCholesky::solve(std::vector<Vector6>& x) const {
   for (std::size_t p = 0; p < rows; ++p) work_[p] = x[order_[p]];
   for (std::size_t p = 0; p < rows; ++p) {
     solveForward(diagonal_[p], work_[p]);
-    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i) work_[entryRow_[i]].noalias() -= entry_[i] * work_[p];
+    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i) subtractProduct(entry_[i], work_[p], work_[entryRow_[i]]);
   }
   for (std::size_t p = rows; p-- > 0;) {
     for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i)
-      work_[p].noalias() -= entry_[i].transpose() * work_[entryRow_[i]];
+      subtractTransposedProduct(entry_[i], work_[entryRow_[i]], work_[p]);
     solveBackward(diagonal_[p], work_[p]);
   }
   for (std::size_t p = 0; p < rows; ++p) x[order_[p]] = work_[p];

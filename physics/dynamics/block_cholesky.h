@@ -1,13 +1,11 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <vector>
 
-namespace medulla {
+#include "physics/dynamics/block6.h"
 
-using Block6 = Eigen::Matrix<double, 6, 6>;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
+namespace medulla {
 
 // Cholesky factor of a sparse symmetric positive definite matrix of 6x6 blocks, one row of blocks per sphere and one
 // block beside the diagonal per link. Order and fill are found once (minimum degree); factorising and solving allocate
