@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 
 #include "physics/dynamics/simd.h"
 
@@ -12,52 +13,69 @@ namespace medulla {
 using Block6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
+struct Six {
+  Lanes rows0;    // 0-3
+  __m128d rows4;  // 4, 5
+};
+
+MEDULLA_INLINE Six loadSix(const double* from) {
+  return {_mm256_loadu_pd(from), _mm_loadu_pd(from + 4)};
+}
+MEDULLA_INLINE void storeSix(double* to, const Six& a) {
+  _mm256_storeu_pd(to, a.rows0);
+  _mm_storeu_pd(to + 4, a.rows4);
+}
+MEDULLA_INLINE Six operator-(const Six& a, const Six& b) {
+  return {a.rows0 - b.rows0, a.rows4 - b.rows4};
+}
+// f a + b
+MEDULLA_INLINE Six fma(double f, const Six& a, const Six& b) {
+  return {fma(splat(f), a.rows0, b.rows0), _mm_fmadd_pd(_mm_set1_pd(f), a.rows4, b.rows4)};
+}
+
 namespace block6 {
 
 // (rows 4, 5, 0, 1) of a column whose rows 0-3 and 2-5 are given.
 MEDULLA_INLINE Lanes rowsAcross(Lanes rows0, Lanes rows2) {
   return _mm256_permute2f128_pd(rows0, rows2, 0x03);
 }
-// (a a b b) of numbers 0 and 1, or 2 and 3, of four.
-MEDULLA_INLINE Lanes lowerTwice(Lanes a) {
-  return _mm256_permute4x64_pd(a, 0x50);
-}
-MEDULLA_INLINE Lanes upperTwice(Lanes a) {
-  return _mm256_permute4x64_pd(a, 0xFA);
+
+// Of six numbers, each twice: (0 0 1 1), (2 2 3 3), (4 4 5 5).
+MEDULLA_INLINE void eachTwice(const double* x, Lanes (&pairs)[3]) {
+  const Lanes x0 = _mm256_loadu_pd(x);
+  pairs[0] = _mm256_permute4x64_pd(x0, 0x50);
+  pairs[1] = _mm256_permute4x64_pd(x0, 0xFA);
+  pairs[2] = _mm256_permute4x64_pd(_mm256_loadu_pd(x + 2), 0xFA);
 }
 
 }  // namespace block6
 
-// y -= a x
-MEDULLA_INLINE void subtractProduct(const Block6& a, const Vector6& x, Vector6& y) {
-  const double* m = a.data();
-  const Lanes x0 = _mm256_loadu_pd(x.data()), x2 = _mm256_loadu_pd(x.data() + 2);
-  const Lanes pairs[3] = {block6::lowerTwice(x0), block6::upperTwice(x0), block6::upperTwice(x2)};
-  Lanes first = splat(0), across = splat(0), second = splat(0);
+// a x; `x` holds six.
+MEDULLA_INLINE Six product(const Block6& a, const double* x) {
+  Lanes pairs[3], first = splat(0), across = splat(0), second = splat(0);
+  block6::eachTwice(x, pairs);
   for (int p = 0; p < 3; ++p) {
-    first = fma(_mm256_loadu_pd(m + 12 * p), _mm256_broadcast_sd(&x[2 * p]), first);
-    across = fma(_mm256_loadu_pd(m + 12 * p + 4), pairs[p], across);
-    second = fma(_mm256_loadu_pd(m + 12 * p + 8), _mm256_broadcast_sd(&x[2 * p + 1]), second);
+    const double* columns = a.data() + 12 * p;
+    first = fma(_mm256_loadu_pd(columns), _mm256_broadcast_sd(&x[2 * p]), first);
+    across = fma(_mm256_loadu_pd(columns + 4), pairs[p], across);
+    second = fma(_mm256_loadu_pd(columns + 8), _mm256_broadcast_sd(&x[2 * p + 1]), second);
   }
-  const Lanes rows0 = first + _mm256_permute2f128_pd(across, second, 0x21);
-  const __m128d rows4 = _mm256_castpd256_pd128(across) + _mm256_extractf128_pd(second, 1);
-  _mm256_storeu_pd(y.data(), _mm256_loadu_pd(y.data()) - rows0);
-  _mm_storeu_pd(y.data() + 4, _mm_loadu_pd(y.data() + 4) - rows4);
+  return {first + _mm256_permute2f128_pd(across, second, 0x21),
+          _mm256_castpd256_pd128(across) + _mm256_extractf128_pd(second, 1)};
 }
 
-// y -= a^T x
-MEDULLA_INLINE void subtractTransposedProduct(const Block6& a, const Vector6& x, Vector6& y) {
-  const double* m = a.data();
-  const Lanes x0 = _mm256_loadu_pd(x.data()), x2 = _mm256_loadu_pd(x.data() + 2);
-  const Lanes across = block6::rowsAcross(x0, x2);
+// a^T x; `x` holds six.
+MEDULLA_INLINE Six transposedProduct(const Block6& a, const double* x) {
+  const Lanes x0 = _mm256_loadu_pd(x), x2 = _mm256_loadu_pd(x + 2), x4 = block6::rowsAcross(x0, x2);
+  __m128d sums[3];
   for (int p = 0; p < 3; ++p) {
-    const Lanes first = _mm256_loadu_pd(m + 12 * p) * x0, middle = _mm256_loadu_pd(m + 12 * p + 4) * across,
-                second = _mm256_loadu_pd(m + 12 * p + 8) * x2;
-    const Lanes halves = _mm256_hadd_pd(first, second);
-    const __m128d ends = _mm_hadd_pd(_mm256_castpd256_pd128(middle), _mm256_extractf128_pd(middle, 1));
-    const __m128d sums = (_mm256_castpd256_pd128(halves) + _mm256_extractf128_pd(halves, 1)) + ends;
-    _mm_storeu_pd(&y[2 * p], _mm_loadu_pd(&y[2 * p]) - sums);
+    const double* columns = a.data() + 12 * p;
+    const Lanes halves = _mm256_hadd_pd(_mm256_loadu_pd(columns) * x0, _mm256_loadu_pd(columns + 8) * x2);
+    const Lanes across = _mm256_loadu_pd(columns + 4) * x4;
+    const __m128d ends = _mm_hadd_pd(_mm256_castpd256_pd128(across), _mm256_extractf128_pd(across, 1));
+    sums[p] = (_mm256_castpd256_pd128(halves) + _mm256_extractf128_pd(halves, 1)) + ends;
   }
+  return {_mm256_set_m128d(sums[1], sums[0]), sums[2]};
 }
 
 // to -= a b^T
@@ -65,36 +83,53 @@ MEDULLA_INLINE void subtractProductWithTransposed(const Block6& a, const Block6&
   Lanes sum[9];
   for (int k = 0; k < 9; ++k) sum[k] = _mm256_loadu_pd(to.data() + 4 * k);
   for (int j = 0; j < 6; ++j) {
-    const double *column = a.data() + 6 * j, *row = b.data() + 6 * j;
+    const double *column = a.data() + 6 * j, *factors = b.data() + 6 * j;
     const Lanes rows0 = _mm256_loadu_pd(column), rows2 = _mm256_loadu_pd(column + 2);
     const Lanes across = block6::rowsAcross(rows0, rows2);
-    const Lanes b0 = _mm256_loadu_pd(row), b2 = _mm256_loadu_pd(row + 2);
-    const Lanes pairs[3] = {block6::lowerTwice(b0), block6::upperTwice(b0), block6::upperTwice(b2)};
+    Lanes pairs[3];
+    block6::eachTwice(factors, pairs);
     for (int p = 0; p < 3; ++p) {
-      sum[3 * p] = fnma(rows0, _mm256_broadcast_sd(row + 2 * p), sum[3 * p]);
+      sum[3 * p] = fnma(rows0, _mm256_broadcast_sd(factors + 2 * p), sum[3 * p]);
       sum[3 * p + 1] = fnma(across, pairs[p], sum[3 * p + 1]);
-      sum[3 * p + 2] = fnma(rows2, _mm256_broadcast_sd(row + 2 * p + 1), sum[3 * p + 2]);
+      sum[3 * p + 2] = fnma(rows2, _mm256_broadcast_sd(factors + 2 * p + 1), sum[3 * p + 2]);
     }
   }
   for (int k = 0; k < 9; ++k) _mm256_storeu_pd(to.data() + 4 * k, sum[k]);
 }
 
-// b := b l^-T, with `l` lower and its diagonal inverted.
-MEDULLA_INLINE void divideByTransposed(const Block6& l, Block6& b) {
-  Lanes rows0[6];
-  __m128d rows4[6];
+// b := b u, with `u` upper.
+MEDULLA_INLINE void multiplyByUpper(const Block6& u, Block6& b) {
+  Six columns[6];
+  for (int j = 0; j < 6; ++j) columns[j] = loadSix(b.data() + 6 * j);
   for (int j = 0; j < 6; ++j) {
-    rows0[j] = _mm256_loadu_pd(b.data() + 6 * j);
-    rows4[j] = _mm_loadu_pd(b.data() + 6 * j + 4);
-    for (int k = 0; k < j; ++k) {
-      rows0[j] = fnma(splat(l(j, k)), rows0[k], rows0[j]);
-      rows4[j] = _mm_fnmadd_pd(_mm_set1_pd(l(j, k)), rows4[k], rows4[j]);
-    }
-    rows0[j] = rows0[j] * splat(l(j, j));
-    rows4[j] = rows4[j] * _mm_set1_pd(l(j, j));
-    _mm256_storeu_pd(b.data() + 6 * j, rows0[j]);
-    _mm_storeu_pd(b.data() + 6 * j + 4, rows4[j]);
+    Six sum{splat(0), _mm_setzero_pd()};
+    for (int k = 0; k <= j; ++k) sum = fma(u(k, j), columns[k], sum);
+    storeSix(b.data() + 6 * j, sum);
   }
+}
+
+// a := L^-T of a = L L^T, upper. False where a pivot is not positive. Only the lower triangle is read.
+inline bool invertFactor(Block6& a) {
+  double inverse[6];
+  for (int j = 0; j < 6; ++j) {
+    double* column = a.data() + 6 * j;
+    if (!(column[j] > 0)) return false;
+    inverse[j] = 1 / std::sqrt(column[j]);
+    const Six scaled = fma(inverse[j], loadSix(column), {splat(0), _mm_setzero_pd()});
+    storeSix(column, scaled);
+    for (int k = j + 1; k < 6; ++k)
+      storeSix(column + 6 * (k - j), fma(-column[k], scaled, loadSix(column + 6 * (k - j))));
+  }
+  // Row i of L^-1 is (unit i - sum over k < i of L(i, k) row k) / L(i, i); it becomes column i.
+  const Block6 l = a;
+  for (int i = 0; i < 6; ++i) {
+    Vector6 unit = Vector6::Zero();
+    unit[i] = inverse[i];
+    Six row = loadSix(unit.data());
+    for (int k = 0; k < i; ++k) row = fma(-inverse[i] * l(i, k), loadSix(a.data() + 6 * k), row);
+    storeSix(a.data() + 6 * i, row);
+  }
+  return true;
 }
 
 }  // namespace medulla

@@ -1,7 +1,6 @@
 #include "physics/dynamics/block_cholesky.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 
 namespace medulla {
@@ -35,37 +34,6 @@ std::vector<std::vector<int>> eliminate(int rows, const std::vector<std::array<i
     columns.push_back(column);
   }
   return columns;
-}
-
-// L of a = L L^T in the lower triangle; its pivots are stored inverted, which solves without divisions.
-bool factoriseBlock(Block6& a) {
-  for (int j = 0; j < 6; ++j) {
-    double pivot = a(j, j);
-    for (int k = 0; k < j; ++k) pivot -= a(j, k) * a(j, k);
-    if (!(pivot > 0)) return false;
-    const double inverse = 1 / std::sqrt(pivot);
-    a(j, j) = inverse;
-    for (int i = j + 1; i < 6; ++i) {
-      double sum = a(i, j);
-      for (int k = 0; k < j; ++k) sum -= a(i, k) * a(j, k);
-      a(i, j) = sum * inverse;
-    }
-  }
-  return true;
-}
-
-void solveForward(const Block6& l, Vector6& x) {
-  for (int j = 0; j < 6; ++j) {
-    x[j] *= l(j, j);
-    for (int i = j + 1; i < 6; ++i) x[i] -= l(i, j) * x[j];
-  }
-}
-
-void solveBackward(const Block6& l, Vector6& x) {
-  for (int j = 5; j >= 0; --j) {
-    for (int i = j + 1; i < 6; ++i) x[j] -= l(i, j) * x[i];
-    x[j] *= l(j, j);
-  }
 }
 
 }  // namespace
@@ -121,8 +89,8 @@ void BlockCholesky::addBlock(int k, const Block6& block) {
 
 bool BlockCholesky::factorise() {
   for (std::size_t p = 0; p < diagonal_.size(); ++p) {
-    if (!factoriseBlock(diagonal_[p])) return false;
-    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i) divideByTransposed(diagonal_[p], entry_[i]);
+    if (!invertFactor(diagonal_[p])) return false;
+    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i) multiplyByUpper(diagonal_[p], entry_[i]);
     for (int u = firstUpdate_[p]; u < firstUpdate_[p + 1]; ++u) {
       const Update& update = updates_[u];
       Block6& target = update.target < 0 ? diagonal_[-1 - update.target] : entry_[update.target];
@@ -136,13 +104,18 @@ void BlockCholesky::solve(std::vector<Vector6>& x) const {
   const std::size_t rows = order_.size();
   for (std::size_t p = 0; p < rows; ++p) work_[p] = x[order_[p]];
   for (std::size_t p = 0; p < rows; ++p) {
-    solveForward(diagonal_[p], work_[p]);
-    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i) subtractProduct(entry_[i], work_[p], work_[entryRow_[i]]);
+    double* own = work_[p].data();
+    storeSix(own, transposedProduct(diagonal_[p], own));
+    for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i) {
+      double* other = work_[entryRow_[i]].data();
+      storeSix(other, loadSix(other) - product(entry_[i], own));
+    }
   }
   for (std::size_t p = rows; p-- > 0;) {
+    double* own = work_[p].data();
     for (int i = firstEntry_[p]; i < firstEntry_[p + 1]; ++i)
-      subtractTransposedProduct(entry_[i], work_[entryRow_[i]], work_[p]);
-    solveBackward(diagonal_[p], work_[p]);
+      storeSix(own, loadSix(own) - transposedProduct(entry_[i], work_[entryRow_[i]].data()));
+    storeSix(own, product(diagonal_[p], own));
   }
   for (std::size_t p = 0; p < rows; ++p) x[order_[p]] = work_[p];
 }

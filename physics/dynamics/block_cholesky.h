@@ -32,7 +32,7 @@ class BlockCholesky {
   std::vector<int> order_, position_;     // order_[p]: the row that is eliminated p-th; position_: its inverse
   std::vector<int> firstEntry_;           // per column, in the order of elimination
   std::vector<int> entryRow_;             // position of each block below the diagonal
-  std::vector<Block6> entry_, diagonal_;  // after factorise(): L, its diagonal blocks with inverted pivots
+  std::vector<Block6> entry_, diagonal_;  // after factorise(): L, and of its diagonal blocks L^-T
   std::vector<int> firstUpdate_;          // per column
   std::vector<Update> updates_;
   std::vector<int> slot_;     // of analyse()'s blocks: an entry
