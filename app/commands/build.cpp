@@ -117,9 +117,17 @@ void divideSpheres(std::vector<BuildJob>& jobs) {
   shapes.reserve(jobs.size());
   BuildSettings average = jobs[0].settings;
   average.spheres = std::max(1, average.spheres / static_cast<int>(jobs.size()));
-  for (const BuildJob& job : jobs)
+  Progress progress("share spheres", 100, "%");
+  const auto tick = [&](double share) {
+    checkInterrupt();
+    progress.update(100 * share);
+  };
+  for (const BuildJob& job : jobs) {
+    tick(0.5 * static_cast<double>(shapes.size()) / static_cast<double>(jobs.size()));
     shapes.push_back(naming(job.meshPath, [&] { return measureShape(job.mesh.mesh, overshootOf(average)); }));
-  const std::vector<int> counts = shareSpheres(shapes, jobs[0].settings.spheres);
+  }
+  const std::vector<int> counts =
+      shareSpheres(shapes, jobs[0].settings.spheres, [&](double share) { tick(0.5 + 0.5 * share); });
   for (std::size_t j = 0; j < jobs.size(); ++j) jobs[j].settings.spheres = counts[j];
 }
 

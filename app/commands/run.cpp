@@ -322,6 +322,8 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   for (const BodyOverlap& o : simulation.world().startOverlaps())
     fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n",
                loaded.scene.bodies[o.body0].name, loaded.scene.bodies[o.body1].name, 1e3 * o.depth);
+  if (loaded.scene.sleepAfter > 0 && loaded.scene.integrator == Integrator::implicit)
+    fmt::print(stderr, "warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
   for (bool last = false; !last;) {
     checkInterrupt();
     if (advance)

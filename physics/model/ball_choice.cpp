@@ -111,16 +111,21 @@ std::vector<Ball> fewestBalls(const BodyShape& shape, double gap, int most, cons
   return best;
 }
 
-std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count) {
+std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count, const Progress& progress) {
+  constexpr int kSteps = 16;
   const int bodies = static_cast<int>(shapes.size());
   if (count < bodies) {
     throw std::runtime_error(fmt::format("{} spheres for {} bodies; expected one each at least", count, bodies));
   }
   std::vector<GreedyCount> greedy;
   double high = 0;  // m
+  const auto report = [&](double done) {
+    if (progress) progress(done);
+  };
   for (const BodyShape& shape : shapes) {
     greedy.emplace_back(candidatesOf(shape, 1), targetsOf(shape, 1));
     high = std::max(high, shape.diagonal);
+    report(0.5 * static_cast<double>(greedy.size()) / bodies);
   }
   const auto countsFor = [&](double gap) {
     std::vector<int> counts(bodies);
@@ -130,7 +135,8 @@ std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count) {
   // Gaps that bring the sum just under and just over what was asked for.
   std::vector<int> counts(bodies, 1), more = countsFor(0);
   double low = 0;
-  for (int step = 0; step < 16; ++step) {
+  for (int step = 0; step < kSteps; ++step) {
+    report(0.5 + 0.5 * step / kSteps);
     const std::vector<int> probe = countsFor((low + high) / 2);
     const bool fits = std::accumulate(probe.begin(), probe.end(), 0) <= count;
     (fits ? high : low) = (low + high) / 2;

@@ -40,6 +40,7 @@ double largestGap(const BodyShape& shape, const std::vector<Ball>& balls);
 // set cover takes for the smallest gap that they suffice for. Filling greedily, each next sphere where the gap is
 // largest, leaves most of them in folds that no candidate reaches well: 287 of 411 in a colon. At least one each.
 // Throws std::runtime_error where there are fewer spheres than bodies.
-std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count);
+std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count,
+                              const std::function<void(double)>& progress = {});
 
 }  // namespace medulla
