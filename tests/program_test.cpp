@@ -78,6 +78,17 @@ TEST(Program, BodiesThatOverlapAtTheStartAreNamedOnceAndComeApart) {
   EXPECT_NE(valueOf(run.out, "penetration_max"), "0");
 }
 
+TEST(Program, TellsThatBodiesDoNotSleepUnderTheImplicitIntegrator) {
+  const auto told = [](const std::string& integrator) {
+    const ProgramResult run = runProgram({"replay", kScene, "--set", "clock.duration=0.02", "--set",
+                                          "dynamics.sleep_after=1", "--set", "dynamics.integrator=" + integrator});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    return run.err.find("warning: sleep_after has no effect") != std::string::npos;
+  };
+  EXPECT_TRUE(told("implicit"));
+  EXPECT_FALSE(told("explicit"));
+}
+
 TEST(Program, DrawingOptionsLeaveTheHashAlone) {
   const TemporaryFolder folder;
   const std::string hash = valueOf(runProgram(command({"replay", kScene})).out, "hash");
