@@ -152,7 +152,7 @@ def gallbladder():
         Case("poke_large", "bed", Load("large", tuple(-500 * front)), 3),
     ]
     return Body("gallbladder", "assets/gallbladder/gallbladder.obj", 9e3, 1040, regions, cases,
-                grids={"root": grids(1, 2, 1, 4, 2, 4), "bed": grids(1, 0, 1, 2, 1, 4)}, kept={"root": 1, "bed": 2},
+                grids={"root": grids(1, 2, 1, 4, 2, 4), "bed": grids(1, 0, 1, 2, 1, 4)}, kept={"root": 2, "bed": 2},
                 cut=("root",))
 
 
@@ -176,8 +176,24 @@ def liver():
         Case("poke_large", "bed", Load("large", (0, 0, -2000))),
     ]
     return Body("liver", "assets/liver/liver.obj", 5e3, 1060, regions, cases,
-                grids={"root": grids(1, 2, 1, 4, 1, 6), "bed": grids(1, 0, 1, 2, 1, 4)}, kept={"root": 0, "bed": 1})
+                grids={"root": grids(1, 2, 1, 4, 1, 6), "bed": grids(1, 0, 1, 2, 1, 4)}, kept={"root": 1, "bed": 1})
+
+
+def stomach():
+    curvature, away = np.array((108.0, -26.0, 25.0)), np.array((0.625, -0.214, 0.751))
+    oesophagus, duodenum = within((17, 108, -40), 30), within((-38, -85, -30), 35)
+    regions = {
+        "root": lambda x, n: oesophagus(x, n) | duodenum(x, n),
+        "curvature": within(curvature, 25),
+        "front": within((40.0, -60.0, 40.0), 20),
+    }
+    cases = [
+        Case("pull", "root", Load("curvature", tuple(15 * away)), 4),
+        Case("press", "root", Load("front", (0, 0, -15)), 4),
+    ]
+    return Body("stomach", "assets/stomach/stomach.obj", 7e3, 1040, regions, cases,
+                grids={"root": grids(1, 2, 1, 4, 1, 6)}, kept={"root": 1})
 
 
 def bodies():
-    return [cylinder(), gallbladder(), liver()]
+    return [cylinder(), gallbladder(), liver(), stomach()]
