@@ -1,5 +1,6 @@
 #include "app/interrupt.h"
 
+#include <atomic>
 #include <csignal>
 #include <initializer_list>
 
@@ -7,10 +8,12 @@ namespace medulla {
 
 namespace {
 
-volatile std::sig_atomic_t requested = 0;
+// Read by other threads than the one that the signal interrupts, so that a volatile sig_atomic_t would not do.
+std::atomic<bool> requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free);  // what a signal handler may write
 
 extern "C" void onSignal(int) {
-  requested = 1;
+  requested = true;
 }
 
 }  // namespace
@@ -24,7 +27,7 @@ void watchInterrupts() {
 }
 
 bool interruptRequested() {
-  return requested != 0;
+  return requested;
 }
 
 void checkInterrupt() {

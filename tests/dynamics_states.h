@@ -118,7 +118,7 @@ inline void expectForcesAreMinusGradient(WorldData& d, double tolerance) {
   for (int i = 0; i < d.spheres.count; ++i) {
     for (int k = 0; k < 3; ++k) {
       const Quad position = d.spheres.position[i], q = d.spheres.orientation[i];
-      double energy[2];
+      double energy[2] = {};
       for (int side : {0, 1}) {
         d.spheres.position[i].v[k] = position.v[k] + (side == 0 ? -1 : 1) * 0.1 * step;
         energy[side] = elastic(d);
@@ -138,7 +138,7 @@ inline void expectForcesAreMinusGradient(WorldData& d, double tolerance) {
   for (int i = 0; i < d.nodes.dynamicEnd; i += 5) {
     for (int k = 0; k < 3; ++k) {
       const Vector3d position = vectorAt(d.nodes.position, i);
-      double energy[2];
+      double energy[2] = {};
       for (int side : {0, 1}) {
         setVector(d.nodes.position, i, position + (side == 0 ? -1 : 1) * 0.1 * step * Vector3d::Unit(k));
         energy[side] = elastic(d);

@@ -1,11 +1,11 @@
 #include "app/files/identified_part.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 
 #include "app/files/model_rows.h"
+#include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
 
@@ -78,8 +78,8 @@ void readLinks(const std::string& path, const XmlElement& element, IdentifiedNet
         l.stiffness(b, a) = l.stiffness(a, b);
       }
     }
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> own(l.stiffness, Eigen::EigenvaluesOnly);
-    rows.require(own.eigenvalues().allFinite() && own.eigenvalues()[0] >= -kRounding * std::abs(own.eigenvalues()[5]),
+    const Eigen::Matrix<double, 6, 1> own = symmetricEigen(l.stiffness).values;
+    rows.require(own.allFinite() && own[0] >= -kRounding * std::abs(own[5]),
                  "a stiffness that is not positive semidefinite");
   });
 }

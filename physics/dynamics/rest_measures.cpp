@@ -1,9 +1,9 @@
 #include "physics/dynamics/rest_measures.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
 #include "physics/dynamics/identified_mechanics.h"
+#include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
 
@@ -16,12 +16,12 @@ static std::vector<MeasureRow> identifiedRows(const SoftBodyModel& m, const Body
   for (std::size_t k = 0; k < b.identifiedLinks.size(); ++k) {
     const IdentifiedLink& l = m.identified->links[k];
     const RestMeasures measures = restMeasures(m, l);
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(b.identifiedLinks[k]);
+    const SymmetricEigen eigen = symmetricEigen(b.identifiedLinks[k]);
     for (int i = 0; i < 6; ++i) {
-      if (!(eigen.eigenvalues()[i] > 0)) continue;
-      const Eigen::Matrix<double, 1, 6> e = eigen.eigenvectors().col(i).transpose();
+      if (!(eigen.values[i] > 0)) continue;
+      const Eigen::Matrix<double, 1, 6> e = eigen.vectors.col(i).transpose();
       rows.push_back({l.frame0, l.frame1 < spheres ? l.frame1 : -1, (e * measures.line).transpose(),
-                      (e * measures.turn0).transpose(), (e * measures.turn1).transpose(), eigen.eigenvalues()[i]});
+                      (e * measures.turn0).transpose(), (e * measures.turn1).transpose(), eigen.values[i]});
     }
   }
   return rows;

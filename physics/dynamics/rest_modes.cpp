@@ -313,7 +313,8 @@ MatrixXd freeRigidMotions(const SoftBodyModel& m, const std::vector<int>& freedo
   }
   if (fixed.rows() == 0) return free;
   const double size = std::max(1e-12, all.leftCols(6).cwiseAbs().maxCoeff());
-  const Eigen::JacobiSVD<MatrixXd> svd(fixed.transpose() * fixed, Eigen::ComputeFullV);
+  // Of a square matrix, which needs no QR first.
+  const Eigen::JacobiSVD<MatrixXd, Eigen::NoQRPreconditioner> svd(fixed.transpose() * fixed, Eigen::ComputeFullV);
   MatrixXd out(freeCount, 0);
   for (int k = 0; k < 6; ++k) {
     if (svd.singularValues()[k] > 1e-12 * size * size) continue;

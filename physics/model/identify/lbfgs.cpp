@@ -50,8 +50,7 @@ double descend(const Objective& objective, const DescentSettings& settings, Vect
     }
     double low = 0, high = std::numeric_limits<double>::infinity();
     double step = pairs.empty() ? std::min(1., 0.1 * std::max(1., x.norm()) / d.norm()) : 1, reached = value;
-    bool found = false;
-    for (int k = 0; k < 30 && !found; ++k) {
+    for (int k = 0; k < 30; ++k) {
       trial = x + step * d;
       reached = objective(trial, trialGradient);
       if (!(reached <= value + decrease * step * slope)) {
@@ -59,7 +58,6 @@ double descend(const Objective& objective, const DescentSettings& settings, Vect
       } else if (trialGradient.dot(d) < curvature * slope) {
         low = step;
       } else {
-        found = true;
         break;
       }
       step = std::isfinite(high) ? (low + high) / 2 : 2 * low;

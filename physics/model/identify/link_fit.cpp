@@ -1,7 +1,6 @@
 #include "physics/model/identify/link_fit.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 
 #include "physics/model/identify/lbfgs.h"
 #include "physics/model/identify/skin_fit.h"
+#include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
 
@@ -142,7 +142,8 @@ class LinkFit {
       if (form == LinkForm::diagonal) {
         scales_.push_back(h.diagonal().cwiseSqrt().cwiseInverse().asDiagonal());
       } else {
-        scales_.push_back(Eigen::SelfAdjointEigenSolver<Matrix6d>(h).operatorInverseSqrt());
+        const SymmetricEigen e = symmetricEigen(h);
+        scales_.push_back(e.vectors * e.values.cwiseInverse().cwiseSqrt().asDiagonal() * e.vectors.transpose());
       }
     }
     const Index n = compliance.rows();

@@ -1,0 +1,12 @@
+#include "physics/model/symmetric_eigen.h"
+
+#include <Eigen/Eigenvalues>
+
+namespace medulla {
+
+SymmetricEigen symmetricEigen(const Matrix6d& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+}  // namespace medulla
