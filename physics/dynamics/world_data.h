@@ -204,7 +204,7 @@ struct SurfacePart {            // of one host; part k is that of Nodes::onLinks
   int quietFrames = 0;          // in a row, in which nothing asked for it; state
   bool always = true;           // there is no choice: another surface mode, or something acts on it all the time
   std::vector<int> neighbours;  // parts that edges join to this one
-  double unrest = 0;            // m: nodes farther than this from where they hang at rest set neighbours moving
+  double unrest = 0;            // m: it moves where its neighbours' edges would shift a node of it by more
 };
 
 // A sphere without any node's mass, kg and kg m2 in its frame; what a carried node adds.
