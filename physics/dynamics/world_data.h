@@ -242,12 +242,14 @@ struct StillPlace {  // where a sphere was at the first frame of Rest::stillFram
 // fetch everything anew.
 struct Batch {
   std::vector<int> bodies, spheres, sphereGroups, linkGroups, nodeGroups;  // groups: with anything awake in them
+  std::vector<int> framedLinkGroups, bareLinkGroups;  // linkGroups: with and without frames that substeps ask for
   std::vector<HostRange> onLinks, onSpheres;
 };
 
 struct Awake {
   int bodies = 0;
   std::vector<Batch> batches;
+  std::vector<char> loadedSkins;  // per body: a skin, and loads act on its nodes in this frame
 };
 
 // A driven sphere; DrivenSphere with everything in world units.
