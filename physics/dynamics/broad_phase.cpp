@@ -9,7 +9,8 @@ namespace medulla {
 
 namespace {
 
-using Cell = std::array<std::int32_t, 3>;
+using Cell = BroadPhase::Cell;
+using CellRange = BroadPhase::CellRange;
 // Comparing arrays calls memcmp.
 bool same(const Cell& a, const Cell& b) {
   return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
@@ -54,15 +55,15 @@ struct Grid {
                             (static_cast<std::uint32_t>(c[2]) * 83492791u);
     return (h ^ (h >> 15)) & mask;
   }
-  template <class Visit>
-  void forEachCell(const AxisBox& b, const Visit& visit) const {
-    const Cell low = cellOf(b.low), high = cellOf(b.high);
-    Cell c;
-    for (c[0] = low[0]; c[0] <= high[0]; ++c[0])
-      for (c[1] = low[1]; c[1] <= high[1]; ++c[1])
-        for (c[2] = low[2]; c[2] <= high[2]; ++c[2]) visit(c);
-  }
 };
+
+template <class Visit>
+void forEachCell(const CellRange& r, const Visit& visit) {
+  Cell c;
+  for (c[0] = r.low[0]; c[0] <= r.high[0]; ++c[0])
+    for (c[1] = r.low[1]; c[1] <= r.high[1]; ++c[1])
+      for (c[2] = r.low[2]; c[2] <= r.high[2]; ++c[2]) visit(c);
+}
 
 // Counting sort of (cell, box) by bucket; within a bucket boxes ascend.
 Grid fillGrid(const std::vector<AxisBox>& boxes, double size, BroadPhase& phase) {
@@ -70,8 +71,9 @@ Grid fillGrid(const std::vector<AxisBox>& boxes, double size, BroadPhase& phase)
   std::size_t count = 0;
   grid.first = grid.cellOf(boxes[0].low);
   Cell last = grid.first;
+  phase.ranges.clear();
   for (const AxisBox& b : boxes) {
-    const Cell low = grid.cellOf(b.low), high = grid.cellOf(b.high);
+    const auto& [low, high] = phase.ranges.emplace_back(CellRange{grid.cellOf(b.low), grid.cellOf(b.high)});
     std::size_t cells = 1;
     for (int a = 0; a < 3; ++a) {
       cells *= high[a] - low[a] + 1;
@@ -90,25 +92,30 @@ Grid fillGrid(const std::vector<AxisBox>& boxes, double size, BroadPhase& phase)
   if (!dense) grid.mask = static_cast<std::uint32_t>(buckets - 1);
   phase.begin.assign(buckets + 1, 0);
   phase.entries.resize(count);
-  for (const AxisBox& b : boxes) grid.forEachCell(b, [&](const Cell& c) { ++phase.begin[grid.bucketOf(c)]; });
+  for (const CellRange& r : phase.ranges) forEachCell(r, [&](const Cell& c) { ++phase.begin[grid.bucketOf(c)]; });
   std::uint32_t end = 0;
   for (std::uint32_t& b : phase.begin) b = end += b;
   for (std::size_t i = boxes.size(); i-- > 0;) {
-    grid.forEachCell(boxes[i], [&](const Cell& c) {
+    forEachCell(phase.ranges[i], [&](const Cell& c) {
       phase.entries[--phase.begin[grid.bucketOf(c)]] = {static_cast<std::uint32_t>(i), c};
     });
   }
   return grid;
 }
 
-// The lower corner of what two boxes share, or false where they share nothing. A pair that meets in several cells is
-// taken where this corner lies.
-bool sharedCorner(const AxisBox& a, const AxisBox& b, std::array<double, 3>& corner) {
-  for (int k = 0; k < 3; ++k) {
-    corner[k] = std::max(a.low[k], b.low[k]);
-    if (corner[k] > std::min(a.high[k], b.high[k])) return false;
-  }
-  return true;
+// One outcome for all axes: which of them parts two boxes is anybody's guess.
+bool overlap(const AxisBox& a, const AxisBox& b) {
+  bool apart = false;
+  for (int k = 0; k < 3; ++k) apart = apart | (a.low[k] > b.high[k]) | (b.low[k] > a.high[k]);
+  return !apart;
+}
+
+// Whether `c`, a cell of both boxes, is where the lower corner of what they share lies: a pair that meets in several
+// cells is taken there. Rounding down keeps order, so that this corner's cell is the later one of the two boxes' own.
+bool holdsSharedCorner(const Cell& c, const Cell& low0, const Cell& low1) {
+  bool holds = true;
+  for (int k = 0; k < 3; ++k) holds = holds & (std::max(low0[k], low1[k]) == c[k]);
+  return holds;
 }
 
 }  // namespace
@@ -120,13 +127,13 @@ void findOverlaps(const std::vector<AxisBox>& boxes, BroadPhase& phase) {
   const Grid grid = fillGrid(boxes, size, phase);
   for (std::uint32_t i = 0; i < boxes.size(); ++i) {
     const std::size_t first = phase.pairs.size();
-    grid.forEachCell(boxes[i], [&](const Cell& c) {
+    forEachCell(phase.ranges[i], [&](const Cell& c) {
       const std::uint32_t bucket = grid.bucketOf(c);
       for (std::uint32_t k = phase.begin[bucket + 1]; k-- > phase.begin[bucket];) {
         const BroadPhase::Entry& e = phase.entries[k];
         if (e.box <= i) break;  // ascending: the rest is below i too
-        std::array<double, 3> corner;
-        if (same(e.cell, c) && sharedCorner(boxes[i], boxes[e.box], corner) && same(grid.cellOf(corner), c))
+        if (same(e.cell, c) && holdsSharedCorner(c, phase.ranges[i].low, phase.ranges[e.box].low) &&
+            overlap(boxes[i], boxes[e.box]))
           phase.pairs.push_back({i, e.box});
       }
     });

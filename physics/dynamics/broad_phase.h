@@ -18,10 +18,15 @@ struct BoxPair {
 
 // Buffers, kept so that nothing is allocated once warm.
 struct BroadPhase {
+  using Cell = std::array<std::int32_t, 3>;
+  struct CellRange {  // of a box
+    Cell low, high;
+  };
   struct Entry {
     std::uint32_t box;
-    std::array<std::int32_t, 3> cell;
+    Cell cell;
   };
+  std::vector<CellRange> ranges;     // per box
   std::vector<Entry> entries;        // by bucket
   std::vector<std::uint32_t> begin;  // of each bucket in `entries`, and the end of the last
   std::vector<BoxPair> pairs;        // result: sorted by first, then second

@@ -182,51 +182,69 @@ MEDULLA_INLINE void thin(const LinkGroup& link, Lanes length, Lanes lengthRate, 
   f.thicknessRate = f.thicknessSlope * lengthRate;
 }
 
-void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundTwist, LinkFrame& f) {
-  const SphereLanes s0 = gatherSpheres(spheres, link.sphere0, link.restArm0, link.hasArms),
-                    s1 = gatherSpheres(spheres, link.sphere1, link.restArm1, link.hasArms);
-  const LinkMeasures m = measure(link, s0, s1, load(unwoundTwist));
+struct LinkState {
+  SphereLanes s0, s1;
+  LinkMeasures m;
+  Lanes3 lineVelocity, nRate;
+  Lanes lengthRate, spin0, spin1;
+  Lanes3 force1, torque0, torque1;  // as LinkFrame's
+  Lanes twistMoment;
+};
+
+MEDULLA_INLINE void evaluate(const LinkGroup& link, const Spheres& spheres, Quad& unwoundTwist, LinkState& e) {
+  e.s0 = gatherSpheres(spheres, link.sphere0, link.restArm0, link.hasArms);
+  e.s1 = gatherSpheres(spheres, link.sphere1, link.restArm1, link.hasArms);
+  const LinkMeasures& m = e.m = measure(link, e.s0, e.s1, load(unwoundTwist));
   store(unwoundTwist, m.twist);
 
-  const Lanes3 lineVelocity = s1.velocity - s0.velocity;
-  const Lanes lengthRate = dot(m.n, lineVelocity);
-  const Lanes3 nRate = m.inverseLength * fnma(lengthRate, m.n, lineVelocity);
-  const Lanes spin0 = dot(m.end0.spinAxis, s0.angularVelocity) - dot(m.end0.lever, nRate);
-  const Lanes spin1 = dot(m.end1.spinAxis, s1.angularVelocity) - dot(m.end1.lever, nRate);
+  e.lineVelocity = e.s1.velocity - e.s0.velocity;
+  e.lengthRate = dot(m.n, e.lineVelocity);
+  e.nRate = m.inverseLength * fnma(e.lengthRate, m.n, e.lineVelocity);
+  e.spin0 = dot(m.end0.spinAxis, e.s0.angularVelocity) - dot(m.end0.lever, e.nRate);
+  e.spin1 = dot(m.end1.spinAxis, e.s1.angularVelocity) - dot(m.end1.lever, e.nRate);
 
   Lanes stretched = m.length - link.restLength;
   if (link.hasBeams) {
     const Lanes hyper = link.restLength * neoHookeanTension(m.length * link.inverseRestLength);
     stretched = fma(link.beam, hyper - stretched, stretched);
   }
-  const Lanes tension = link.elongation * fma(link.relaxation, lengthRate, stretched);
+  const Lanes tension = link.elongation * fma(link.relaxation, e.lengthRate, stretched);
   const Flexion still0 = flexionOf(m.end0), still1 = flexionOf(m.end1);
-  const Flexion q0 = damped(still0, flexionRate(m.end0, nRate, s0.angularVelocity, m.n), link.relaxation);
-  const Flexion q1 = damped(still1, flexionRate(m.end1, nRate, s1.angularVelocity, m.n), link.relaxation);
+  const Flexion q0 = damped(still0, flexionRate(m.end0, e.nRate, e.s0.angularVelocity, m.n), link.relaxation);
+  const Flexion q1 = damped(still1, flexionRate(m.end1, e.nRate, e.s1.angularVelocity, m.n), link.relaxation);
   Flexion moments0 = momentsAt0(link, m, q0, q1), moments1 = momentsAt1(link, m, q0, q1);
   fold(m.end0, still0, link.flexionU0 + link.flexionV0, moments0);
   fold(m.end1, still1, link.flexionU1 + link.flexionV1, moments1);
   const Lanes3 bend0 = flexionGradient(m.end0, moments0), bend1 = flexionGradient(m.end1, moments1);
   const Lanes3 bend = bend0 + bend1;
   const Lanes3 across = fnma(dot(bend, m.n), m.n, bend);
-  put((splat(0) - tension) * m.n - m.inverseLength * across, f.force1);
-  put(cross(m.n, bend0), f.torque0);
-  put(cross(m.n, bend1), f.torque1);
-  f.twistMoment =
-      fma(link.torsion, fma(link.relaxation, spin1 - spin0, m.twist), couplingTorque(link, m, still0, still1));
+  e.force1 = (splat(0) - tension) * m.n - m.inverseLength * across;
+  e.torque0 = cross(m.n, bend0);
+  e.torque1 = cross(m.n, bend1);
+  e.twistMoment =
+      fma(link.torsion, fma(link.relaxation, e.spin1 - e.spin0, m.twist), couplingTorque(link, m, still0, still1));
+}
 
-  put(s0.arm, f.arm0);
-  put(s1.arm, f.arm1);
-  put(s0.position, f.origin);
+void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundTwist, LinkFrame& f) {
+  LinkState e;
+  evaluate(link, spheres, unwoundTwist, e);
+  const LinkMeasures& m = e.m;
+  put(e.force1, f.force1);
+  put(e.torque0, f.torque0);
+  put(e.torque1, f.torque1);
+  f.twistMoment = e.twistMoment;
+  put(e.s0.arm, f.arm0);
+  put(e.s1.arm, f.arm1);
+  put(e.s0.position, f.origin);
   put(m.line, f.line);
-  put(s0.velocity, f.originVelocity);
-  put(lineVelocity, f.lineVelocity);
+  put(e.s0.velocity, f.originVelocity);
+  put(e.lineVelocity, f.lineVelocity);
   put(m.n, f.n);
   put(m.axisU, f.axisU);
   put(m.axisV, f.axisV);
-  put(cross(m.n, nRate), f.turning);
-  f.spin0 = spin0;
-  f.spinAlong = spin1 - spin0;
+  put(cross(m.n, e.nRate), f.turning);
+  f.spin0 = e.spin0;
+  f.spinAlong = e.spin1 - e.spin0;
   f.twist = m.twist;
   f.inverseLength = m.inverseLength;
   put(m.end0.spinAxis, f.spinAxis0);
@@ -234,11 +252,11 @@ void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundT
   put(m.end0.lever, f.spinLever0);
   put(m.end1.lever, f.spinLever1);
   if (link.hasBeams) {
-    thin(link, m.length, lengthRate, f);
+    thin(link, m.length, e.lengthRate, f);
     put(m.end0.t, f.t0);
     put(m.end1.t, f.t1);
     setBend(link, f);
-    setBendRates(link, s0.angularVelocity, s1.angularVelocity, lengthRate, f);
+    setBendRates(link, e.s0.angularVelocity, e.s1.angularVelocity, e.lengthRate, f);
   }
 }
 
@@ -251,6 +269,39 @@ void storeVectors(const Lanes3& v, Quad& q0, Quad& q1, Quad& q2, Quad& q3) {
   store(q3, d);
 }
 
+// The forces on four links' spheres: `own` at the ends and on the spheres, less what the anchors' loads take.
+MEDULLA_INLINE void giveToSpheres(const LinkGroup& link, const Lanes3& ownForce1, const Lanes3& ownTorque0,
+                                  const Lanes3& ownTorque1, const EndLoads& nodes, const Lanes3& arm0,
+                                  const Lanes3& arm1, Slot* s) {
+  const Lanes3 force1 = ownForce1 - nodes.force1;
+  const Lanes3 force0 = splat(-1) * (ownForce1 + nodes.force0);
+  Lanes3 torque0 = ownTorque0 - nodes.torque0;
+  Lanes3 torque1 = ownTorque1 - nodes.torque1;
+  if (link.hasArms) {
+    torque0 = torque0 + cross(arm0, force0);
+    torque1 = torque1 + cross(arm1, force1);
+  }
+  storeVectors(force0, s[0].force, s[2].force, s[4].force, s[6].force);
+  storeVectors(torque0, s[0].torque, s[2].torque, s[4].torque, s[6].torque);
+  storeVectors(force1, s[1].force, s[3].force, s[5].force, s[7].force);
+  storeVectors(torque1, s[1].torque, s[3].torque, s[5].torque, s[7].torque);
+}
+
+// Links on which nothing hangs that moves by itself: their frames, 2.5 kB for four, are nobody's business. To the bit
+// what endLoads() makes of the torsion alone.
+void evaluateBareGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundTwist, Slot* slots) {
+  LinkState e;
+  evaluate(link, spheres, unwoundTwist, e);
+  const Lanes zero = splat(0), spin0 = zero - e.twistMoment, spin1 = e.twistMoment;
+  const Lanes3 none{zero, zero, zero};
+  EndLoads twisting;
+  twisting.force1 = e.m.inverseLength * (none - spin0 * e.m.end0.lever - spin1 * e.m.end1.lever);
+  twisting.force0 = none - twisting.force1;
+  twisting.torque0 = spin0 * e.m.end0.spinAxis;
+  twisting.torque1 = spin1 * e.m.end1.spinAxis;
+  giveToSpheres(link, e.force1, e.torque0, e.torque1, twisting, e.s0.arm, e.s1.arm, slots);
+}
+
 }  // namespace
 
 void evaluateLinks(WorldData& d, const Batch& batch) {
@@ -259,27 +310,23 @@ void evaluateLinks(WorldData& d, const Batch& batch) {
   evaluateIdentifiedLinks(d, batch);
 }
 
+void evaluateLinkForces(WorldData& d, const Batch& batch) {
+  for (const int g : batch.framedLinkGroups)
+    evaluateGroup(d.links.groups[g], d.spheres, d.links.unwoundTwist[g], d.links.frames[g]);
+  for (const int g : batch.bareLinkGroups)
+    evaluateBareGroup(d.links.groups[g], d.spheres, d.links.unwoundTwist[g], &d.links.slots[8 * g]);
+  evaluateIdentifiedLinks(d, batch);
+}
+
 // Loads are minus the forces on the nodes; torsion turns the frame's two spins apart, as a load does.
 void returnLinkForces(WorldData& d, const Batch& batch) {
-  for (const int g : batch.linkGroups) {
+  for (const int g : batch.framedLinkGroups) {
     const LinkFrame& f = d.links.frames[g];
     const LinkGroup& link = d.links.groups[g];
     AnchorLoads loads = gatherLoads(&d.links.loads[4 * g], link.hasBeams);
     loads.twist = loads.twist + f.twistMoment;
-    const EndLoads nodes = endLoads(link, f, loads);
-    const Lanes3 force1 = f.force1 - nodes.force1;
-    const Lanes3 force0 = splat(-1) * (f.force1 + nodes.force0);
-    Lanes3 torque0 = f.torque0 - nodes.torque0;
-    Lanes3 torque1 = f.torque1 - nodes.torque1;
-    if (link.hasArms) {
-      torque0 = torque0 + cross(f.arm0, force0);
-      torque1 = torque1 + cross(f.arm1, force1);
-    }
-    Slot* s = &d.links.slots[8 * g];
-    storeVectors(force0, s[0].force, s[2].force, s[4].force, s[6].force);
-    storeVectors(torque0, s[0].torque, s[2].torque, s[4].torque, s[6].torque);
-    storeVectors(force1, s[1].force, s[3].force, s[5].force, s[7].force);
-    storeVectors(torque1, s[1].torque, s[3].torque, s[5].torque, s[7].torque);
+    giveToSpheres(link, f.force1, f.torque0, f.torque1, endLoads(link, f, loads), f.arm0, f.arm1,
+                  &d.links.slots[8 * g]);
   }
   returnFrameForces(d, batch);
 }

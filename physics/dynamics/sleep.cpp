@@ -2,6 +2,7 @@
 #include <cmath>
 #include <iterator>
 #include <numeric>
+#include <utility>
 
 #include "physics/dynamics/contact_stages.h"
 #include "physics/dynamics/stages.h"
@@ -91,6 +92,20 @@ void moveImpulses(const WorldData& d, bool asleep, std::vector<CarriedImpulse>& 
   to = std::move(all);
 }
 
+// Links' frames are for nodes that move by themselves, and for skins that loads act on; implicit steps take them all.
+void shareOutLinkGroups(WorldData& d) {
+  const bool all = d.settings.integrator == Integrator::implicit;
+  std::vector<char> framed(d.links.groups.size(), all ? 1 : 0);
+  for (std::size_t b = 0; b < d.awake.loadedSkins.size(); ++b) {
+    if (!d.awake.loadedSkins[b]) continue;
+    for (int k = 0; k < d.ranges[b].linkCount; ++k) framed[(d.ranges[b].firstLink + k) / 4] = 1;
+  }
+  for (Batch& batch : d.awake.batches) {
+    for (const HostRange& range : batch.onLinks) framed[range.host / 4] = 1;
+    for (const int g : batch.linkGroups) (framed[g] ? batch.framedLinkGroups : batch.bareLinkGroups).push_back(g);
+  }
+}
+
 }  // namespace
 
 void listAwake(WorldData& d) {
@@ -123,6 +138,20 @@ void listAwake(WorldData& d) {
   };
   list(d.nodes.onLinks, &Batch::onLinks);
   list(d.nodes.onSpheres, &Batch::onSpheres);
+  shareOutLinkGroups(d);
+}
+
+void frameLoadedSkins(WorldData& d, const Loads& loads) {
+  std::vector<char> loaded(d.bodies.size(), 0);
+  for (const ToolSpring& t : loads.toolSprings) loaded[t.body] = 1;
+  for (const HeldNode& held : loads.heldNodes) loaded[held.body] = 1;
+  for (std::size_t b = 0; b < loaded.size(); ++b) {
+    if (!d.bodies[b].deadLoads.empty()) loaded[b] = 1;
+    if (d.bodies[b].surface != SurfaceMode::skin) loaded[b] = 0;
+  }
+  if (loaded == d.awake.loadedSkins) return;
+  d.awake.loadedSkins = std::move(loaded);
+  listAwake(d);
 }
 
 void layOutRest(WorldData& d) {

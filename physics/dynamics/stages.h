@@ -9,6 +9,8 @@ namespace medulla {
 
 // link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
 void evaluateLinks(WorldData&, const Batch&);
+// The same without the frames that no node asks for within a substep; forces of such links are in their slots then.
+void evaluateLinkForces(WorldData&, const Batch&);
 void evaluateAttachments(WorldData&, const Batch&);  // surface.cpp: where every node would be, and the pull on it
 void finishNodeForces(WorldData&, const Batch&);     // edge springs and pressure; from the anchors to their hosts
 // link_force.cpp: links and what hangs on them, to their two spheres
@@ -36,8 +38,10 @@ void moveLoadedParts(WorldData&, const Loads& loads);  // at a frame's start: wh
 void chooseSurfaceParts(WorldData&, const Loads& loads);  // at its end: what has come to rest is carried again
 
 // sleep.cpp
-void listAwake(WorldData&);   // WorldData::awake anew
-void layOutRest(WorldData&);  // all bodies awake
+void listAwake(WorldData&);  // WorldData::awake anew
+void frameLoadedSkins(WorldData&,
+                      const Loads& loads);  // at a frame's start: Awake::loadedSkins, and the lists after it
+void layOutRest(WorldData&);                // all bodies awake
 // At the end of a frame: bodies that have kept still for long enough, with all that they touch, fall asleep. `loads`
 // are the frame's: what tools hold stays awake.
 void fallAsleep(WorldData&, const Loads& loads);
@@ -47,7 +51,7 @@ void wakeTouched(WorldData&);                     // those that bodies awake pre
 
 // All forces of the current state, left in Spheres::force, torque and Nodes::force.
 inline void evaluateForces(WorldData& d, const Batch& batch) {
-  evaluateLinks(d, batch);
+  evaluateLinkForces(d, batch);
   evaluateAttachments(d, batch);
   finishNodeForces(d, batch);
   returnLinkForces(d, batch);

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <utility>
 
+#include "physics/dynamics/edge_springs.h"
 #include "physics/dynamics/node_motion.h"
 #include "physics/dynamics/stages.h"
 
@@ -15,8 +16,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kUnrest =
-    0.002;                        // of the body's mean radius, besides what weight sinks nodes by: edges share that out
+// Of the body's mean radius, besides what weight sinks nodes by, which edges share out: a part whose nodes edges would
+// shift by more joins.
+constexpr double kUnrest = 0.002;
 constexpr double kQuiet = 0.5;    // of that: nodes nearer are at rest
 constexpr int kQuietFrames = 10;  // a fifth of a second at 50 Hz: several periods of a node on its attachment
 
@@ -25,56 +27,63 @@ const HostRange& rangeOf(const WorldData& d, std::size_t part) {
   return part < onLinks ? d.nodes.onLinks[part] : d.nodes.onSpheres[part - onLinks];
 }
 
-// An attachment's stiffness, N/m, along the surface and, what identified ones are more, along the node's normal.
-double stiffnessAlong(const WorldData& d, int node) {
-  return d.nodes.groups[node / 4].stiffness[node % 4];
-}
-double normalExcess(const WorldData& d, int node) {  // N/m5, times the node's area squared
-  const int skin = d.identified.ofNodeGroup[node / 4];
-  return skin < 0 ? 0 : d.identified.skin[skin].normalExcess[node % 4];
-}
-double stiffnessAcross(const WorldData& d, int node) {
-  return stiffnessAlong(d, node) + normalExcess(d, node) * vectorAt(d.nodes.area, node).squaredNorm();
-}
-
-Vector3d sagOf(const WorldData& d, int node) {  // m, without pressure
-  if (d.nodes.inverseMass[node] == 0) return Vector3d::Zero();
-  const Vector3d even = d.nodes.mass[node] / stiffnessAlong(d, node) * vectorOf(d.gravity);
-  const Vector3d area = vectorAt(d.nodes.area, node);
-  return even - normalExcess(d, node) * area.dot(even) / stiffnessAcross(d, node) * area;
-}
-
-double deepestSag(const WorldData& d, const HostRange& range) {
-  double most = 0;
-  for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) most = std::max(most, sagOf(d, i).norm());
-  return most;
-}
-
 // Where a host's nodes hang still from their anchors: k x = m g - p a, and p = bulk sum a.x is the host's pressure.
 // Their mean weight alone would not do: a host's patch of surface is open, so that nodes which all sink alike press.
+// Fixed nodes, and pads, stay where they are. Identified attachments have more than k along the node's normal.
 class StillNodes {
  public:
-  StillNodes(const WorldData& d, const HostRange& range) : d_(&d) {
-    double sunk = 0, give = 0;
-    for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
-      if (d.nodes.inverseMass[i] == 0) continue;
-      const Vector3d area = vectorAt(d.nodes.area, i);
-      sunk += area.dot(sagOf(d, i));
-      give += area.squaredNorm() / stiffnessAcross(d, i);
+  StillNodes(const WorldData& d, const HostRange& range) : d_(&d), gravity_(splat(d.gravity)) {
+    Lanes sunk = splat(0), give = sunk;
+    for (int g = range.firstGroup; g < range.endGroup; ++g) {
+      const Lanes3 area = d.nodes.area[g];
+      sunk = sunk + dot(area, sag(g));
+      give = fma(dot(area, area), giveAcross(g), give);
     }
-    pressure_ = range.bulk * sunk / (1 + range.bulk * give);
+    const double volume = sumOfLanes(sunk);
+    pressure_ = range.bulk * volume / (1 + range.bulk * sumOfLanes(give));
     swollen_ = range.bulk > 0 ? pressure_ / range.bulk : 0;
   }
-  Vector3d displaced(int node) const {  // m
-    if (d_->nodes.inverseMass[node] == 0) return Vector3d::Zero();
-    return sagOf(*d_, node) - pressure_ / stiffnessAcross(*d_, node) * vectorAt(d_->nodes.area, node);
+  Lanes3 displaced(int g) const {  // m, of the nodes of group g
+    return fnma(splat(pressure_) * giveAcross(g), d_->nodes.area[g], sag(g));
+  }
+  Lanes3 sag(int g) const {  // m, without pressure
+    const Lanes heavy = _mm256_and_pd(moves(g), _mm256_loadu_pd(&d_->nodes.mass[4 * g]) / stiffness(g));
+    const Lanes3 even = heavy * gravity_, area = d_->nodes.area[g];
+    if (d_->identified.ofNodeGroup[g] < 0) return even;
+    return fnma(excess(g) * dot(area, even) * giveAcross(g), area, even);
   }
   double swollen() const { return swollen_; }  // m3
 
  private:
+  Lanes moves(int g) const { return isLess(splat(0), _mm256_loadu_pd(&d_->nodes.inverseMass[4 * g])); }
+  Lanes stiffness(int g) const { return select(moves(g), d_->nodes.groups[g].stiffness, splat(1)); }  // N/m
+  Lanes excess(int g) const {                                                                         // N/m5
+    const int skin = d_->identified.ofNodeGroup[g];
+    return skin < 0 ? splat(0) : d_->identified.skin[skin].normalExcess;
+  }
+  Lanes giveAcross(int g) const {  // m/N, along the normal
+    const Lanes3 area = d_->nodes.area[g];
+    return _mm256_and_pd(moves(g), splat(1) / fma(excess(g), dot(area, area), stiffness(g)));
+  }
+
   const WorldData* d_;
+  Lanes3 gravity_;
   double pressure_, swollen_;
 };
+
+double longest(Lanes squared) {
+  return std::sqrt(std::max(std::max(squared[0], squared[1]), std::max(squared[2], squared[3])));
+}
+
+double deepestSag(const WorldData& d, const HostRange& range) {
+  const StillNodes still(d, range);
+  Lanes squared = splat(0);
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const Lanes3 sag = still.sag(g);
+    squared = larger(squared, dot(sag, sag));
+  }
+  return longest(squared);
+}
 
 // Nothing turns or moves what the part hangs on, so that nodes which hold it have nothing to hold.
 bool isHeld(const WorldData& d, const BodyMechanics& mechanics, std::size_t part) {
@@ -187,15 +196,32 @@ std::vector<char> loadedParts(const WorldData& d, const Loads& loads) {
   return loaded;
 }
 
-// m: how far the part's nodes are from where they hang at rest, at most.
-double unrestOf(const WorldData& d, std::size_t part) {
+// m: how far the part's nodes are from where they hang at rest, into `unrest`, per node. Returns the most.
+double unrestOf(const WorldData& d, std::size_t part, std::vector<Quad>& unrest) {
   const HostRange& range = rangeOf(d, part);
   const StillNodes still(d, range);
-  double squared = 0;
-  for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i)
-    if (d.nodes.mass[i] > 0)
-      squared = std::max(squared, (vectorOf(d.nodes.displaced[i]) - still.displaced(i)).squaredNorm());
-  return std::sqrt(squared);
+  Lanes squared = splat(0);
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const Lanes3 off = gatherFour(d.nodes.displaced, 4 * g) - still.displaced(g);
+    const Lanes isNode = isLess(splat(0), _mm256_loadu_pd(&d.nodes.mass[4 * g]));  // pads drift
+    storeFour(off, unrest, 4 * g);
+    squared = larger(squared, _mm256_and_pd(isNode, dot(off, off)));
+  }
+  return longest(squared);
+}
+
+// m: how far edges would shift the nodes of a part that is carried, at most, did they not hang still.
+double shiftOf(const WorldData& d, std::size_t part, const std::vector<Quad>& unrest) {
+  const Lanes zero = splat(0);
+  Lanes squared = zero;
+  for (int g = rangeOf(d, part).firstGroup; g < rangeOf(d, part).endGroup; ++g) {
+    const NodeGroup& group = d.nodes.groups[g];
+    const Lanes3 pull = pullOfEdges(d.springs, unrest.data(), {zero, zero, zero}, group.edges, g);
+    const Lanes moves = isLess(zero, _mm256_loadu_pd(&d.nodes.inverseMass[4 * g]));
+    const Lanes give = _mm256_and_pd(moves, splat(1) / (group.stiffness + group.edges));
+    squared = larger(squared, (give * give) * dot(pull, pull));
+  }
+  return longest(squared);
 }
 
 // The nodes of a part that does not move are where they hang still.
@@ -203,8 +229,7 @@ void hang(WorldData& d, std::size_t part) {
   const HostRange& range = rangeOf(d, part);
   const StillNodes still(d, range);
   d.nodes.swollen[range.part] = still.swollen();
-  for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i)
-    if (d.nodes.mass[i] > 0) d.nodes.displaced[i] = quadOf(still.displaced(i));
+  for (int g = range.firstGroup; g < range.endGroup; ++g) storeFour(still.displaced(g), d.nodes.displaced, 4 * g);
 }
 
 void carry(WorldData& d, std::size_t part) {
@@ -252,14 +277,16 @@ void moveLoadedParts(WorldData& d, const Loads& loads) {
 void chooseSurfaceParts(WorldData& d, const Loads& loads) {
   if (!hasChoice(d.surface)) return;
   std::vector<SurfacePart>& parts = d.surface.parts;
-  std::vector<char> wanted = loadedParts(d, loads);
+  std::vector<char> wanted = loadedParts(d, loads), beside(parts.size(), 0);
   std::vector<double> unrest(parts.size(), 0);
+  std::vector<Quad> ofNodes(d.nodes.dynamicEnd);
   for (std::size_t k = 0; k < parts.size(); ++k) {
     if (!parts[k].moves || parts[k].neighbours.empty()) continue;
-    unrest[k] = unrestOf(d, k);
-    if (unrest[k] > parts[k].unrest)
-      for (const int beside : parts[k].neighbours) wanted[beside] = 1;
+    unrest[k] = unrestOf(d, k, ofNodes);
+    for (const int other : parts[k].neighbours) beside[other] = 1;
   }
+  for (std::size_t k = 0; k < parts.size(); ++k)
+    if (!parts[k].moves && beside[k] && shiftOf(d, k, ofNodes) > parts[k].unrest) wanted[k] = 1;
   bool changed = false;
   for (std::size_t k = 0; k < parts.size(); ++k) {
     SurfacePart& part = parts[k];

@@ -242,6 +242,7 @@ FrameReport World::advance(const Loads& loads) {
   d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Eigen::Vector3d::Zero());
   wakeLoaded(d, loads);
   moveLoadedParts(d, loads);
+  frameLoadedSkins(d, loads);
   const bool implicit = d.settings.integrator == Integrator::implicit;
   (implicit ? stepFrameImplicitly : stepFrameExplicitly)(d, loads, report);
   ++d.frame;

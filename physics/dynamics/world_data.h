@@ -204,7 +204,7 @@ struct SurfacePart {            // of one host; part k is that of Nodes::onLinks
   int quietFrames = 0;          // in a row, in which nothing asked for it; state
   bool always = true;           // there is no choice: another surface mode, or something acts on it all the time
   std::vector<int> neighbours;  // parts that edges join to this one
-  double unrest = 0;            // m: nodes farther than this from where they hang at rest set neighbours moving
+  double unrest = 0;            // m: it moves where its neighbours' edges would shift a node of it by more
 };
 
 // A sphere without any node's mass, kg and kg m2 in its frame; what a carried node adds.
@@ -242,12 +242,14 @@ struct StillPlace {  // where a sphere was at the first frame of Rest::stillFram
 // fetch everything anew.
 struct Batch {
   std::vector<int> bodies, spheres, sphereGroups, linkGroups, nodeGroups;  // groups: with anything awake in them
+  std::vector<int> framedLinkGroups, bareLinkGroups;  // linkGroups: with and without frames that substeps ask for
   std::vector<HostRange> onLinks, onSpheres;
 };
 
 struct Awake {
   int bodies = 0;
   std::vector<Batch> batches;
+  std::vector<char> loadedSkins;  // per body: a skin, and loads act on its nodes in this frame
 };
 
 // A driven sphere; DrivenSphere with everything in world units.
