@@ -39,14 +39,11 @@ unsigned makeShadowTexture() {
   unsigned texture = 0;
   glGenTextures(1, &texture);
   glBindTexture(GL_TEXTURE_2D, texture);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, kShadowSide, kShadowSide, 0, GL_DEPTH_COMPONENT, GL_FLOAT,
-               nullptr);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_R32F, kShadowStride, kShadowSide, 0, GL_RED, GL_FLOAT, nullptr);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
   return texture;
 }
 
@@ -56,7 +53,9 @@ TissuePass::Program TissuePass::makeProgram(Variant v) {
   const bool dull = v == Variant::litDull || v == Variant::edgeDull;
   const int shade = v == Variant::dark ? 2 : v == Variant::edge || v == Variant::edgeDull ? 1 : 0;
   Program p;
-  p.id = buildProgram("#define SHADE " + std::to_string(shade) + "\n" + (dull ? "#define DULL\n" : ""),
+  p.id = buildProgram("#define SHADE " + std::to_string(shade) + "\n" + (dull ? "#define DULL\n" : "") +
+                          "#define SHADOW_WIDTH " + std::to_string(kShadowStride) + ".\n#define SHADOW_HEIGHT " +
+                          std::to_string(kShadowSide) + ".\n",
                       kTissueVertexShader, kTissueFragmentShader);
   const auto uniform = [&p](const char* name) { return glGetUniformLocation(p.id, name); };
   p.clipFromWorld = uniform("clipFromWorld");
@@ -68,7 +67,6 @@ TissuePass::Program TissuePass::makeProgram(Variant v) {
   glUseProgram(p.id);
   glUniform1i(uniform("detail"), 0);
   glUniform1i(uniform("shadowMap"), 1);
-  glUniform1f(uniform("texel"), 1.f / kShadowSide);
   glUniform1i(uniform("squares"), 3);
   return p;
 }
@@ -138,10 +136,7 @@ void TissuePass::upload(const VertexLight& lit, const DrawLists& lists, const Sh
   if (!shadow) return;
   glActiveTexture(GL_TEXTURE1);
   glBindTexture(GL_TEXTURE_2D, shadowTexture_);
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, shadow->map.stride);
-  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, kShadowSide, kShadowSide, GL_DEPTH_COMPONENT, GL_FLOAT,
-                  shadow->map.depth.data());
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, kShadowStride, kShadowSide, GL_RED, GL_FLOAT, shadow->map.depth.data());
   glActiveTexture(GL_TEXTURE0);
 }
 
