@@ -22,9 +22,9 @@ Variant variantOf(Shade shade, bool glinting) {
   return glinting ? Variant::lit : Variant::litDull;
 }
 
-// The level with about one texel a pixel along the direction that crosses most. Texture coordinates are interpolated along
-// lines of the picture, so that a triangle has one slope, and what OpenGL would find out for each four pixels, at a tenth
-// of their time, is known before.
+// The level with about one texel a pixel along the direction that crosses most. Texture coordinates are interpolated
+// along lines of the picture, so that a triangle has one slope, and what OpenGL would find out for each four pixels, at
+// a tenth of their time, is known before.
 int detailLevel(const VisibleTriangles& seen, const VertexLight& lit, const std::uint32_t* t, float texelsPerUnit,
                 float pixelsPerUnit) {
   const auto picture = [&](int corner) { return glm::vec2(seen.picture[seen.vertices[t[corner]]]) * pixelsPerUnit; };

@@ -92,9 +92,9 @@ Blend findBlend(const std::uint8_t* m, std::ptrdiff_t stride) {
   const int other = towardsBefore ? before : after, contrast = std::abs(other - here);
 
   const int twiceMean = here + other, limit = std::max(contrast / 2, 1);
-  const auto [left, right] = level ? followRow(m, across, twiceMean, limit)
-                                   : EdgeEnds{followEdge(m, across, -along, twiceMean, limit),
-                                              followEdge(m, across, along, twiceMean, limit)};
+  const auto [left, right] =
+      level ? followRow(m, across, twiceMean, limit)
+            : EdgeEnds{followEdge(m, across, -along, twiceMean, limit), followEdge(m, across, along, twiceMean, limit)};
   const EdgeEnd nearest = left.distance < right.distance ? left : right;
   const bool darker = 2 * here < twiceMean;
   const float span = float(left.distance + right.distance);

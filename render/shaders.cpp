@@ -34,7 +34,8 @@ unsigned compile(unsigned kind, const std::string& source) {
 }  // namespace
 
 unsigned buildProgram(const std::string& defines, const char* vertex, const char* fragment) {
-  const std::string head = "#version 330 core\n#extension GL_ARB_texture_gather : require\n" + defines;
+  const std::string head =
+      "#version 330 core\n#extension GL_ARB_texture_gather : require\n#define BLEED .045\n" + defines;
   const unsigned program = glCreateProgram();
   const unsigned shaders[] = {compile(GL_VERTEX_SHADER, head + vertex),
                               compile(GL_FRAGMENT_SHADER, head + kToneCurve + fragment)};
@@ -49,10 +50,10 @@ unsigned buildProgram(const std::string& defines, const char* vertex, const char
   throw std::runtime_error(std::string("shaders do not link: ") + log);
 }
 
-// surface: mottling, vessel opacity, slope of the film's relief, how far red light bleeds into shadow. lobes: a1 - 1, c1,
-// a2 - 1, c2 of GlossLobes; tint.w: the film's peak.
-// Interpolated without perspective: the triangles are small, and a division per pixel is saved. What a draw shares comes
-// to the pixels as flat inputs: llvmpipe gathers uniforms lane by lane, for a tenth of a pixel's time.
+// surface: mottling, vessel opacity, slope of the film's relief, how far red light bleeds into shadow. lobes: a1 - 1,
+// c1, a2 - 1, c2 of GlossLobes; tint.w: the film's peak. Interpolated without perspective: the triangles are small, and
+// a division per pixel is saved. What a draw shares comes to the pixels as flat inputs: llvmpipe gathers uniforms lane
+// by lane, for a tenth of a pixel's time.
 const char* const kTissueVertexShader = R"(
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 directGloss;
@@ -85,6 +86,9 @@ void main() {
   float x = halfwayBias.z * halfwayBias.z, d1 = x * lobes.x + 1., d2 = x * lobes.z + 1.;
   vDirect.rgb += directGloss.w * (lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), tint.w));
   vHalfway.xy *= surface.z;
+#endif
+#if SHADE == 2
+  vAmbient.r += BLEED * surface.w * directGloss.r;  // as the edge's shader leaves it, or triangles would show
 #endif
 #if SHADE == 1
   vShadow = shadowFromWorld * vec4(position, 1);
@@ -158,7 +162,7 @@ void main() {
 #if SHADE == 1
   float s = softShadow(vShadow.xyz / vShadow.w, vRadius);
   // Light bleeds into the shadow's edge through the tissue, and red light farthest.
-  diffuse *= vec3(mix(s, mix(s, sqrt(s), .5) * .955 + .045, fSurface.y), s, s);
+  diffuse *= vec3(mix(s, mix(s, sqrt(s), .5) * (1. - BLEED) + BLEED, fSurface.y), s, s);
 #ifndef DULL
   gloss *= s;
 #endif
