@@ -35,7 +35,7 @@ int detailLevel(const VisibleTriangles& seen, const VertexLight& lit, const std:
   const glm::vec2 alongX = ub * c.y - uc * b.y, alongY = uc * b.x - ub * c.x;
   const float most = std::max(glm::dot(alongX, alongX), glm::dot(alongY, alongY)) / std::max(area * area, 1e-12f);
   if (!(most > 0.5f)) return 0;
-  return std::min((std::ilogb(most) + 1) / 2, kDetailLevels - 1);
+  return std::min((std::ilogb(std::min(most, 1e9f)) + 1) / 2, kDetailLevels - 1);
 }
 
 }  // namespace

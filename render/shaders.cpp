@@ -51,7 +51,7 @@ unsigned buildProgram(const std::string& defines, const char* vertex, const char
 }
 
 // surface: mottling, vessel opacity, slope of the film's relief, how far red light bleeds into shadow. lobes: a1 - 1,
-// c1, a2 - 1, c2 of GlossLobes; tint.w: the film's peak. Interpolated without perspective: the triangles are small, and
+// c1, a2 - 1, c2 of GlossLobes. Interpolated without perspective: the triangles are small, and
 // a division per pixel is saved. What a draw shares comes to the pixels as flat inputs: llvmpipe gathers uniforms lane
 // by lane, for a tenth of a pixel's time.
 const char* const kTissueVertexShader = R"(
@@ -61,30 +61,28 @@ layout(location = 2) in vec4 ambientRadius;
 layout(location = 3) in vec4 halfwayBias;
 layout(location = 4) in vec3 uvDetail;
 uniform mat4 clipFromWorld, shadowFromWorld;
-uniform vec4 surface, lobes, tint;
+uniform vec4 surface, lobes;
+uniform vec3 tint;
 noperspective out vec4 vDirect;
-noperspective out vec3 vAmbient;
-noperspective out vec3 vHalfway;
+noperspective out vec4 vAmbient;
+noperspective out vec4 vHalfway;
 noperspective out vec4 vUv;
 flat out vec4 fTint;
 flat out vec4 fLobes;
-flat out vec2 fSurface;
 #if SHADE == 1
 out vec4 vShadow;
-noperspective out float vRadius;
 #endif
 void main() {
   gl_Position = clipFromWorld * vec4(position, 1);
   vDirect = directGloss;
-  vAmbient = ambientRadius.rgb;
-  vHalfway = halfwayBias.xyz;
+  vAmbient = ambientRadius;
+  vHalfway = vec4(halfwayBias.xyz, surface.w);
   vUv = vec4(uvDetail.xy, surface.xy * uvDetail.z);
-  fTint = tint;
+  fTint = vec4(tint, surface.z);
   fLobes = lobes;
-  fSurface = surface.zw;
 #ifdef DULL
   float x = halfwayBias.z * halfwayBias.z, d1 = x * lobes.x + 1., d2 = x * lobes.z + 1.;
-  vDirect.rgb += directGloss.w * (lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), tint.w));
+  vDirect.rgb += directGloss.w * (lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), FILM_PEAK));
   vHalfway.xy *= surface.z;
 #endif
 #if SHADE == 2
@@ -94,25 +92,22 @@ void main() {
   vShadow = shadowFromWorld * vec4(position, 1);
   vShadow.z -= halfwayBias.w * vShadow.w;
   vShadow.xyz = .5 * (vShadow.xyz + vShadow.w);
-  vRadius = ambientRadius.w;
 #endif
 }
 )";
 
 const char* const kTissueFragmentShader = R"(
 noperspective in vec4 vDirect;
-noperspective in vec3 vAmbient;
-noperspective in vec3 vHalfway;
+noperspective in vec4 vAmbient;
+noperspective in vec4 vHalfway;
 noperspective in vec4 vUv;
 flat in vec4 fTint;
 flat in vec4 fLobes;
-flat in vec2 fSurface;
 out vec4 pixel;
 uniform float opacity;
 uniform sampler2D detail;
 #if SHADE == 1
 in vec4 vShadow;
-noperspective in float vRadius;
 uniform sampler2D shadowMap;
 uniform int squares;
 
@@ -146,28 +141,28 @@ void main() {
   vec4 t = texture(detail, vUv.xy);
   vec3 detailColour = mix(vec3(1. + vUv.z * (t.x - .5)), fTint.rgb, t.y * vUv.w);
 #if SHADE == 2
-  vec3 colour = detailColour * vAmbient;
+  vec3 colour = detailColour * vAmbient.rgb;
 #else
 #ifdef DULL
   float along = dot(t.zw - .5, vHalfway.xy);
 #else
-  vec2 slope = (t.zw - .5) * fSurface.x;
+  vec2 slope = (t.zw - .5) * fTint.w;
   float along = dot(slope, vHalfway.xy);
   float h = max(vHalfway.z - along, 0.);
-  float x = h * h / ((1. + dot(slope, slope)) * dot(vHalfway, vHalfway));
+  float x = h * h / ((1. + dot(slope, slope)) * dot(vHalfway.xyz, vHalfway.xyz));
   float d1 = x * fLobes.x + 1., d2 = x * fLobes.z + 1.;
-  float gloss = vDirect.w * (fLobes.y / (d1 * d1) + min(fLobes.w / (d2 * d2), fTint.w));
+  float gloss = vDirect.w * (fLobes.y / (d1 * d1) + min(fLobes.w / (d2 * d2), FILM_PEAK));
 #endif
   vec3 diffuse = vDirect.rgb * (1. - along * .9);
 #if SHADE == 1
-  float s = softShadow(vShadow.xyz / vShadow.w, vRadius);
+  float s = softShadow(vShadow.xyz / vShadow.w, vAmbient.w);
   // Light bleeds into the shadow's edge through the tissue, and red light farthest.
-  diffuse *= vec3(mix(s, mix(s, sqrt(s), .5) * (1. - BLEED) + BLEED, fSurface.y), s, s);
+  diffuse *= vec3(mix(s, mix(s, sqrt(s), .5) * (1. - BLEED) + BLEED, vHalfway.w), s, s);
 #ifndef DULL
   gloss *= s;
 #endif
 #endif
-  vec3 colour = detailColour * (diffuse + vAmbient);
+  vec3 colour = detailColour * (diffuse + vAmbient.rgb);
 #ifndef DULL
   colour += gloss * vec3(1., .97, .93);
 #endif

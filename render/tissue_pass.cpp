@@ -64,8 +64,9 @@ TissuePass::Program TissuePass::makeProgram(Variant v) {
   const int shade = v == Variant::dark ? 2 : v == Variant::edge || v == Variant::edgeDull ? 1 : 0;
   Program p;
   p.id = buildProgram("#define SHADE " + std::to_string(shade) + "\n" + (dull ? "#define DULL\n" : "") +
-                          "#define SHADOW_WIDTH " + std::to_string(kShadowStride) + ".\n#define SHADOW_HEIGHT " +
-                          std::to_string(kShadowSide) + ".\n",
+                          "#define FILM_PEAK " + std::to_string(kFilmPeak) + "\n#define SHADOW_WIDTH " +
+                          std::to_string(kShadowStride) + ".\n#define SHADOW_HEIGHT " + std::to_string(kShadowSide) +
+                          ".\n",
                       kTissueVertexShader, kTissueFragmentShader);
   const auto uniform = [&p](const char* name) { return glGetUniformLocation(p.id, name); };
   p.clipFromWorld = uniform("clipFromWorld");
@@ -170,7 +171,7 @@ void TissuePass::draw(const SceneMesh& mesh, const DrawLists& lists, const std::
       glUniformMatrix4fv(p.shadowFromWorld, 1, GL_FALSE, glm::value_ptr(lightView.clipFromWorld));
       glUniform4f(p.surface, look.mottle, look.vessels, look.bump, bleed);
       glUniform4f(p.lobes, lobes.a1 - 1, lobes.c1, lobes.a2 - 1, lobes.c2);
-      glUniform4f(p.tint, look.vesselTint.x, look.vesselTint.y, look.vesselTint.z, kFilmPeak);
+      glUniform3f(p.tint, look.vesselTint.x, look.vesselTint.y, look.vesselTint.z);
       glUniform1f(p.opacity, opacity);
     }
     last = &run;
