@@ -8,7 +8,7 @@
 namespace medulla {
 namespace {
 
-constexpr int kBlock = 8;  // texels handled together; one AVX2 register of floats
+constexpr int kBlock = DepthMap::kPadding;  // texels handled together; one AVX2 register of floats
 
 // Value along a row of texels: at + step * k.
 struct Ramp {

@@ -8,6 +8,8 @@ namespace medulla {
 // Square map of the smallest depth per texel, rasterised on the CPU: a shadow map of the casters takes under a
 // millisecond here and several in software OpenGL.
 struct DepthMap {
+  static constexpr int kPadding = 8;  // texels past the right edge, where whole blocks of them are written
+
   explicit DepthMap(int sideInTexels);
   void clear();  // to 1, the farthest
   // Corners in texels (x, y) and depth 0..1, counter-clockwise; other triangles face away and are dropped. Texels whose
@@ -15,7 +17,7 @@ struct DepthMap {
   void rasterize(glm::vec3 a, glm::vec3 b, glm::vec3 c);
   float at(int x, int y) const { return depth[std::size_t(y) * stride + x]; }
 
-  int side, stride;          // the stride leaves room for whole blocks of texels past the right edge
+  int side, stride;          // side + kPadding
   std::vector<float> depth;  // stride * side
 };
 

@@ -1,6 +1,7 @@
 #include "render/detail_texture.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "render/noise.h"
@@ -223,7 +224,8 @@ std::vector<std::uint8_t> makeDetailTexture(const DetailPattern& pattern, int se
     mottling[i] = glm::mix(mottling[i], lobule[i], pattern.cellContrast);
     height[i] += pattern.cellRelief * lobule[i] + vesselHeight * vessels.opacity()[i];
   }
-  const auto at = [&](int x, int y) { return height[((y + n) % n) * n + (x + n) % n]; };
+  assert((n & (n - 1)) == 0);
+  const auto at = [&](int x, int y) { return height[(y & (n - 1)) * n + (x & (n - 1))]; };
   const float slope = 6 * float(n) / 512;
   std::vector<std::uint8_t> out(4ul * n * n);
   for (int y = 0; y < n; ++y)

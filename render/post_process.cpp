@@ -1,5 +1,7 @@
 #include "render/post_process.h"
 
+#include <immintrin.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -47,6 +49,34 @@ EdgeEnd followEdge(const std::uint8_t* here, std::ptrdiff_t across, std::ptrdiff
   return {kSearch, here[kSearch * along] + here[kSearch * along + across] > twiceMean};
 }
 
+// The same in both directions of a row, all steps at once.
+struct EdgeEnds {
+  EdgeEnd left, right;
+};
+EdgeEnds followRow(const std::uint8_t* here, std::ptrdiff_t across, int twiceMean, int limit) {
+  static_assert(kSearch < 16);
+  const auto rise = [=](std::ptrdiff_t from) {  // of 16 pixels
+    const auto load = [](const std::uint8_t* p) {
+      return _mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
+    };
+    return _mm256_sub_epi16(_mm256_add_epi16(load(here + from), load(here + from + across)),
+                            _mm256_set1_epi16(short(twiceMean)));
+  };
+  const auto bits = [](__m256i flags) {  // two for each pixel, made one
+    const __m256i packed = _mm256_permute4x64_epi64(_mm256_packs_epi16(flags, flags), 0x08);
+    return unsigned(_mm_movemask_epi8(_mm256_castsi256_si128(packed)));
+  };
+  const __m256i below = _mm256_set1_epi16(short(limit - 1)), zero = _mm256_setzero_si256();
+  const __m256i before = rise(-16), after = rise(1);  // pixels -16..-1 and 1..16
+  constexpr unsigned kLast = 1u << (kSearch - 1), kSteps = 2 * kLast - 1;
+  // The last step ends the search whatever it finds.
+  const unsigned leftEnds = (bits(_mm256_cmpgt_epi16(_mm256_abs_epi16(before), below)) | 1u << (16 - kSearch));
+  const unsigned rightEnds = (bits(_mm256_cmpgt_epi16(_mm256_abs_epi16(after), below)) & kSteps) | kLast;
+  const int left = std::countl_zero(std::uint16_t(leftEnds)), right = std::countr_zero(rightEnds);
+  const unsigned leftRises = bits(_mm256_cmpgt_epi16(before, zero)), rightRises = bits(_mm256_cmpgt_epi16(after, zero));
+  return {{left + 1, (leftRises >> (15 - left) & 1) != 0}, {right + 1, (rightRises >> right & 1) != 0}};
+}
+
 // FXAA 3.11 (Lottes 2011): which neighbour the edge runs beside, and how much of it a straight edge between the two
 // jumps would let into this pixel.
 Blend findBlend(const std::uint8_t* m, std::ptrdiff_t stride) {
@@ -62,8 +92,9 @@ Blend findBlend(const std::uint8_t* m, std::ptrdiff_t stride) {
   const int other = towardsBefore ? before : after, contrast = std::abs(other - here);
 
   const int twiceMean = here + other, limit = std::max(contrast / 2, 1);
-  const EdgeEnd left = followEdge(m, across, -along, twiceMean, limit),
-                right = followEdge(m, across, along, twiceMean, limit);
+  const auto [left, right] =
+      level ? followRow(m, across, twiceMean, limit)
+            : EdgeEnds{followEdge(m, across, -along, twiceMean, limit), followEdge(m, across, along, twiceMean, limit)};
   const EdgeEnd nearest = left.distance < right.distance ? left : right;
   const bool darker = 2 * here < twiceMean;
   const float span = float(left.distance + right.distance);

@@ -198,7 +198,7 @@ void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view)
   if (settings.shadows) renderShadowMap(mesh, lightView, shadow);
   findVisibleTriangles(mesh, view, picture.view == ViewKind::tissue, seen);
   lightVertices(mesh, seen, view, picture.light, lightView, haze ? &*haze : nullptr, picture.time, shadowIfOn(), lit);
-  sortByVariant(mesh, seen, lit, shadowIfOn(), lists);
+  sortByVariant(mesh, seen, lit, shadowIfOn(), fineHeight, lists);
 }
 
 void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {

@@ -34,7 +34,8 @@ unsigned compile(unsigned kind, const std::string& source) {
 }  // namespace
 
 unsigned buildProgram(const std::string& defines, const char* vertex, const char* fragment) {
-  const std::string head = "#version 330 core\n" + defines;
+  const std::string head =
+      "#version 330 core\n#extension GL_ARB_texture_gather : require\n#define BLEED .045\n" + defines;
   const unsigned program = glCreateProgram();
   const unsigned shaders[] = {compile(GL_VERTEX_SHADER, head + vertex),
                               compile(GL_FRAGMENT_SHADER, head + kToneCurve + fragment)};
@@ -49,8 +50,11 @@ unsigned buildProgram(const std::string& defines, const char* vertex, const char
   throw std::runtime_error(std::string("shaders do not link: ") + log);
 }
 
-// lobes: a1 - 1, c1, a2 - 1, c2 of GlossLobes; tint.w: the film's peak.
-// Interpolated without perspective: the triangles are small, and a division per pixel is saved.
+// surface: mottling, vessel opacity, slope of the film's relief, how far red light bleeds into shadow. lobes: a1 - 1,
+// c1, a2 - 1, c2 of GlossLobes. Interpolated without perspective: the triangles are small, and
+// a division per pixel is saved. What a draw shares comes to the pixels as flat inputs: llvmpipe gathers uniforms lane
+// by lane, for a tenth of a pixel's time. Eight outputs with the position: with ten, Mesa 22.3 with vectors of 128 bits
+// writes past a buffer of its own.
 const char* const kTissueVertexShader = R"(
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 directGloss;
@@ -58,11 +62,14 @@ layout(location = 2) in vec4 ambientRadius;
 layout(location = 3) in vec4 halfwayBias;
 layout(location = 4) in vec3 uvDetail;
 uniform mat4 clipFromWorld, shadowFromWorld;
-uniform vec4 lobes, tint;
+uniform vec4 surface, lobes;
+uniform vec3 tint;
 noperspective out vec4 vDirect;
 noperspective out vec4 vAmbient;
-noperspective out vec3 vHalfway;
-noperspective out vec3 vUv;
+noperspective out vec4 vHalfway;
+noperspective out vec4 vUv;
+flat out vec4 fTint;
+flat out vec4 fLobes;
 #if SHADE == 1
 out vec4 vShadow;
 #endif
@@ -70,44 +77,60 @@ void main() {
   gl_Position = clipFromWorld * vec4(position, 1);
   vDirect = directGloss;
   vAmbient = ambientRadius;
-  vHalfway = halfwayBias.xyz;
-  vUv = uvDetail;
+  vHalfway = vec4(halfwayBias.xyz, surface.w);
+  vUv = vec4(uvDetail.xy, surface.xy * uvDetail.z);
+  fTint = vec4(tint, surface.z);
+  fLobes = lobes;
 #ifdef DULL
   float x = halfwayBias.z * halfwayBias.z, d1 = x * lobes.x + 1., d2 = x * lobes.z + 1.;
-  vDirect.w *= lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), tint.w);
+  vDirect.rgb += directGloss.w * (lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), FILM_PEAK));
+  vHalfway.xy *= surface.z;
+#endif
+#if SHADE == 2
+  vAmbient.r += BLEED * surface.w * directGloss.r;  // as the edge's shader leaves it, or triangles would show
 #endif
 #if SHADE == 1
   vShadow = shadowFromWorld * vec4(position, 1);
   vShadow.z -= halfwayBias.w * vShadow.w;
+  vShadow.xyz = .5 * (vShadow.xyz + vShadow.w);
 #endif
 }
 )";
 
-// surface: mottling, vessel opacity, slope of the film's relief, how far red light bleeds into shadow.
 const char* const kTissueFragmentShader = R"(
 noperspective in vec4 vDirect;
 noperspective in vec4 vAmbient;
-noperspective in vec3 vHalfway;
-noperspective in vec3 vUv;
+noperspective in vec4 vHalfway;
+noperspective in vec4 vUv;
+flat in vec4 fTint;
+flat in vec4 fLobes;
 out vec4 pixel;
-uniform sampler2D detail;
-uniform vec4 surface, lobes, tint;
 uniform float opacity;
+uniform sampler2D detail;
 #if SHADE == 1
 in vec4 vShadow;
-uniform sampler2DShadow shadowMap;
-uniform float texel;
+uniform sampler2D shadowMap;
 uniform int squares;
 
-// Taps on three turned squares and in the middle, evenly apart seen along any edge, or it shows steps. A rotation per pixel would hide their steps better but leaves a
-// pattern. Most pixels agree on the widest square and are done: llvmpipe runs both sides of a branch but leaves a loop
-// when all its pixels do, so the squares are a loop whose length the compiler cannot know.
-float softShadow(vec3 q, float radius) {
-  float r = radius * texel, sum = texture(shadowMap, q), taps = 1.;
+// Share of the four texels around q.xy, in texels, that are not nearer than q.z. Blended here: OpenGL takes depths into
+// a texture of depth one by one, those of a float as they are.
+float litAt(vec2 q, float z) {
+  vec4 near = vec4(lessThanEqual(vec4(z), textureGather(shadowMap, q * vec2(1. / SHADOW_WIDTH, 1. / SHADOW_HEIGHT))));
+  vec2 w = fract(q - .5);
+  vec2 rows = mix(near.wx, near.zy, w.x);
+  return mix(rows.x, rows.y, w.y);
+}
+
+// Taps on three turned squares and in the middle, evenly apart seen along any edge, or it shows steps. A rotation per
+// pixel would hide their steps better but leaves a pattern. Most pixels agree on the widest square and are done: llvmpipe
+// runs both sides of a branch but leaves a loop when all its pixels do, so the squares are a loop whose length the
+// compiler cannot know.
+float softShadow(vec3 p, float r) {
+  vec2 q = p.xy * SHADOW_HEIGHT;
+  float sum = litAt(q, p.z), taps = 1.;
   for (int k = 0; k < squares; ++k) {
     vec2 d = r * (k == 0 ? vec2(.24, .78) : k == 1 ? vec2(.40, .56) : vec2(.50, .30));
-    sum += texture(shadowMap, q + vec3(d, 0)) + texture(shadowMap, q - vec3(d, 0)) +
-           texture(shadowMap, q + vec3(-d.y, d.x, 0)) + texture(shadowMap, q + vec3(d.y, -d.x, 0));
+    sum += litAt(q + d, p.z) + litAt(q - d, p.z) + litAt(q + vec2(-d.y, d.x), p.z) + litAt(q + vec2(d.y, -d.x), p.z);
     taps += 4.;
     if (sum == 0. || sum == taps) break;
   }
@@ -117,28 +140,33 @@ float softShadow(vec3 q, float radius) {
 
 void main() {
   vec4 t = texture(detail, vUv.xy);
-  vec3 detailColour = mix(vec3(1. + surface.x * (t.x - .5) * vUv.z), tint.rgb, t.y * surface.y * vUv.z);
+  vec3 detailColour = mix(vec3(1. + vUv.z * (t.x - .5)), fTint.rgb, t.y * vUv.w);
 #if SHADE == 2
   vec3 colour = detailColour * vAmbient.rgb;
 #else
-  vec2 slope = (t.zw - .5) * surface.z;
-  float along = dot(slope, vHalfway.xy);
 #ifdef DULL
-  float gloss = vDirect.w;
+  float along = dot(t.zw - .5, vHalfway.xy);
 #else
+  vec2 slope = (t.zw - .5) * fTint.w;
+  float along = dot(slope, vHalfway.xy);
   float h = max(vHalfway.z - along, 0.);
-  float x = h * h / ((1. + dot(slope, slope)) * dot(vHalfway, vHalfway));
-  float d1 = x * lobes.x + 1., d2 = x * lobes.z + 1.;
-  float gloss = vDirect.w * (lobes.y / (d1 * d1) + min(lobes.w / (d2 * d2), tint.w));
+  float x = h * h / ((1. + dot(slope, slope)) * dot(vHalfway.xyz, vHalfway.xyz));
+  float d1 = x * fLobes.x + 1., d2 = x * fLobes.z + 1.;
+  float gloss = vDirect.w * (fLobes.y / (d1 * d1) + min(fLobes.w / (d2 * d2), FILM_PEAK));
 #endif
   vec3 diffuse = vDirect.rgb * (1. - along * .9);
 #if SHADE == 1
-  float s = softShadow(vShadow.xyz / vShadow.w * .5 + .5, vAmbient.w);
+  float s = softShadow(vShadow.xyz / vShadow.w, vAmbient.w);
   // Light bleeds into the shadow's edge through the tissue, and red light farthest.
-  diffuse *= vec3(mix(s, mix(s, sqrt(s), .5) * .955 + .045, surface.w), s, s);
+  diffuse *= vec3(mix(s, mix(s, sqrt(s), .5) * (1. - BLEED) + BLEED, vHalfway.w), s, s);
+#ifndef DULL
   gloss *= s;
 #endif
-  vec3 colour = detailColour * (diffuse + vAmbient.rgb) + gloss * vec3(1., .97, .93);
+#endif
+  vec3 colour = detailColour * (diffuse + vAmbient.rgb);
+#ifndef DULL
+  colour += gloss * vec3(1., .97, .93);
+#endif
 #endif
   pixel = vec4(toneCurve(colour), opacity);
 }

@@ -17,6 +17,7 @@ struct LightView {
 };
 
 constexpr int kShadowSide = 1024;
+constexpr int kShadowStride = kShadowSide + DepthMap::kPadding;  // not a power of two: rows would share cache sets
 
 struct ShadowMap {
   DepthMap map{kShadowSide};

@@ -21,32 +21,39 @@ void attribute(unsigned slot, int components, std::size_t offset) {
   glVertexAttribPointer(slot, components, GL_FLOAT, GL_FALSE, sizeof(LitVertex), bufferOffset(offset));
 }
 
-unsigned makeDetail(const Look& look, int seed) {
+unsigned makeTexture(int filter) {
   unsigned texture = 0;
   glGenTextures(1, &texture);
   glBindTexture(GL_TEXTURE_2D, texture);
-  const std::vector<std::uint8_t> texels = makeDetailTexture(look.detail, seed);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, look.detail.side, look.detail.side, 0, GL_RGBA, GL_UNSIGNED_BYTE,
-               texels.data());
-  glGenerateMipmap(GL_TEXTURE_2D);
-  // Blending two mip levels costs four milliseconds a picture and cannot be told apart on this fine structure.
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_NEAREST);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, filter);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, filter);
   return texture;
 }
 
+// The levels of a mipmap as textures of their own: DrawRun::level says which.
+std::vector<unsigned> makeDetail(const Look& look, int seed) {
+  std::vector<std::uint8_t> texels = makeDetailTexture(look.detail, seed);
+  const auto upload = [&texels](int side) {
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, side, side, 0, GL_RGBA, GL_UNSIGNED_BYTE, texels.data());
+  };
+  const unsigned whole = makeTexture(GL_LINEAR);
+  std::vector<unsigned> levels{whole};
+  upload(look.detail.side);
+  glGenerateMipmap(GL_TEXTURE_2D);
+  for (int side = look.detail.side / 2; side > 0; side /= 2) {
+    glBindTexture(GL_TEXTURE_2D, whole);
+    glGetTexImage(GL_TEXTURE_2D, int(levels.size()), GL_RGBA, GL_UNSIGNED_BYTE, texels.data());
+    levels.push_back(makeTexture(GL_LINEAR));
+    upload(side);
+  }
+  return levels;
+}
+
 unsigned makeShadowTexture() {
-  unsigned texture = 0;
-  glGenTextures(1, &texture);
-  glBindTexture(GL_TEXTURE_2D, texture);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, kShadowSide, kShadowSide, 0, GL_DEPTH_COMPONENT, GL_FLOAT,
-               nullptr);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  const unsigned texture = makeTexture(GL_NEAREST);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_R32F, kShadowStride, kShadowSide, 0, GL_RED, GL_FLOAT, nullptr);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
   return texture;
 }
 
@@ -56,7 +63,10 @@ TissuePass::Program TissuePass::makeProgram(Variant v) {
   const bool dull = v == Variant::litDull || v == Variant::edgeDull;
   const int shade = v == Variant::dark ? 2 : v == Variant::edge || v == Variant::edgeDull ? 1 : 0;
   Program p;
-  p.id = buildProgram("#define SHADE " + std::to_string(shade) + "\n" + (dull ? "#define DULL\n" : ""),
+  p.id = buildProgram("#define SHADE " + std::to_string(shade) + "\n" + (dull ? "#define DULL\n" : "") +
+                          "#define FILM_PEAK " + std::to_string(kFilmPeak) + "\n#define SHADOW_WIDTH " +
+                          std::to_string(kShadowStride) + ".\n#define SHADOW_HEIGHT " + std::to_string(kShadowSide) +
+                          ".\n",
                       kTissueVertexShader, kTissueFragmentShader);
   const auto uniform = [&p](const char* name) { return glGetUniformLocation(p.id, name); };
   p.clipFromWorld = uniform("clipFromWorld");
@@ -68,7 +78,6 @@ TissuePass::Program TissuePass::makeProgram(Variant v) {
   glUseProgram(p.id);
   glUniform1i(uniform("detail"), 0);
   glUniform1i(uniform("shadowMap"), 1);
-  glUniform1f(uniform("texel"), 1.f / kShadowSide);
   glUniform1i(uniform("squares"), 3);
   return p;
 }
@@ -97,7 +106,7 @@ TissuePass::TissuePass() {
 TissuePass::~TissuePass() {
   for (const Program& p : programs_) glDeleteProgram(p.id);
   glDeleteProgram(maskProgram_);
-  for (const auto& [look, texture] : textures_) glDeleteTextures(1, &texture);
+  for (const auto& [look, levels] : textures_) glDeleteTextures(int(levels.size()), levels.data());
   glDeleteTextures(1, &shadowTexture_);
   for (const unsigned b : {vertices_, indices_, maskBuffer_}) glDeleteBuffers(1, &b);
   for (const unsigned a : {vertexArray_, maskArray_}) glDeleteVertexArrays(1, &a);
@@ -138,10 +147,7 @@ void TissuePass::upload(const VertexLight& lit, const DrawLists& lists, const Sh
   if (!shadow) return;
   glActiveTexture(GL_TEXTURE1);
   glBindTexture(GL_TEXTURE_2D, shadowTexture_);
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, shadow->map.stride);
-  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, kShadowSide, kShadowSide, GL_DEPTH_COMPONENT, GL_FLOAT,
-                  shadow->map.depth.data());
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, kShadowStride, kShadowSide, GL_RED, GL_FLOAT, shadow->map.depth.data());
   glActiveTexture(GL_TEXTURE0);
 }
 
@@ -152,20 +158,25 @@ void TissuePass::draw(const SceneMesh& mesh, const DrawLists& lists, const std::
     glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
   }
   glBindVertexArray(vertexArray_);
+  const DrawRun* last = nullptr;  // its program and uniforms serve the other levels, too
   for (const DrawRun& run : lists.runs) {
     if (!wanted[run.part]) continue;
     const Look& look = *mesh.parts[run.part].look;
-    const Program& p = programs_[static_cast<std::size_t>(run.variant)];
-    const GlossLobes lobes = glossLobes(look);
-    const float bleed = std::clamp(4 * (look.wrap.r - look.wrap.b), 0.f, 1.f);
-    glUseProgram(p.id);
-    glUniformMatrix4fv(p.clipFromWorld, 1, GL_FALSE, glm::value_ptr(view.clipFromWorld));
-    glUniformMatrix4fv(p.shadowFromWorld, 1, GL_FALSE, glm::value_ptr(lightView.clipFromWorld));
-    glUniform4f(p.surface, look.mottle, look.vessels, look.bump, bleed);
-    glUniform4f(p.lobes, lobes.a1 - 1, lobes.c1, lobes.a2 - 1, lobes.c2);
-    glUniform4f(p.tint, look.vesselTint.x, look.vesselTint.y, look.vesselTint.z, kFilmPeak);
-    glUniform1f(p.opacity, opacity);
-    glBindTexture(GL_TEXTURE_2D, textures_.at(look.name));
+    if (!last || last->part != run.part || last->variant != run.variant) {
+      const Program& p = programs_[static_cast<std::size_t>(run.variant)];
+      const GlossLobes lobes = glossLobes(look);
+      const float bleed = std::clamp(4 * (look.wrap.r - look.wrap.b), 0.f, 1.f);
+      glUseProgram(p.id);
+      glUniformMatrix4fv(p.clipFromWorld, 1, GL_FALSE, glm::value_ptr(view.clipFromWorld));
+      glUniformMatrix4fv(p.shadowFromWorld, 1, GL_FALSE, glm::value_ptr(lightView.clipFromWorld));
+      glUniform4f(p.surface, look.mottle, look.vessels, look.bump, bleed);
+      glUniform4f(p.lobes, lobes.a1 - 1, lobes.c1, lobes.a2 - 1, lobes.c2);
+      glUniform3f(p.tint, look.vesselTint.x, look.vesselTint.y, look.vesselTint.z);
+      glUniform1f(p.opacity, opacity);
+    }
+    last = &run;
+    const std::vector<unsigned>& levels = textures_.at(look.name);
+    glBindTexture(GL_TEXTURE_2D, levels[std::min(std::size_t(run.level), levels.size() - 1)]);
     glDrawElements(GL_TRIANGLES, int(run.indexCount), GL_UNSIGNED_INT,
                    bufferOffset(run.firstIndex * sizeof(std::uint32_t)));
   }

@@ -32,7 +32,7 @@ class TissuePass {
   static Program makeProgram(Variant variant);
 
   std::array<Program, kVariants> programs_;
-  std::map<std::string, unsigned> textures_;  // by look
+  std::map<std::string, std::vector<unsigned>> textures_;  // by look; one for each level
   unsigned maskProgram_ = 0, maskArray_ = 0, maskBuffer_ = 0;
   unsigned vertexArray_ = 0, vertices_ = 0, indices_ = 0, shadowTexture_ = 0;
 };

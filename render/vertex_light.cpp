@@ -150,23 +150,32 @@ Shade shadeVertex(const ShadowMap& shadow, vec3 texel, float spacing, const Shad
   const float range = light.farDistance * light.nearDistance / (light.farDistance - light.nearDistance);
   const float depthPerMetre = range / (v.lightDistance * v.lightDistance);
   const float metresPerTexel = 2 * v.lightDistance * light.tangent / kShadowSide;
-  // As far as a soft edge reaches beyond the middle between this vertex and the next ones, m apart.
-  constexpr float kSoft = 8.5f, kFarthest = 22;  // texels
-  const float reach = std::min(kSoft + 0.8f * spacing / metresPerTexel, kFarthest) / kFarthest;
+  // As far as a soft edge reaches beyond the middle between this vertex and the next ones, m apart. Seen from near they
+  // stand far apart: wider rings then look between them.
+  constexpr float kSoft = 8.5f, kRing = 22, kFarthest = 5 * kRing, kWiden = 1.4f;  // texels
+  const float reach = std::min(kSoft + 0.8f * spacing / metresPerTexel, kFarthest) / kRing;
   int lit = 0, tried = 0;
   float blockers = 0, blockerDepth = 0;
-  for (const Tap& tap : kTaps) {
-    const int x = int(texel.x + reach * tap.x), y = int(texel.y + reach * tap.y);
-    if (x < 0 || y < 0 || x >= kShadowSide || y >= kShadowSide) continue;
-    ++tried;
-    const float bias = kMinimumBias + depthPerMetre * (0.5f + reach * tap.away) * metresPerTexel * (slope + kBend);
-    const float depth = shadow.map.at(x, y);
-    if (texel.z - bias <= depth)
-      ++lit;
-    else {
-      blockers += 1;
-      blockerDepth += depth;
+  const auto look = [&](float ring) {
+    for (const Tap& tap : kTaps) {
+      const int x = int(texel.x + ring * tap.x), y = int(texel.y + ring * tap.y);
+      if (x < 0 || y < 0 || x >= kShadowSide || y >= kShadowSide) continue;
+      ++tried;
+      const float bias = kMinimumBias + depthPerMetre * (0.5f + ring * tap.away) * metresPerTexel * (slope + kBend);
+      const float depth = shadow.map.at(x, y);
+      if (texel.z - bias <= depth) {
+        ++lit;
+      } else {
+        blockers += 1;
+        blockerDepth += depth;
+      }
     }
+  };
+  look(std::min(reach, 1.f));
+  // Once an edge is found, no ring can change that.
+  for (float ring = 1; ring < reach && (lit == 0 || lit == tried);) {
+    ring = std::min(ring * kWiden, reach);
+    look(ring);
   }
   out.shadowRadius = 2;
   out.shadowBias = 0.0006f + 0.0011f * slope;
