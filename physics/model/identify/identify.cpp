@@ -95,9 +95,9 @@ std::vector<double> volumesBehind(const SoftBodyModel& model) {
 
 // Cells of the spheres span three cells of the grid or more, necks between parts of the body two. Where what is held
 // ends, displacements go as the root of the distance, which no polynomial follows: fifteen hundred cells for the whole
-// body keep that to a percent or two and cost a few seconds.
+// body keep that to a percent or two and cost two seconds.
 CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const Vector3d&)>& behind) {
-  constexpr double perSphere = 3, perNeck = 2, perBody = 1500;
+  constexpr double perSphere = 3, perNeck = 2, perBody = 1000;
   constexpr double partMin = 0.02;  // of the body: what hangs on a thinner neck moves with it alone
   double volume = 0;
   for (const FillingSphere& s : model.spheres) volume += s.volume;
