@@ -45,7 +45,7 @@ std::vector<int> trianglesWhere(const TriangleMesh& mesh, const std::function<bo
 }
 
 HeldRegion endOfCylinder(const TriangleMesh& mesh) {
-  HeldRegion region{"plane=1,0,0,0.001", {}, [](const Vector3d& x) { return x.x() <= 1e-3; }};
+  HeldRegion region{"plane=1,0,0,0.001", {}, true};
   for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
     if (mesh.vertices[n].x() <= 1e-3) region.nodes.push_back(static_cast<int>(n));
   return region;
@@ -157,6 +157,29 @@ TEST(VoxelSolid, ACantileverBendsAsABeam) {
   // Forces spread from nodes move the end's load inward by a part of a triangle.
   EXPECT_LT(errors[0], 0.025);
   EXPECT_LT(errors[1], 0.025);
+}
+
+// What lies behind the fan over the held triangles' rim is gone: the rest answers as a body that ends there.
+TEST(VoxelSolid, MaterialBehindHeldTrianglesHoldsAsAFaceThereWould) {
+  const TriangleMesh whole = cylinder();
+  TriangleMesh rest = cylinderMesh(0.08, 0.01, 18, 16);
+  for (Vector3d& x : rest.vertices) x.x() += 0.02;
+  const std::vector<int> held = trianglesWhere(whole, [](const Vector3d& x) { return x.x() < 0.0201; });
+  const std::vector<HeldSpace> spaces = heldSpaces(whole, {{"plane=1,0,0,0.0201", {}, true}}, {held});
+  ASSERT_EQ(spaces.size(), 1u);
+  const auto behind = behindHeld(spaces);
+  EXPECT_TRUE(behind({0.019, 0.001, 0.002}));
+  EXPECT_FALSE(behind({0.021, 0.001, 0.002}));
+  const auto tipOf = [](const TriangleMesh& mesh, const SolidSettings& settings) {
+    const VoxelSolid solid = makeVoxelSolid(mesh, 0.005, settings);
+    const auto count = static_cast<Index>(mesh.vertices.size());
+    RowMatrix forces = RowMatrix::Zero(3 * count, 1);
+    for (Index n = 0; n < count; ++n) forces(3 * n + 1, 0) = mesh.vertices[n].x() > 0.0999 ? 1 : 0;
+    return (solid.surface * displacementsUnder(solid, forces)).cwiseAbs().maxCoeff();
+  };
+  const std::vector<int> face = trianglesWhere(rest, [](const Vector3d& x) { return x.x() < 0.0201; });
+  const double expected = tipOf(rest, {0.45, face, {}});
+  EXPECT_NEAR(tipOf(whole, {0.45, held, spaces}) / expected, 1, 0.01);
 }
 
 TEST(Multifrontal, SolvesAsAnySparseCholesky) {

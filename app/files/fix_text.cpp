@@ -74,7 +74,7 @@ HeldRegion parseHeldRegion(const std::string& text, const SoftBodyModel& model) 
   }
   const Region region = regionOf(text, kind, value);
   held.nodes = nodesInRegion(model, region);
-  held.contains = [region](const Eigen::Vector3d& x) { return contains(region, x); };
+  held.isSpace = true;
   if (held.nodes.empty()) throw std::runtime_error(fmt::format("--fix {} holds no node of the surface", text));
   return held;
 }

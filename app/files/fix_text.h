@@ -8,7 +8,7 @@ namespace medulla {
 
 // What medulla build --fix names, as a scene's <fix> does: "box=x0,y0,z0,x1,y1,z1", "sphere=x,y,z,r",
 // "plane=nx,ny,nz,d" (holds n.x <= d), in metres of the mesh, or "vertices=FILE.csv", vertices of the mesh file.
-// A part of space holds the material inside, too; vertices hold the surface between them.
+// A part of space holds what lies behind its triangles, too; vertices hold the surface between them.
 // Throws std::runtime_error on anything else.
 HeldRegion parseHeldRegion(const std::string& text, const SoftBodyModel& model);
 

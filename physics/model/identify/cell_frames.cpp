@@ -33,24 +33,31 @@ SharedPart& partOf(std::vector<SharedPart>& parts, int frame) {
   return fresh;
 }
 
-// Positions from `origin`, against cancellation.
+// Positions from `origin`, against cancellation. `held`: of the pieces behind what is held, the integrals of 1, r, r
+// r^T.
 void integrate(const VoxelSolid& solid, const std::vector<int>& frameOfPiece, const Vector3d& origin,
-               std::vector<std::vector<SharedPart>>& parts, std::vector<RawCell>& cells) {
+               std::vector<std::vector<SharedPart>>& parts, std::vector<RawCell>& cells, std::vector<RawCell>& held) {
   const double face = solid.voxels.size * solid.voxels.size;
   for (std::size_t p = 0; p < solid.voxels.pieces.size(); ++p) {
     const VoxelPiece& piece = solid.voxels.pieces[p];
     const double volume = face * piece.height;
     const Vector3d x = piece.centre - origin;
+    const auto sum = [&](RawCell& cell) {
+      cell.volume += volume;
+      cell.centroid += volume * x;
+      cell.secondMoment += volume * x * x.transpose();
+    };
+    sum(cells[frameOfPiece[p]]);
+    if (solid.isBehind[p]) {
+      sum(held[frameOfPiece[p]]);
+      continue;
+    }
     const HexPoint at = locate(solid.grid, piece.centre);
     SharedPart& part = partOf(parts[at.cell], frameOfPiece[p]);
     for (int a = 0; a < kHexNodes; ++a) {
       part.shape[a] += volume * at.shape[a];
       part.shapeTimesPosition[a] += volume * at.shape[a] * x;
     }
-    RawCell& cell = cells[frameOfPiece[p]];
-    cell.volume += volume;
-    cell.centroid += volume * x;
-    cell.secondMoment += volume * x * x.transpose();
   }
   for (RawCell& cell : cells) {
     cell.centroid /= cell.volume;
@@ -62,6 +69,21 @@ Matrix3d cross(const Vector3d& r) {
   Matrix3d m;
   m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
   return m;
+}
+
+// The cell's motion N = (1 / V; lengthScale J^-1 r x) of its held pieces' displacements: integral N N^T over stiffness.
+Matrix6d giveOf(const RawCell& cell, const RawCell& held, double stiffness, double lengthScale) {
+  const Matrix3d inverse = lengthScale * inertia(cell.secondMoment).inverse();
+  const Vector3d first = held.centroid - held.volume * cell.centroid;  // about the cell's centroid
+  const Matrix3d second = held.secondMoment - held.centroid * cell.centroid.transpose() -
+                          cell.centroid * held.centroid.transpose() +
+                          held.volume * cell.centroid * cell.centroid.transpose();
+  Matrix6d out;
+  out.topLeftCorner<3, 3>() = held.volume / (cell.volume * cell.volume) * Matrix3d::Identity();
+  out.bottomLeftCorner<3, 3>() = inverse * cross(first) / cell.volume;
+  out.topRightCorner<3, 3>() = out.bottomLeftCorner<3, 3>().transpose();
+  out.bottomRightCorner<3, 3>() = inverse * inertia(second) * inverse;
+  return out / stiffness;
 }
 
 }  // namespace
@@ -79,8 +101,12 @@ CellFrames makeCellFrames(const TriangleMesh& mesh, const std::vector<Ball>& bal
 
   const Vector3d origin = out.frames[0].restPosition;
   std::vector<std::vector<SharedPart>> parts(solid.grid.cells.size());
-  std::vector<RawCell> raw(count);
-  integrate(solid, cells.cellOfPiece, origin, parts, raw);
+  std::vector<RawCell> raw(count), held(count);
+  integrate(solid, cells.cellOfPiece, origin, parts, raw, held);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double perVolume = kHeldPenalty / (solid.grid.size * solid.grid.size);
+    out.heldGive.push_back(giveOf(raw[i], held[i], perVolume, out.lengthScale));
+  }
   std::vector<Eigen::Triplet<double>> entries;
   std::vector<Matrix3d> inverseInertia;
   for (const RawCell& cell : raw) inverseInertia.push_back(inertia(cell.secondMoment).inverse());

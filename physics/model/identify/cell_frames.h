@@ -15,6 +15,9 @@ struct CellFrames {
   std::vector<IdentifiedFrame> frames;
   double lengthScale = 0;  // m, cube root of the mean volume
   RowSparse motion;        // 6 frames x 3 grid nodes: (t at restPosition, lengthScale theta) of each
+  // m/N per Pa, in the same six: what held material lets go, by itself, under loads spread over the whole cell. As
+  // stiff as held triangles are, it only matters where a cell has nothing else.
+  std::vector<Matrix6d> heldGive;
   PowerSites sites;
   std::map<std::pair<int, int>, double> contactArea;  // m2, as of PowerCells
 };

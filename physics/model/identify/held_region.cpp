@@ -3,8 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
+#include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "physics/model/surface_queries.h"
 
@@ -29,29 +32,75 @@ std::vector<int> wholeTriangles(const TriangleMesh& mesh, const HeldRegion& regi
   return out;
 }
 
-std::function<bool(const Vector3d&)> heldMaterial(const TriangleMesh& mesh, const std::vector<HeldRegion>& regions,
-                                                  const std::vector<std::vector<int>>& triangles) {
-  struct Space {
-    std::function<bool(const Vector3d&)> contains;
-    SurfaceTree held, others;
-  };
-  const auto spaces = std::make_shared<std::vector<Space>>();
-  for (std::size_t r = 0; r < regions.size(); ++r) {
-    if (!regions[r].contains) continue;
-    TriangleMesh held{mesh.vertices, {}}, others{mesh.vertices, {}};
-    for (std::size_t t = 0, next = 0; t < mesh.triangles.size(); ++t) {
-      const bool isHeld = next < triangles[r].size() && triangles[r][next] == static_cast<int>(t);
-      (isHeld ? held : others).triangles.push_back(mesh.triangles[t]);
-      next += isHeld ? 1 : 0;
-    }
-    if (others.triangles.empty()) throw std::runtime_error(regions[r].text + " holds the whole surface");
-    spaces->push_back({regions[r].contains, makeSurfaceTree(held), makeSurfaceTree(others)});
+namespace {
+
+using Edge = std::pair<int, int>;
+
+// Directed edges of the triangles that no other of them has the other way round.
+std::vector<Edge> rimOf(const std::vector<std::array<int, 3>>& triangles) {
+  std::set<Edge> edges;
+  for (const std::array<int, 3>& t : triangles) {
+    for (int k = 0; k < 3; ++k) edges.insert({t[k], t[(k + 1) % 3]});
   }
-  if (spaces->empty()) return {};
-  return [spaces](const Vector3d& x) {
-    return std::any_of(spaces->begin(), spaces->end(), [&](const Space& s) {
-      return s.contains(x) && closestPoint(s.held, x).distance < closestPoint(s.others, x).distance;
-    });
+  std::vector<Edge> rim;
+  for (const Edge& e : edges)
+    if (!edges.contains({e.second, e.first})) rim.push_back(e);
+  return rim;
+}
+
+// The parts of a rim that hang together.
+std::vector<std::vector<Edge>> loopsOf(std::vector<Edge> rim) {
+  std::vector<std::vector<Edge>> loops;
+  while (!rim.empty()) {
+    std::set<int> corners = {rim[0].first};
+    std::vector<Edge> loop;
+    for (bool more = true; more;) {
+      const auto touches = [&](const Edge& e) { return corners.contains(e.first) || corners.contains(e.second); };
+      const auto rest = std::stable_partition(rim.begin(), rim.end(), touches);
+      more = rest != rim.begin();
+      for (auto e = rim.begin(); e != rest; ++e) {
+        corners.insert({e->first, e->second});
+        loop.push_back(*e);
+      }
+      rim.erase(rim.begin(), rest);
+    }
+    loops.push_back(loop);
+  }
+  return loops;
+}
+
+HeldSpace spaceBehind(const TriangleMesh& mesh, const std::vector<int>& held) {
+  HeldSpace out{{mesh.vertices, {}}, static_cast<int>(held.size())};
+  for (const int t : held) out.surface.triangles.push_back(mesh.triangles[t]);
+  for (const std::vector<Edge>& loop : loopsOf(rimOf(out.surface.triangles))) {
+    Vector3d middle = Vector3d::Zero();
+    for (const Edge& e : loop) middle += mesh.vertices[e.first] / static_cast<double>(loop.size());
+    const int centre = static_cast<int>(out.surface.vertices.size());
+    out.surface.vertices.push_back(middle);
+    for (const auto& [a, b] : loop) out.surface.triangles.push_back({b, a, centre});
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<HeldSpace> heldSpaces(const TriangleMesh& mesh, const std::vector<HeldRegion>& regions,
+                                  const std::vector<std::vector<int>>& triangles) {
+  std::vector<HeldSpace> out;
+  for (std::size_t r = 0; r < regions.size(); ++r) {
+    if (!regions[r].isSpace) continue;
+    if (triangles[r].size() == mesh.triangles.size())
+      throw std::runtime_error(regions[r].text + " holds the whole surface");
+    out.push_back(spaceBehind(mesh, triangles[r]));
+  }
+  return out;
+}
+
+std::function<bool(const Vector3d&)> behindHeld(const std::vector<HeldSpace>& spaces) {
+  const auto trees = std::make_shared<std::vector<SurfaceTree>>();
+  for (const HeldSpace& s : spaces) trees->push_back(makeSurfaceTree(s.surface));
+  return [trees](const Vector3d& x) {
+    return std::any_of(trees->begin(), trees->end(), [&](const SurfaceTree& tree) { return isInside(tree, x); });
   };
 }
 

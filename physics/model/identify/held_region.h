@@ -11,19 +11,26 @@ namespace medulla {
 
 // A part of the surface that is to be held.
 struct HeldRegion {
-  std::string text;                                      // FixedPatch::region
-  std::vector<int> nodes;                                // of the model, ascending
-  std::function<bool(const Eigen::Vector3d&)> contains;  // a part of space: the material there is held, too; or empty
+  std::string text;        // FixedPatch::region
+  std::vector<int> nodes;  // of the model, ascending
+  bool isSpace = false;    // holds what lies behind its triangles, too
 };
 
 // Triangles with all corners in the region, ascending. Throws std::runtime_error where there is none.
 std::vector<int> wholeTriangles(const TriangleMesh& mesh, const HeldRegion& region);
 
-// The material in the regions that is nearer to the triangles held there than to all others: what lies behind them,
-// where a region ends within a triangle, too. Empty where no region is a part of space. `triangles`: of each region.
-// Throws std::runtime_error where a region holds the whole surface.
-std::function<bool(const Eigen::Vector3d&)> heldMaterial(const TriangleMesh& mesh,
-                                                         const std::vector<HeldRegion>& regions,
-                                                         const std::vector<std::vector<int>>& triangles);
+// The material behind triangles that are held: as far as a fan over each of their rims, about the rim's middle.
+struct HeldSpace {
+  TriangleMesh surface;  // closed: the held triangles, then the fans
+  int firstFan = 0;      // of `surface.triangles`
+};
+
+// Of every region that is a part of space. `triangles`: of each region. Throws std::runtime_error where such a region
+// holds the whole surface.
+std::vector<HeldSpace> heldSpaces(const TriangleMesh& mesh, const std::vector<HeldRegion>& regions,
+                                  const std::vector<std::vector<int>>& triangles);
+
+// Whether a point of the body lies in one of them. `spaces` are copied.
+std::function<bool(const Eigen::Vector3d&)> behindHeld(const std::vector<HeldSpace>& spaces);
 
 }  // namespace medulla

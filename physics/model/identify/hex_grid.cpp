@@ -85,8 +85,9 @@ std::array<double, 3> quadraticSlopes(double x) {
   return {4 * x - 3, 4 - 8 * x, 4 * x - 1};
 }
 
-HexGrid makeHexGrid(const VoxelBody& voxels) {
+HexGrid makeHexGrid(const VoxelBody& voxels, const std::vector<bool>& without) {
   constexpr int n = HexGrid::kVoxels;
+  const auto isLeftOut = [&](std::size_t piece) { return !without.empty() && without[piece]; };
   HexGrid grid;
   grid.size = n * voxels.size;
   grid.low = voxels.low;
@@ -95,7 +96,10 @@ HexGrid makeHexGrid(const VoxelBody& voxels) {
     return (static_cast<std::size_t>(c[0]) * grid.count[1] + c[1]) * grid.count[2] + c[2];
   };
   std::vector<double> inside(static_cast<std::size_t>(grid.count[0]) * grid.count[1] * grid.count[2], 0);
-  for (const VoxelPiece& piece : voxels.pieces) inside[at(cellOf(piece))] += piece.height / voxels.size / (n * n * n);
+  for (std::size_t p = 0; p < voxels.pieces.size(); ++p) {
+    const VoxelPiece& piece = voxels.pieces[p];
+    if (!isLeftOut(p)) inside[at(cellOf(piece))] += piece.height / voxels.size / (n * n * n);
+  }
   grid.cellAt.assign(inside.size(), -1);
   for (int i = 0; i < grid.count[0]; ++i) {
     for (int j = 0; j < grid.count[1]; ++j) {
@@ -118,9 +122,10 @@ HexGrid makeHexGrid(const VoxelBody& voxels) {
     grid.weights.row(q).setConstant(kFloorWeight * rule.weights[q / 25] * rule.weights[q / 5 % 5] *
                                     rule.weights[q % 5]);
   }
-  for (const VoxelPiece& piece : voxels.pieces) {
+  for (std::size_t p = 0; p < voxels.pieces.size(); ++p) {
+    const VoxelPiece& piece = voxels.pieces[p];
     const int cell = grid.cellAt[at(cellOf(piece))];
-    if (cell < 0) continue;
+    if (cell < 0 || isLeftOut(p)) continue;
     const double middle = (piece.centre.z() - grid.low.z()) / grid.size - grid.cells[cell][2];
     const double half = piece.height / grid.size / 2;
     const std::array<double, 5>&x = across[piece.index[0] % n], &y = across[piece.index[1] % n],

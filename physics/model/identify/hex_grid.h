@@ -26,8 +26,9 @@ struct HexGrid {
 };
 
 // The grid whose cells are kVoxels voxels wide. Cells with less than 2 % inside are dropped: they would make the
-// stiffness matrix nearly singular. The rest get 1e-3 of the whole cell on top, for the same reason.
-HexGrid makeHexGrid(const VoxelBody& voxels);
+// stiffness matrix nearly singular. The rest get 1e-3 of the whole cell on top, for the same reason. Pieces `without`,
+// if given, are left out.
+HexGrid makeHexGrid(const VoxelBody& voxels, const std::vector<bool>& without = {});
 
 // Where a point lies among the nodes: in its cell, or, where that was dropped, beyond the edge of the nearest one.
 struct HexPoint {

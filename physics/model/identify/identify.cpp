@@ -94,24 +94,25 @@ std::vector<double> volumesBehind(const SoftBodyModel& model) {
 }
 
 // Cells of the spheres span three cells of the grid or more, necks between parts of the body two; six hundred for the
-// whole body hold a few spheres' accuracy and cost a second.
-CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const Vector3d&)>& held) {
+// whole body hold a few spheres' accuracy and cost a second. Where what is held ends, displacements go as the root of
+// the distance, which no polynomial follows: finer cells converge there in the first order only.
+CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const Vector3d&)>& behind) {
   constexpr double perSphere = 3, perNeck = 2, perBody = 600;
   constexpr double partMin = 0.02;  // of the body: what hangs on a thinner neck moves with it alone
   double volume = 0;
   for (const FillingSphere& s : model.spheres) volume += s.volume;
   const double spheres = std::cbrt(volume / static_cast<double>(model.spheres.size())) / perSphere;
   CellSize out{std::min(spheres, std::cbrt(volume / perBody)), ""};
-  const std::vector<double> behind = volumesBehind(model);
+  const std::vector<double> beyond = volumesBehind(model);
   for (std::size_t l = 0; l < model.links.size(); ++l) {
-    if (behind[l] < partMin * volume) continue;
+    if (beyond[l] < partMin * volume) continue;
     const ElasticLink& link = model.links[l];
     const Vector3d from = model.spheres[link.sphere0].restFrame, to = model.spheres[link.sphere1].restFrame;
     // The outer sections of a link may lie in the body's rounded end.
     for (int k = 2; k + 2 < ElasticLink::kSections; ++k) {
       const double neck = 2 * std::sqrt(link.sections[k].area / std::numbers::pi);
       const Vector3d place = from + (k + 0.5) / ElasticLink::kSections * (to - from);
-      if (neck / perNeck >= out.size || (held && held(place))) continue;
+      if (neck / perNeck >= out.size || behind(place)) continue;
       out = {neck / perNeck,
              fmt::format("the neck of {:.2g} mm between spheres {} and {}, near ({:.3g}, {:.3g}, {:.3g})", 1e3 * neck,
                          link.sphere0, link.sphere1, place.x(), place.y(), place.z())};
@@ -123,7 +124,7 @@ CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const V
 VoxelSolid makeSolid(const SoftBodyModel& model, const TriangleMesh& mesh, const IdentifySettings& settings,
                      const SolidSettings& solid, const Progress& progress) {
   if (settings.cellSize > 0) return makeVoxelSolid(mesh, settings.cellSize, solid, progress);
-  const CellSize cell = chooseSize(model, solid.heldSpace);
+  const CellSize cell = chooseSize(model, behindHeld(solid.heldSpaces));
   try {
     return makeVoxelSolid(mesh, cell.size, solid, progress);
   } catch (const std::runtime_error& error) {
@@ -244,7 +245,7 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
     solidSettings.heldTriangles.insert(solidSettings.heldTriangles.end(), patchTriangles.back().begin(),
                                        patchTriangles.back().end());
   }
-  solidSettings.heldSpace = heldMaterial(mesh, held, patchTriangles);
+  solidSettings.heldSpaces = heldSpaces(mesh, held, patchTriangles);
   const auto stage = [&](double from, double to) -> Progress {
     return [&progress, from, to](double part) {
       if (progress) progress(std::lerp(from, to, part));

@@ -29,6 +29,8 @@ Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const st
     out.nodes.middleCols(first, count) = solid.surface * x;
     if (progress) progress(static_cast<double>(first + count) / static_cast<double>(n));
   }
+  for (std::size_t i = 0; i < cells.heldGive.size(); ++i)
+    out.frames.block<6, 6>(6 * static_cast<Index>(i), 6 * static_cast<Index>(i)) += cells.heldGive[i];
   out.frames = (out.frames + out.frames.transpose()).eval() / 2;
   return out;
 }

@@ -11,6 +11,7 @@
 
 #include "physics/model/identify/hex_stiffness.h"
 #include "physics/model/mass_properties.h"
+#include "physics/model/surface_queries.h"
 
 namespace medulla {
 
@@ -19,8 +20,6 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
 namespace {
-
-constexpr double kPenalty = 100;  // times E / cell size: a hundredth of the cell's own give, of no account
 
 // The springs of held triangles, by cell: shape shape^T times stiffness, summed over points a third of a cell apart.
 using HeldCells = std::map<int, Eigen::Matrix<double, kHexNodes, kHexNodes>>;
@@ -48,19 +47,31 @@ void overTriangle(const TriangleMesh& mesh, const std::array<int, 3>& corners, d
   }
 }
 
-void holdTriangles(const TriangleMesh& mesh, const std::vector<int>& triangles, const HexGrid& grid, HeldCells& held) {
-  for (const int t : triangles) {
+// Springs on what bounds the cells: held triangles where material lies behind them, fans where they cut the body.
+HeldCells heldCells(const TriangleMesh& mesh, const SolidSettings& settings, const HexGrid& grid) {
+  HeldCells held;
+  const auto hold = [&](const Vector3d& point, double area) {
+    holdPoint(grid, point, kHeldPenalty / grid.size * area, held);
+  };
+  const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
+  for (const int t : settings.heldTriangles) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    const Vector3d normal =
+        (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).normalized();
     overTriangle(mesh, mesh.triangles[t], grid.size, [&](const Vector3d& point, const Vector3d&, double area) {
-      holdPoint(grid, point, kPenalty / grid.size * area, held);
+      if (!behind(point - 1e-3 * grid.size * normal)) hold(point, area);
     });
   }
-}
-
-void holdSpace(const VoxelBody& voxels, const std::function<bool(const Vector3d&)>& space, const HexGrid& grid,
-               HeldCells& held) {
-  const double perHeight = kPenalty / (grid.size * grid.size) * voxels.size * voxels.size;
-  for (const VoxelPiece& piece : voxels.pieces)
-    if (space(piece.centre)) holdPoint(grid, piece.centre, perHeight * piece.height, held);
+  const SurfaceTree body = makeSurfaceTree(mesh);
+  for (const HeldSpace& space : settings.heldSpaces) {
+    for (std::size_t t = space.firstFan; t < space.surface.triangles.size(); ++t) {
+      overTriangle(space.surface, space.surface.triangles[t], grid.size,
+                   [&](const Vector3d& point, const Vector3d&, double area) {
+                     if (isInside(body, point)) hold(point, area);
+                   });
+    }
+  }
+  return held;
 }
 
 void addHeld(const Eigen::Matrix<double, kHexNodes, kHexNodes>& springs, MatrixXd& matrix) {
@@ -148,10 +159,17 @@ std::map<int, std::vector<int>> pinnedFreedoms(const HexGrid& grid, const std::v
   return out;
 }
 
-RowSparse interpolation(const HexGrid& grid, const std::vector<Vector3d>& points) {
+// Held nodes do not move; behind what is held there are no cells to say so.
+RowSparse interpolation(const HexGrid& grid, const TriangleMesh& mesh, const std::vector<int>& heldTriangles) {
+  const std::vector<Vector3d>& points = mesh.vertices;
+  std::vector<bool> isHeld(points.size(), false);
+  for (const int t : heldTriangles) {
+    for (const int n : mesh.triangles[t]) isHeld[n] = true;
+  }
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(points.size() * kHexFreedoms);
   for (std::size_t p = 0; p < points.size(); ++p) {
+    if (isHeld[p]) continue;
     const HexPoint at = locate(grid, points[p]);
     for (int a = 0; a < kHexNodes; ++a) {
       for (int k = 0; k < 3; ++k) {
@@ -177,7 +195,10 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
                                          1e3 * cellSize, volume / (cellSize * cellSize * cellSize), cellsMax));
   }
   solid.voxels = voxelise(mesh, volume, static_cast<int>(volume / (voxel * voxel * voxel)));
-  solid.grid = makeHexGrid(solid.voxels);
+  const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
+  for (const VoxelPiece& piece : solid.voxels.pieces) solid.isBehind.push_back(behind(piece.centre));
+  solid.grid = makeHexGrid(solid.voxels, solid.isBehind);
+  if (solid.grid.cells.empty()) throw std::runtime_error("all material lies behind what is held: nothing to identify");
   const HexGrid& grid = solid.grid;
   solid.plan = planDissection(grid);
   if (8 * solid.plan.factorNumbers > settings.memoryMax) {
@@ -185,9 +206,7 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
         fmt::format("finite elements of {:.3g} mm would take {:.1f} GB, expected at most {:.1f} GB", 1e3 * grid.size,
                     8e-9 * solid.plan.factorNumbers, 1e-9 * settings.memoryMax));
   }
-  HeldCells held;
-  holdTriangles(mesh, settings.heldTriangles, grid, held);
-  if (settings.heldSpace) holdSpace(solid.voxels, settings.heldSpace, grid, held);
+  const HeldCells held = heldCells(mesh, settings, grid);
   const auto pinned = pinnedFreedoms(grid, held.empty() ? isostaticPins(grid) : std::vector<GridPin>());
   // A batch of cells at once makes their matrices by one large product.
   constexpr std::size_t batch = 32;
@@ -206,7 +225,7 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
     }
   };
   solid.factors = factorise(solid.plan, grid, cellStiffness, progress);
-  solid.surface = interpolation(grid, mesh.vertices);
+  solid.surface = interpolation(grid, mesh, settings.heldTriangles);
   solid.loading = tractions(mesh, grid);
   return solid;
 }

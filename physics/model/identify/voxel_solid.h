@@ -5,18 +5,23 @@
 #include <functional>
 #include <vector>
 
+#include "physics/model/identify/held_region.h"
 #include "physics/model/identify/multifrontal.h"
 #include "physics/model/triangle_mesh.h"
 
 namespace medulla {
 
+constexpr double kHeldPenalty = 100;  // times E / cell size: a hundredth of the cell's own give, of no account
+
 using RowSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 // The body as finite elements, per pascal of Young's modulus: quadratic cells of a regular grid, held by stiff springs
-// on whole triangles of the surface and on material (penalty 100 / cell size, and that over the cell size). A body that
-// nothing holds stands on six springs that hold rigid motions alone: they carry nothing under balanced loads.
+// on whole triangles of the surface (penalty 100 / cell size). Material behind what is held has no cells: its fan is
+// held instead. A body that nothing holds stands on six springs that hold rigid motions alone: they carry nothing under
+// balanced loads.
 struct VoxelSolid {
-  VoxelBody voxels;  // HexGrid::kVoxels of them along a cell's edge
+  VoxelBody voxels;            // of all the body, HexGrid::kVoxels of them along a cell's edge
+  std::vector<bool> isBehind;  // of each piece of them: has no cell and does not move
   HexGrid grid;
   DissectionPlan plan;
   FrontFactors factors;
@@ -27,8 +32,8 @@ struct VoxelSolid {
 struct SolidSettings {
   double poisson = 0.45;  // 0 <= poisson < 0.5
   std::vector<int> heldTriangles;
-  std::function<bool(const Eigen::Vector3d&)> heldSpace;  // holds the material there, too; empty: none
-  double memoryMax = 3e9;                                 // bytes for the factors
+  std::vector<HeldSpace> heldSpaces;
+  double memoryMax = 3e9;  // bytes for the factors
 };
 
 // `cellSize` is met within a percent. Throws std::runtime_error where the factors would not fit.
