@@ -39,7 +39,7 @@ class Body:
     kept: dict  # region held: number of the grid whose nonlinear results are written
     poisson: float = 0.45
     cut: tuple = ()  # regions held with all that lies behind them, not by their surface alone
-    modes: int = 5
+    modes: int = 5  # 0: static cases only
     step: tuple = ("tip", 0.4)  # damped step response: the load of this case times this factor
     vertices: np.ndarray = None
     triangles: np.ndarray = None
@@ -192,7 +192,7 @@ def stomach():
         Case("press", "root", Load("front", (0, 0, -15)), 4),
     ]
     return Body("stomach", "assets/stomach/stomach.obj", 7e3, 1040, regions, cases,
-                grids={"root": grids(1, 2, 1, 4, 1, 6)}, kept={"root": 1})
+                grids={"root": grids(1, 2, 1, 4, 1, 6)}, kept={"root": 1}, modes=0)
 
 
 def bodies():

@@ -49,7 +49,7 @@ def make(project, results, work, wanted):
             rows = "".join(timing(body, case, nonlinear, error))
             result_files.publish(os.path.join(results, f"{body.name}_{case.name}.time"), rows)
             print(summary(body, case, kept, error), flush=True)
-        if chosen(f"{body.name}_modes") or chosen(f"{body.name}_step"):
+        if body.modes and (chosen(f"{body.name}_modes") or chosen(f"{body.name}_step")):
             dynamics.make(results, solved)
 
 
