@@ -103,12 +103,14 @@ CellFrames makeCellFrames(const TriangleMesh& mesh, const std::vector<Ball>& bal
   std::vector<std::vector<SharedPart>> parts(solid.grid.cells.size());
   std::vector<RawCell> raw(count), held(count);
   integrate(solid, cells.cellOfPiece, origin, parts, raw, held);
+  out.heldGive.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     const double perVolume = kHeldPenalty / (solid.grid.size * solid.grid.size);
     out.heldGive.push_back(giveOf(raw[i], held[i], perVolume, out.lengthScale));
   }
   std::vector<Eigen::Triplet<double>> entries;
   std::vector<Matrix3d> inverseInertia;
+  inverseInertia.reserve(raw.size());
   for (const RawCell& cell : raw) inverseInertia.push_back(inertia(cell.secondMoment).inverse());
   for (std::size_t c = 0; c < parts.size(); ++c) {
     for (const SharedPart& part : parts[c]) {
