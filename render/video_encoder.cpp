@@ -77,6 +77,7 @@ struct VideoEncoder::Data {
   AVPacket* packet = nullptr;
   AVFrame* frame = nullptr;
   std::int64_t pictures = 0;
+  bool begun = false;  // the header is written, the trailer not yet
   std::optional<FilmPalette> palette;
 
   Data(VideoFormat f, std::string path, int w, int h, double fps)
@@ -87,6 +88,8 @@ struct VideoEncoder::Data {
         tick(av_inv_q(av_d2q(fps, 100000))),
         partial(std::move(path)) {}
   ~Data() {
+    // Abandoned, the muxer of GIF would keep its last packet for ever; others may take long over a trailer.
+    if (begun && format == VideoFormat::gif) av_write_trailer(muxer);
     av_frame_free(&frame);
     av_packet_free(&packet);
     avcodec_free_context(&codec);
@@ -151,6 +154,7 @@ void VideoEncoder::Data::openCodec(int pixelFormat) {
   stream->avg_frame_rate = stream->r_frame_rate = codec->framerate;
   checkedAv(avcodec_parameters_from_context(stream->codecpar, codec));
   checkedAv(avformat_write_header(muxer, muxerOptions.get()));
+  begun = true;
   muxerOptions.requireUsed();
 }
 
@@ -208,6 +212,7 @@ void VideoEncoder::finish(const std::function<void()>& goOn) {
     d.palette->finish(take, goOn);
   }
   d.encode(nullptr, goOn);
+  d.begun = false;
   checkedAv(av_write_trailer(d.muxer));
   checkedAv(avio_closep(&d.muxer->pb));
 }

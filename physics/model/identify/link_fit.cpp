@@ -39,12 +39,12 @@ IdentifiedLink linkBetween(int frame0, int frame1, const Vector3d& from, const V
 
 // Area of the patch in each frame's cell, m2.
 std::vector<double> heldAreas(const TriangleMesh& mesh, const CellFrames& cells, const std::vector<int>& triangles) {
-  constexpr int parts = 4;
+  constexpr int parts = 4, points = parts * (parts + 1) / 2;
   std::vector<double> areas(cells.frames.size(), 0);
   for (const int t : triangles) {
     const Vector3d o = mesh.vertices[mesh.triangles[t][0]], u = mesh.vertices[mesh.triangles[t][1]] - o,
                    v = mesh.vertices[mesh.triangles[t][2]] - o;
-    const double area = u.cross(v).norm() / 2 / (parts * (parts + 1) / 2);
+    const double area = u.cross(v).norm() / 2 / points;
     for (int i = 0; i < parts; ++i) {
       for (int j = 0; i + j < parts; ++j)
         areas[cellAt(cells.sites, o + (i + 1. / 3) / parts * u + (j + 1. / 3) / parts * v)] += area;
