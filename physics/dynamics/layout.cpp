@@ -132,14 +132,15 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
 
 NodeOrder orderNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   NodeOrder order;
-  const auto append = [&](bool skin, bool onLink, std::vector<HostRange>& ranges) {
+  // Body after body: what a batch's stages leave lies together.
+  const auto append = [&](bool skin, std::vector<HostRange>& onLinks, std::vector<HostRange>& onSpheres) {
     for (std::size_t b = 0; b < d.bodies.size(); ++b) {
       if ((d.bodies[b].surface == SurfaceMode::skin) != skin) continue;
-      appendNodes(order, d, mechanics[b], static_cast<int>(b), onLink, ranges);
+      appendNodes(order, d, mechanics[b], static_cast<int>(b), true, onLinks);
+      appendNodes(order, d, mechanics[b], static_cast<int>(b), false, onSpheres);
     }
   };
-  append(false, true, d.nodes.onLinks);
-  append(false, false, d.nodes.onSpheres);
+  append(false, d.nodes.onLinks, d.nodes.onSpheres);
   d.nodes.dynamicEnd = static_cast<int>(order.node.size());
   for (std::vector<HostRange>* ranges : {&d.nodes.onLinks, &d.nodes.onSpheres}) {
     for (HostRange& range : *ranges) {
@@ -147,8 +148,7 @@ NodeOrder orderNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) 
       d.nodes.swollen.push_back(0);
     }
   }
-  append(true, true, d.nodes.skinOnLinks);
-  append(true, false, d.nodes.skinOnSpheres);
+  append(true, d.nodes.skinOnLinks, d.nodes.skinOnSpheres);
   return order;
 }
 
@@ -157,8 +157,8 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   Nodes& n = d.nodes;
   n.count = static_cast<int>(order.node.size());
   n.displaced.resize(n.count);
-  for (std::vector<Lanes3>* a : {&n.position, &n.velocity, &n.force, &n.offset, &n.area})
-    a->resize(n.count / 4, Lanes3{splat(0), splat(0), splat(0)});
+  for (std::vector<Lanes3>* a : {&n.position, &n.velocity}) a->resize(n.count / 4, Lanes3{splat(0), splat(0), splat(0)});
+  for (StageArray<Lanes3>* a : {&n.force, &n.offset, &n.area}) a->resize(n.count / 4);
   n.mass.resize(n.count, 0);
   n.inverseMass.resize(n.count, 0);
   n.groups.resize(n.count / 4, NodeGroup{});

@@ -192,17 +192,21 @@ inline void setLane(Lanes3& to, int lane, const Eigen::Vector3d& a) {
 }
 
 // Vectors four to a group: the i-th of them all.
-inline Eigen::Vector3d vectorAt(const std::vector<Lanes3>& groups, std::uint32_t i) {
+template <class Array>
+Eigen::Vector3d vectorAt(const Array& groups, std::uint32_t i) {
   return vectorOf(groups[i / 4], static_cast<int>(i % 4));
 }
-inline void setVector(std::vector<Lanes3>& groups, std::uint32_t i, const Eigen::Vector3d& a) {
+template <class Array>
+void setVector(Array& groups, std::uint32_t i, const Eigen::Vector3d& a) {
   setLane(groups[i / 4], static_cast<int>(i % 4), a);
 }
 // The four that begin at i between an array of quads and lanes.
-inline Lanes3 gatherFour(const std::vector<Quad>& q, std::size_t i) {
+template <class Array>
+Lanes3 gatherFour(const Array& q, std::size_t i) {
   return gather(q[i], q[i + 1], q[i + 2], q[i + 3]);
 }
-inline void storeFour(const Lanes3& v, std::vector<Quad>& q, std::size_t i) {
+template <class Array>
+void storeFour(const Lanes3& v, Array& q, std::size_t i) {
   Lanes a = v.x, b = v.y, c = v.z, d = splat(0);
   transpose(a, b, c, d);
   store(q[i], a);

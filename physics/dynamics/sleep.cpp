@@ -106,7 +106,49 @@ void shareOutLinkGroups(WorldData& d) {
   }
 }
 
+// A surface that moves as a whole needs what its stages leave within its batch alone; contact mode weighs it at the
+// frame's end, and loads on skins between the stages. A world of one batch has nothing to share with.
+void shareStages(WorldData& d) {
+  const Awake& a = d.awake;
+  const auto keepsNothing = [&](int b) {
+    const SurfaceMode surface = d.bodies[b].surface;
+    return surface == SurfaceMode::full ||
+           (surface == SurfaceMode::skin && (a.loadedSkins.empty() || !a.loadedSkins[b]));
+  };
+  for (Batch& batch : d.awake.batches) {
+    batch.sharesStages = a.batches.size() > 1 && std::all_of(batch.bodies.begin(), batch.bodies.end(), keepsNothing);
+    if (!batch.sharesStages) continue;
+    const auto extent = [](const std::vector<int>& groups) {
+      return groups.empty() ? 0 : static_cast<std::size_t>(groups.back() - groups.front() + 1);
+    };
+    const std::size_t nodes = extent(batch.nodeGroups), links = extent(batch.linkGroups);
+    for (StageArray<Lanes3>* of : {&d.nodes.force, &d.nodes.offset, &d.nodes.area}) of->reserveShared(nodes);
+    d.nodes.displaced.reserveShared(4 * nodes);
+    d.links.frames.reserveShared(links);
+    d.links.slots.reserveShared(8 * links);
+  }
+}
+
 }  // namespace
+
+void shareStageArrays(WorldData& d, const Batch& batch) {
+  if (!batch.sharesStages) return useWholeStageArrays(d);
+  const auto first = [](const std::vector<int>& groups) {
+    return groups.empty() ? 0 : static_cast<std::size_t>(groups.front());
+  };
+  const std::size_t node = first(batch.nodeGroups), link = first(batch.linkGroups);
+  for (StageArray<Lanes3>* of : {&d.nodes.force, &d.nodes.offset, &d.nodes.area}) of->useShared(node);
+  d.nodes.displaced.useShared(4 * node);
+  d.links.frames.useShared(link);
+  d.links.slots.useShared(8 * link);
+}
+
+void useWholeStageArrays(WorldData& d) {
+  for (StageArray<Lanes3>* of : {&d.nodes.force, &d.nodes.offset, &d.nodes.area}) of->useWhole();
+  d.nodes.displaced.useWhole();
+  d.links.frames.useWhole();
+  d.links.slots.useWhole();
+}
 
 void listAwake(WorldData& d) {
   Awake& a = d.awake;
@@ -138,7 +180,9 @@ void listAwake(WorldData& d) {
   };
   list(d.nodes.onLinks, &Batch::onLinks);
   list(d.nodes.onSpheres, &Batch::onSpheres);
+  for (Batch& batch : a.batches) std::sort(batch.nodeGroups.begin(), batch.nodeGroups.end());
   shareOutLinkGroups(d);
+  shareStages(d);
 }
 
 void frameLoadedSkins(WorldData& d, const Loads& loads) {
@@ -178,6 +222,7 @@ void fallAsleep(WorldData& d, const Loads& loads) {
   if (!any) return;
   moveImpulses(d, true, d.contact.carried, d.contact.resting);
   runStage(d, evaluateLinks);  // once more, for the nodes that hang on them: without speed
+  runStage(d, evaluateAttachments);
   listAwake(d);
   d.contact.listsAreOld = true;
 }

@@ -39,6 +39,9 @@ void chooseSurfaceParts(WorldData&, const Loads& loads);  // at its end: what ha
 
 // sleep.cpp
 void listAwake(WorldData&);  // WorldData::awake anew
+// The memory of a batch's stages: shared with the other batches where it can be, until useWholeStageArrays().
+void shareStageArrays(WorldData&, const Batch&);
+void useWholeStageArrays(WorldData&);
 void frameLoadedSkins(WorldData&,
                       const Loads& loads);  // at a frame's start: Awake::loadedSkins, and the lists after it
 void layOutRest(WorldData&);                // all bodies awake

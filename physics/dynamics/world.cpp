@@ -48,10 +48,12 @@ void checkLoads(const WorldData& d, const Loads& loads) {
 
 // What a body does by itself.
 void applyForces(WorldData& d, const Batch& batch) {
+  shareStageArrays(d, batch);
   evaluateForces(d, batch);
   dampBodies(d, batch);
   dragVelocities(d, batch);
   stepVelocities(d, batch);
+  useWholeStageArrays(d);
 }
 
 // What joins bodies to tools and to each other; `remaining` is the time (s) from the substep's end to the frame's.

@@ -8,6 +8,7 @@
 #include "physics/dynamics/identified_data.h"
 #include "physics/dynamics/point_spring.h"
 #include "physics/dynamics/simd.h"
+#include "physics/dynamics/stage_array.h"
 #include "physics/dynamics/world.h"
 
 // The arrays of a world, laid out for AVX2: gathers by index from arrays of quads, arithmetic on four links, springs or
@@ -119,10 +120,10 @@ struct Slot {
 struct Links {
   int count = 0;
   std::vector<LinkGroup> groups;
-  std::vector<LinkFrame> frames;
+  StageArray<LinkFrame> frames;
   std::vector<LinkLoads> loads;    // per link, padded to four
   std::vector<Quad> unwoundTwist;  // rad per link, state: counts turns beyond 180 degrees
-  std::vector<Slot> slots;         // 2 per link: end 0, end 1
+  StageArray<Slot> slots;         // 2 per link: end 0, end 1
 };
 
 // ---- Surface nodes: sorted by host, each host's range padded to four.
@@ -155,10 +156,10 @@ struct GroupHost {
 struct Nodes {
   int count = 0;                           // with pads
   std::vector<Lanes3> position, velocity;  // m, m/s, per group, as all that a node shares with its host's nodes alone
-  std::vector<Lanes3> force;               // N, of the current substep, weight apart; dynamic nodes only
-  std::vector<Lanes3> offset;              // m, from the anchors' bases to them; of the current substep
-  std::vector<Lanes3> area;                // m2, of the surface at rest, carried along; of the current substep
-  std::vector<Quad> displaced;             // m, per node: from where the host would carry it; of the current substep
+  StageArray<Lanes3> force;                // N, of the current substep, weight apart; dynamic nodes only
+  StageArray<Lanes3> offset;               // m, from the anchors' bases to them; of the current substep
+  StageArray<Lanes3> area;                 // m2, of the surface at rest, carried along; of the current substep
+  StageArray<Quad> displaced;              // m, per node: from where the host would carry it; of the current substep
   std::vector<double> swollen;             // m3, per host: between its nodes and their anchors; of the current substep
   std::vector<double> mass, inverseMass;   // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
   std::vector<NodeGroup> groups;
@@ -244,6 +245,7 @@ struct Batch {
   std::vector<int> bodies, spheres, sphereGroups, linkGroups, nodeGroups;  // groups: with anything awake in them
   std::vector<int> framedLinkGroups, bareLinkGroups;  // linkGroups: with and without frames that substeps ask for
   std::vector<HostRange> onLinks, onSpheres;
+  bool sharesStages = false;  // nothing that its stages leave is asked for between them (StageArray)
 };
 
 struct Awake {
