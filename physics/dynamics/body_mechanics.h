@@ -47,6 +47,7 @@ struct BodyMechanics {
   std::vector<double> normalExcess;          // N/m per node: what its attachment is stiffer along its normal
   std::vector<double> nodeMass;              // kg; 0 on skin
   std::vector<bool> nodeMoves;               // per node: not fixed
+  int firstLike = 0;  // the first body with this description but for pose and loads; set by World
   // Set by dampBody. s, damping over stiffness, Rayleigh's beta of links and surface; 1/s, damping over mass, his
   // alpha.
   double linkRelaxation = 0, surfaceRelaxation = 0, massDamping = 0;

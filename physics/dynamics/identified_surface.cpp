@@ -32,13 +32,14 @@ void pullOnFrames(WorldData& d, const HostRange& range) {
   Identified& s = d.identified;
   const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
   const HomeFrame home = seeHost(s, host);
+  const NodeGroup* constants = constantsOf(n, range);
   const Lanes relaxation = splat(range.relaxation);
   Lanes volume = splat(0);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const int skin = s.ofNodeGroup[g];
     const SkinPlace place = placeSkin<true>(s, s.skin[skin], statesOf(s, host));
     put(place.turn, s.turns[skin]);
-    const NodeGroup& group = n.groups[g];
+    const NodeGroup& group = constants[g];
     const Lanes3 offset = rotate(home.rotation, place.offset), area = rotate(home.rotation, group.restArea);
     const Lanes3 lever = n.position[g] - home.position, displaced = lever - offset;
     const Lanes3 rate =
@@ -59,9 +60,10 @@ void pullOnFrames(WorldData& d, const HostRange& range) {
 void returnToFrames(WorldData& d, const HostRange& range, Lanes pressure) {
   Nodes& n = d.nodes;
   FrameReturn back(d, range);
+  const EdgePull edgePull(d, range);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const Lanes3 displaced = gatherFour(n.displaced, 4 * g);
-    const Lanes3 edges = pullOfEdges(d.springs, n.displaced.data(), displaced, n.groups[g].edges, g);
+    const Lanes3 edges = edgePull.at(g, displaced);
     const Lanes3 own = fnma(pressure, n.area[g], n.force[g]), force = own + edges;
     put(force, n.force[g]);
     const Lanes minus = splat(-1);

@@ -56,7 +56,7 @@ void applySurface(const WorldData& d, ImplicitData& s, const Quad* x) {
   const Lanes h2 = splat(s.duration * s.duration);
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
     const Lanes3 own = gatherFour(displaced, 4 * g);
-    const Lanes3 edges = pullOfEdges(d.springs, displaced.data(), own, d.nodes.groups[g].edges, g);
+    const Lanes3 edges = pullOfEdges(d.springs, d.nodes.groups.data(), displaced.data(), own, g);
     storeFour(fnma(h2, edges, _mm256_loadu_pd(&s.pull[4 * g]) * own), s.given, 4 * g);
   }
   applyPressure(d, s);

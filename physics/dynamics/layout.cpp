@@ -115,7 +115,8 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
                     (onLink ? mechanics.linkBulk : mechanics.sphereBulk)[host],
                     mechanics.largestPressure,
                     -1,
-                    onFrames};
+                    onFrames,
+                    d.ranges[mechanics.firstLike].firstNodeGroup - d.ranges[b].firstNodeGroup};
     for (; k < sorted.size() && hostOf(sorted[k]) == std::pair(host, held); ++k) {
       order.body.push_back(b);
       order.node.push_back(sorted[k]);
@@ -136,6 +137,7 @@ NodeOrder orderNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) 
   const auto append = [&](bool skin, std::vector<HostRange>& onLinks, std::vector<HostRange>& onSpheres) {
     for (std::size_t b = 0; b < d.bodies.size(); ++b) {
       if ((d.bodies[b].surface == SurfaceMode::skin) != skin) continue;
+      d.ranges[b].firstNodeGroup = static_cast<int>(order.node.size()) / 4;
       appendNodes(order, d, mechanics[b], static_cast<int>(b), true, onLinks);
       appendNodes(order, d, mechanics[b], static_cast<int>(b), false, onSpheres);
     }

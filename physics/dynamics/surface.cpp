@@ -42,20 +42,22 @@ MEDULLA_INLINE void visitLink(const WorldData& d, int link, const Visit& visit) 
 void pullOnLink(WorldData& d, const HostRange& range) {
   visitLink(
       d, range.host, [&](const LinkHost& host) __attribute__((always_inline)) {
+        const NodeGroup* constants = constantsOf(d.nodes, range);
         const Lanes relaxation = splat(range.relaxation);
         Lanes volume = splat(0);
         for (int g = range.firstGroup; g < range.endGroup; ++g)
-          pullNodes(d.nodes, relaxation, d.nodes.groups[g], anchorOnLink(host, d.nodes.groups[g]), g, volume);
+          pullNodes(d.nodes, relaxation, constants[g], anchorOnLink(host, constants[g]), g, volume);
         d.nodes.swollen[range.part] = sumOfLanes(volume);
       });
 }
 
 void pullOnSphere(WorldData& d, const HostRange& range) {
   const SphereHost host = sphereHost(d, range.host);
+  const NodeGroup* constants = constantsOf(d.nodes, range);
   const Lanes relaxation = splat(range.relaxation);
   Lanes volume = splat(0);
   for (int g = range.firstGroup; g < range.endGroup; ++g)
-    pullNodes(d.nodes, relaxation, d.nodes.groups[g], anchorOnSphere(host, d.nodes.groups[g]), g, volume);
+    pullNodes(d.nodes, relaxation, constants[g], anchorOnSphere(host, constants[g]), g, volume);
   d.nodes.swollen[range.part] = sumOfLanes(volume);
 }
 
@@ -75,10 +77,10 @@ struct NodeForces {
 // displaced)^2. The host bears all forces at the anchors, and where it turns: springs pull along the lever from anchor
 // to node and turn nothing, dampers act at the node, and so do the areas, which turn with the host; edges act at the
 // anchors.
-MEDULLA_INLINE NodeForces finishForces(WorldData& d, Lanes pressure, int g) {
+MEDULLA_INLINE NodeForces finishForces(WorldData& d, const EdgePull& edgePull, Lanes pressure, int g) {
   Nodes& n = d.nodes;
   const Lanes3 displaced = gatherFour(n.displaced, 4 * g);
-  const Lanes3 edges = pullOfEdges(d.springs, n.displaced.data(), displaced, n.groups[g].edges, g);
+  const Lanes3 edges = edgePull.at(g, displaced);
   NodeForces out;
   out.force = fnma(pressure, n.area[g], n.force[g] + edges);
   out.turn = cross(n.offset[g] + displaced, out.force) - cross(displaced, edges);
@@ -91,9 +93,11 @@ void returnToLink(WorldData& d, const HostRange& range) {
       d, range.host, [&](const LinkHost& host) __attribute__((always_inline)) {
         AnchorLoads sum = noLoads();
         const Lanes pressure = splat(pressureOf(d, range));
+        const NodeGroup* constants = constantsOf(d.nodes, range);
+        const EdgePull edgePull(d, range);
         for (int g = range.firstGroup; g < range.endGroup; ++g) {
-          const NodeForces on = finishForces(d, pressure, g);
-          addLoads(host, d.nodes.groups[g], d.nodes.offset[g], on.force, on.turn, sum);
+          const NodeForces on = finishForces(d, edgePull, pressure, g);
+          addLoads(host, constants[g], d.nodes.offset[g], on.force, on.turn, sum);
         }
         setLoads(host, sum, d.links.loads[range.host]);
       });
@@ -103,8 +107,9 @@ void returnToSphere(WorldData& d, const HostRange& range) {
   const Lanes zero = splat(0);
   Lanes3 sum{zero, zero, zero}, moment = sum;
   const Lanes pressure = splat(pressureOf(d, range));
+  const EdgePull edgePull(d, range);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
-    const NodeForces on = finishForces(d, pressure, g);
+    const NodeForces on = finishForces(d, edgePull, pressure, g);
     sum = sum + on.force;
     moment = moment + on.turn;
   }

@@ -216,7 +216,7 @@ double shiftOf(const WorldData& d, std::size_t part, const std::vector<Quad>& un
   Lanes squared = zero;
   for (int g = rangeOf(d, part).firstGroup; g < rangeOf(d, part).endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
-    const Lanes3 pull = pullOfEdges(d.springs, unrest.data(), {zero, zero, zero}, group.edges, g);
+    const Lanes3 pull = pullOfEdges(d.springs, d.nodes.groups.data(), unrest.data(), {zero, zero, zero}, g);
     const Lanes moves = isLess(zero, _mm256_loadu_pd(&d.nodes.inverseMass[4 * g]));
     const Lanes give = _mm256_and_pd(moves, splat(1) / (group.stiffness + group.edges));
     squared = larger(squared, (give * give) * dot(pull, pull));

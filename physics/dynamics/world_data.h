@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -146,6 +147,7 @@ struct HostRange {
   double largestPressure;  // Pa
   int part;                // place in Nodes::swollen and SurfaceParts::parts; of dynamic nodes
   bool onFrames;           // of an identified body, among those on spheres: each node hangs on frames of its own
+  int toConstants;         // from its groups to those of the first like body, which substeps read for both
 };
 
 struct GroupHost {
@@ -168,6 +170,14 @@ struct Nodes {
   std::vector<HostRange> skinOnLinks, skinOnSpheres;  // massless nodes, behind them
   int dynamicEnd = 0;                                 // nodes [0, dynamicEnd) are dynamic
 };
+
+// Indexed by the range's own groups: the constants of the first like body. A heap of like bodies so streams through the
+// caches what moves, and hardly a constant.
+inline const NodeGroup* constantsOf(const Nodes& n, const HostRange& range) {
+  // As an integer: it may lie before the memory's beginning.
+  const std::ptrdiff_t shift = range.toConstants * static_cast<std::ptrdiff_t>(sizeof(NodeGroup));
+  return reinterpret_cast<const NodeGroup*>(reinterpret_cast<std::uintptr_t>(n.groups.data()) + shift);
+}
 
 // ---- Edge springs between dynamic nodes, each listed at both of its nodes: sums without a store, and no spring waits
 // for what another one has just added to its node.
@@ -193,6 +203,7 @@ struct BodyRange {
   std::vector<int> node;   // index in Nodes of every model node
   double restVolume = 0;   // m3, enclosed by the rest nodes
   double massDamping = 0;  // 1/s, Rayleigh's alpha
+  int firstNodeGroup = 0;  // of its nodes, which lie together
   bool held = false;       // some sphere is fixed: deformation is motion against it rather than against a rigid motion
   int batch = 0;           // bodies of different batches share no group of spheres or links
 };
