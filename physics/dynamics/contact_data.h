@@ -62,8 +62,9 @@ struct Contact {
 
 // m, from the frame of the contact's end `e` to the point of contact, moved along with its side. Not kept in the
 // contact: those of a heap outgrow a core's own cache, and all are read in every pass.
-MEDULLA_INLINE Lanes leverOf(const std::vector<Quad>& arms, const Contact& c, int e) {
-  return fma(splat(c.reach[e]), c.normal, load(arms[c.sphere[e]]));
+// `arm` is ContactData::arm of the end's sphere.
+MEDULLA_INLINE Lanes leverOf(const Quad& arm, const Contact& c, int e) {
+  return fma(splat(c.reach[e]), c.normal, load(arm));
 }
 
 struct CarriedImpulse {
@@ -71,9 +72,13 @@ struct CarriedImpulse {
   Quad impulse;  // N s, world
 };
 
-// World-frame inverse inertia of a sphere, valid in a substep with contacts.
-struct WorldInertia {
-  Quad column[3];  // 1/(kg m2); zero where rotation is fixed
+// What contacts ask of a sphere and change in it, in the world's frame: in one place, three lines of the cache, because
+// every pass asks for it once per contact of the sphere.
+struct alignas(64) ContactSphere {
+  Quad velocity;           // m/s; w: 1/kg, inverse mass
+  Quad angularVelocity;    // rad/s
+  Quad arm;                // ContactData::arm
+  Quad inverseInertia[3];  // columns, 1/(kg m2); zero where rotation is fixed
 };
 
 struct ContactData {
@@ -101,7 +106,7 @@ struct ContactData {
   std::vector<Quad> ball;  // m, per sphere: centre in the world, and radius
   std::vector<Quad> arm;   // m, per sphere: from its frame to the ball's centre; w = 0
   std::vector<Contact> contacts;
-  std::vector<WorldInertia> inertia;
+  std::vector<ContactSphere> spheres;
 
   // State: the impulses that the last substep ended with, ascending in key; the next one starts from them.
   std::vector<CarriedImpulse> carried;

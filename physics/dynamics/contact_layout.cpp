@@ -41,7 +41,7 @@ void addBalls(WorldData& d) {
   c.margin = 2 * c.freeMove + kFastest * d.substep;
   c.ball = c.restBall;
   c.arm.resize(c.ball.size());
-  c.inertia.resize(d.spheres.position.size());
+  c.spheres.resize(d.spheres.position.size());
 }
 
 // Balls that are linked never meet.

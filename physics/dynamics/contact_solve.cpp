@@ -30,63 +30,76 @@ constexpr double kGammaTimesMass = 1 / (kOmegaTimesStep * (2 * kDampingRatio + k
 constexpr int kPasses = 4;
 constexpr double kSettled = 1e-2;  // of the largest impulse
 
-// Inverse inertia in the world and angular velocity of all spheres, at the momenta of this substep.
+// Spheres as contacts see them, at the momenta of this substep.
 void prepareSpheres(WorldData& d) {
-  Spheres& s = d.spheres;
-  const Lanes zero = splat(0);
+  const Spheres& s = d.spheres;
   for (std::size_t g = 0; g < s.groups.size(); ++g) {
     const SphereGroup& group = s.groups[g];
     const std::size_t i = 4 * g;
+    ContactSphere* out = &d.contact.spheres[i];
     Lanes w;
     const Lanes3 q = gather(s.orientation[i], s.orientation[i + 1], s.orientation[i + 2], s.orientation[i + 3], w);
     const Rotation r = rotationOf(q, w);
-    const Lanes3 unit[3] = {{r.x.x, r.y.x, r.z.x}, {r.x.y, r.y.y, r.z.y}, {r.x.z, r.y.z, r.z.z}};
     const Lanes3 momentum =
         gather(s.angularMomentum[i], s.angularMomentum[i + 1], s.angularMomentum[i + 2], s.angularMomentum[i + 3]);
-    Lanes3 omega = rotate(r, timesInverseInertia(group, rotateBack(r, momentum)));
-    Lanes fourth = zero;
-    transpose(omega.x, omega.y, omega.z, fourth);
-    store(s.angularVelocity[i], omega.x);
-    store(s.angularVelocity[i + 1], omega.y);
-    store(s.angularVelocity[i + 2], omega.z);
-    store(s.angularVelocity[i + 3], fourth);
-    for (int k = 0; k < 3; ++k) {
-      Lanes3 column = group.freeToTurn * rotate(r, timesInverseInertia(group, unit[k]));
-      fourth = zero;
-      transpose(column.x, column.y, column.z, fourth);
-      store(d.contact.inertia[i].column[k], column.x);
-      store(d.contact.inertia[i + 1].column[k], column.y);
-      store(d.contact.inertia[i + 2].column[k], column.z);
-      store(d.contact.inertia[i + 3].column[k], fourth);
+    const auto put = [out](Lanes3 a, Quad& (*place)(ContactSphere&)) {
+      Lanes fourth = splat(0);
+      transpose(a.x, a.y, a.z, fourth);
+      store(place(out[0]), a.x);
+      store(place(out[1]), a.y);
+      store(place(out[2]), a.z);
+      store(place(out[3]), fourth);
+    };
+    const auto columnOf = [&](const Lanes3& unit) {
+      return group.freeToTurn * rotate(r, timesInverseInertia(group, unit));
+    };
+    put(rotate(r, timesInverseInertia(group, rotateBack(r, momentum))),
+        [](ContactSphere& a) -> Quad& { return a.angularVelocity; });
+    put(columnOf({r.x.x, r.y.x, r.z.x}), [](ContactSphere& a) -> Quad& { return a.inverseInertia[0]; });
+    put(columnOf({r.x.y, r.y.y, r.z.y}), [](ContactSphere& a) -> Quad& { return a.inverseInertia[1]; });
+    put(columnOf({r.x.z, r.y.z, r.z.z}), [](ContactSphere& a) -> Quad& { return a.inverseInertia[2]; });
+    for (int k = 0; k < 4; ++k) {
+      out[k].arm = d.contact.arm[i + k];
+      out[k].velocity = s.velocity[i + k];
+      out[k].velocity.v[3] = group.inverseMass[k];
     }
   }
 }
 
-MEDULLA_INLINE Lanes timesInertia(const WorldInertia& inertia, Lanes a) {
-  return fma(load(inertia.column[2]), splatLane<2>(a),
-             fma(load(inertia.column[1]), splatLane<1>(a), load(inertia.column[0]) * splatLane<0>(a)));
+MEDULLA_INLINE Lanes timesInverseInertia(const ContactSphere& s, Lanes a) {
+  return fma(load(s.inverseInertia[2]), splatLane<2>(a),
+             fma(load(s.inverseInertia[1]), splatLane<1>(a), load(s.inverseInertia[0]) * splatLane<0>(a)));
 }
 
+// Its w is of no meaning: directions have none.
 MEDULLA_INLINE Lanes relativeVelocity(const WorldData& d, const Contact& c) {
   Lanes v = splat(0);
   for (int e = 0; e < c.ends; ++e) {
-    const std::uint32_t i = c.sphere[e];
-    const Lanes ofEnd =
-        load(d.spheres.velocity[i]) + crossProduct(load(d.spheres.angularVelocity[i]), leverOf(d.contact.arm, c, e));
-    v = fma(splat(c.weight[e]), ofEnd, v);
+    const ContactSphere& s = d.contact.spheres[c.sphere[e]];
+    v = fma(splat(c.weight[e]), load(s.velocity) + crossProduct(load(s.angularVelocity), leverOf(s.arm, c, e)), v);
   }
   return v;
 }
 
 MEDULLA_INLINE void apply(WorldData& d, const Contact& c, Lanes impulse) {
   for (int e = 0; e < c.ends; ++e) {
+    ContactSphere& s = d.contact.spheres[c.sphere[e]];
+    const Lanes share = splat(c.weight[e]) * impulse, twist = crossProduct(leverOf(s.arm, c, e), share);
+    store(s.velocity, fma(splat(s.velocity.v[3]), share, load(s.velocity)));
+    store(s.angularVelocity, load(s.angularVelocity) + timesInverseInertia(s, twist));
+  }
+}
+
+// What contacts have made of the spheres' velocities. Angular momenta change by the whole impulses, so that what one
+// side gets the other loses, to rounding.
+void returnImpulse(WorldData& d, const Contact& c, Lanes impulse) {
+  for (int e = 0; e < c.ends; ++e) {
     const std::uint32_t i = c.sphere[e];
-    const SphereGroup& g = d.spheres.groups[i / 4];
-    const Lanes share = splat(c.weight[e]) * impulse, twist = crossProduct(leverOf(d.contact.arm, c, e), share);
-    Quad &v = d.spheres.velocity[i], &l = d.spheres.angularMomentum[i], &omega = d.spheres.angularVelocity[i];
-    store(v, fma(splat(g.inverseMass[i % 4]), share, load(v)));
-    store(l, fma(splat(g.freeToTurn[i % 4]), twist, load(l)));
-    store(omega, load(omega) + timesInertia(d.contact.inertia[i], twist));
+    const Lanes twist = crossProduct(leverOf(d.contact.arm[i], c, e), splat(c.weight[e]) * impulse);
+    Quad& l = d.spheres.angularMomentum[i];
+    store(l, fma(splat(d.spheres.groups[i / 4].freeToTurn[i % 4]), twist, load(l)));
+    d.spheres.velocity[i] = d.contact.spheres[i].velocity;
+    d.spheres.velocity[i].v[3] = 0;
   }
 }
 
@@ -94,10 +107,10 @@ MEDULLA_INLINE void apply(WorldData& d, const Contact& c, Lanes impulse) {
 Lanes mobilityAlong(const WorldData& d, const Contact& c, Lanes a) {
   Lanes sum = splat(0);
   for (int e = 0; e < c.ends; ++e) {
-    const std::uint32_t i = c.sphere[e];
-    const Lanes lever = leverOf(d.contact.arm, c, e);
-    const Lanes spin = timesInertia(d.contact.inertia[i], crossProduct(lever, a));
-    const Lanes ofEnd = fma(splat(d.spheres.groups[i / 4].inverseMass[i % 4]), a, crossProduct(spin, lever));
+    const ContactSphere& s = d.contact.spheres[c.sphere[e]];
+    const Lanes lever = leverOf(s.arm, c, e);
+    const Lanes spin = timesInverseInertia(s, crossProduct(lever, a));
+    const Lanes ofEnd = fma(splat(s.velocity.v[3]), a, crossProduct(spin, lever));
     sum = fma(splat(c.weight[e] * c.weight[e]), ofEnd, sum);
   }
   return sum;
@@ -246,10 +259,12 @@ void solveContacts(WorldData& d) {
   }
   c.carried.clear();
   for (const Contact& contact : c.contacts) {
+    const Lanes impulse = impulseOf(contact);
+    returnImpulse(d, contact, impulse);
     if (!(contact.normalImpulse > 0)) continue;
     CarriedImpulse& kept = c.carried.emplace_back();
     kept.key = contact.key;
-    store(kept.impulse, impulseOf(contact));
+    store(kept.impulse, impulse);
   }
   wakeTouched(d);
 }

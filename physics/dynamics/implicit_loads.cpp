@@ -55,7 +55,7 @@ void addContactRows(const WorldData& d, ImplicitData& s, std::size_t index) {
   const Vector3d normal(c.normal[0], c.normal[1], c.normal[2]);
   addRows(s, true, index, normal, [&](const Vector3d& axis) {
     for (int e = 0; e < c.ends; ++e) {
-      const Lanes arm = leverOf(d.contact.arm, c, e);
+      const Lanes arm = leverOf(d.contact.arm[c.sphere[e]], c, e);
       const Vector3d lever(arm[0], arm[1], arm[2]);
       addTerm(s, 2 * static_cast<int>(c.sphere[e]), c.weight[e] * axis);
       addTerm(s, 2 * static_cast<int>(c.sphere[e]) + 1, c.weight[e] * lever.cross(axis));
