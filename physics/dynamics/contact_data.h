@@ -42,29 +42,30 @@ struct StaticNeighbour {
 
 // One point of contact: up to four spheres' velocities with weights that add up to its relative velocity, and the
 // impulse that goes back to them with the same weights. Fewer than two sides where the other is static.
-struct Contact {
+// Four lines of the cache: contacts of a heap outgrow it, and all are read in every pass.
+struct alignas(64) Contact {
   std::uint64_t key;  // which pair: what ties it to the substep before
-  int ends = 0;
+  std::uint32_t ends = 0, firstSideEnds = 0;
   std::array<std::uint32_t, 4> sphere;
-  std::array<double, 4> weight;          // < 0 on the side that the normal points away from
-  std::array<double, 4> reach;           // m, from the ball's centre to the point of contact, along the normal
-  Lanes normal, tangent0;                // unit, into the second side, and across; w = 0
-  Lanes mobility;                        // 1/kg: relative velocity per impulse along the normal
-  double gap = 0;                        // m
-  double smallerRadius = 0;              // m, of the two in contact
-  double normalMobility = 0;             // 1/kg: its part along the normal
+  std::array<double, 4> weight;        // < 0 on the side that the normal points away from
+  std::array<double, 2> reach;         // m, per side: from the ball's centre to the point of contact, along the normal
+  double gap = 0;                      // m
+  double smallerRadius = 0;            // m, of the two in contact
+  Lanes normal, tangent0;              // unit, into the second side, and across; w = 0
+  double inverseNormal = 0;            // kg: of the mobility along the normal, 1/kg, and the softness together
+  double tangentMobility[2] = {0, 0};  // 1/kg: velocity across per impulse along the normal
   double inverseTangent[3] = {0, 0, 0};  // kg: inverse of the mobility in the tangent plane: 00, 11, 01
   double softness = 0;                   // 1/kg, gamma
   double bias = 0;                       // m/s
   double friction = 0;
   double normalImpulse = 0, tangentImpulse0 = 0, tangentImpulse1 = 0;  // N s
 };
+static_assert(sizeof(Contact) == 256);
 
-// m, from the frame of the contact's end `e` to the point of contact, moved along with its side. Not kept in the
-// contact: those of a heap outgrow a core's own cache, and all are read in every pass.
+// m, from the frame of the contact's end `e` to the point of contact, moved along with its side. Not kept: too large.
 // `arm` is ContactData::arm of the end's sphere.
 MEDULLA_INLINE Lanes leverOf(const Quad& arm, const Contact& c, int e) {
-  return fma(splat(c.reach[e]), c.normal, load(arm));
+  return fma(splat(c.reach[e >= static_cast<int>(c.firstSideEnds)]), c.normal, load(arm));
 }
 
 struct CarriedImpulse {
@@ -85,6 +86,7 @@ struct ContactData {
   ContactMode mode = ContactMode::none;
   // Constants.
   std::vector<Quad> restBall;           // m, per sphere: the ball's centre in its sphere's frame, and its radius
+  std::vector<int> bodyOf;              // per sphere; -1: a pad
   std::vector<double> inverseCellMass;  // 1/kg, per sphere: with what its share of the surface weighs; 0: fixed
   std::vector<Collider> colliders;
   std::vector<std::vector<std::uint32_t>> excluded;  // per collider: later ones of its body that it never meets

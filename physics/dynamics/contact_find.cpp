@@ -7,16 +7,14 @@ namespace medulla {
 
 namespace {
 
-// Adds one side to a contact: the collider's ball at `along`, the point of contact `reach` from its centre along the
-// normal. A cone's two spheres share by 1 - s and s; both carry the lever to their own ball's centre plus the same
-// way to the point, so that the weighted points of application are the point of contact itself and torques of both
-// sides cancel.
-void addSide(const Collider& of, double along, double sign, double reach, Contact& contact) {
+// Adds one side to a contact: the collider's ball at `along`. A cone's two spheres share by 1 - s and s; both carry the
+// lever to their own ball's centre plus the same way to the point, so that the weighted points of application are the
+// point of contact itself and torques of both sides cancel.
+void addSide(const Collider& of, double along, double sign, Contact& contact) {
   const auto add = [&](std::uint32_t sphere, double weight) {
     if (weight == 0) return;
     contact.sphere[contact.ends] = sphere;
     contact.weight[contact.ends] = sign * weight;
-    contact.reach[contact.ends] = reach;
     ++contact.ends;
   };
   add(of.sphere0, 1 - along);
@@ -47,8 +45,10 @@ void addContact(WorldData& d, std::uint32_t i, std::uint32_t j, double s, double
   // Two centres in one point know no direction: any will part them.
   contact.normal = distance > 1e-12 ? way / splat(distance) : Lanes{0, 1, 0, 0};
   contact.friction = c.rootFriction[a.body] * c.rootFriction[b.body];
-  addSide(a, s, -1, p.radius + 0.5 * contact.gap, contact);
-  addSide(b, t, 1, -(q.radius + 0.5 * contact.gap), contact);
+  addSide(a, s, -1, contact);
+  contact.firstSideEnds = contact.ends;
+  addSide(b, t, 1, contact);
+  contact.reach = {p.radius + 0.5 * contact.gap, -(q.radius + 0.5 * contact.gap)};
 }
 
 }  // namespace

@@ -116,8 +116,7 @@ Lanes mobilityAlong(const WorldData& d, const Contact& c, Lanes a) {
   return sum;
 }
 
-// What completes the frame of normal and tangent0. Not kept: contacts of a heap outgrow the second-level cache, and all
-// are read in every pass.
+// What completes the frame of normal and tangent0.
 MEDULLA_INLINE Lanes tangent1(const Contact& c) {
   return crossProduct(c.normal, c.tangent0);
 }
@@ -139,9 +138,10 @@ bool prepare(const WorldData& d, Contact& c) {
   const ContactLaw law = contactLaw(d, c, h);
   c.bias = law.bias;
   if (!(c.gap > 0)) c.softness = law.softness;  // until they touch: no further than that, and hard
-  c.mobility = mobilityAlong(d, c, c.normal);
-  c.normalMobility = dotProduct(c.mobility, c.normal);
-  if (!(c.normalMobility > 0)) return false;
+  const Lanes mobility = mobilityAlong(d, c, c.normal);
+  const double alongNormal = dotProduct(mobility, c.normal);
+  if (!(alongNormal > 0)) return false;
+  c.inverseNormal = 1 / (alongNormal + c.softness);
   chooseTangent(c);
   if (c.friction == 0) return true;
   const Lanes across = tangent1(c), mobility0 = mobilityAlong(d, c, c.tangent0),
@@ -152,6 +152,8 @@ bool prepare(const WorldData& d, Contact& c) {
     c.friction = 0;
     return true;
   }
+  c.tangentMobility[0] = dotProduct(mobility, c.tangent0);
+  c.tangentMobility[1] = dotProduct(mobility, across);
   c.inverseTangent[0] = k11 / determinant;
   c.inverseTangent[1] = k00 / determinant;
   c.inverseTangent[2] = -k01 / determinant;
@@ -192,17 +194,17 @@ void startFrom(WorldData& d, const std::vector<CarriedImpulse>& carried) {
 // One contact's turn: first the normal impulse, then Coulomb's friction, which is what it takes to stop the sliding as
 // long as that is no more than friction times the normal impulse. Returns the size of the change, N s.
 double settle(WorldData& d, Contact& c) {
-  Lanes v = relativeVelocity(d, c);
-  const double wanted = c.normalImpulse - (dotProduct(v, c.normal) + c.bias + c.softness * c.normalImpulse) /
-                                              (c.normalMobility + c.softness);
+  const Lanes v = relativeVelocity(d, c);
+  const double wanted =
+      c.normalImpulse - (dotProduct(v, c.normal) + c.bias + c.softness * c.normalImpulse) * c.inverseNormal;
   const double next = std::max(0.0, wanted), change = next - c.normalImpulse;
   c.normalImpulse = next;
   Lanes impulse = splat(change) * c.normal;
   double size = std::abs(change);
   if (c.friction > 0) {
-    v = fma(splat(change), c.mobility, v);
     const Lanes across = tangent1(c);
-    const double v0 = dotProduct(v, c.tangent0), v1 = dotProduct(v, across);
+    const double v0 = dotProduct(v, c.tangent0) + change * c.tangentMobility[0],
+                 v1 = dotProduct(v, across) + change * c.tangentMobility[1];
     const double before0 = c.tangentImpulse0, before1 = c.tangentImpulse1;
     c.tangentImpulse0 -= c.inverseTangent[0] * v0 + c.inverseTangent[2] * v1;
     c.tangentImpulse1 -= c.inverseTangent[2] * v0 + c.inverseTangent[1] * v1;

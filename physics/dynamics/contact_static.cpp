@@ -12,12 +12,6 @@ using Eigen::Vector3d;
 
 constexpr std::uint64_t kStaticKey = std::uint64_t{1} << 63;
 
-int bodyOfSphere(const WorldData& d, std::uint32_t sphere) {
-  const auto after = std::upper_bound(d.ranges.begin(), d.ranges.end(), static_cast<int>(sphere),
-                                      [](int i, const BodyRange& r) { return i < r.firstSphere; });
-  return static_cast<int>(after - d.ranges.begin()) - 1;
-}
-
 struct Nearest {
   double distance;  // m, of the ball's centre from the surface; < 0 behind it
   Vector3d normal;  // unit, world, away from the shape
@@ -120,7 +114,7 @@ Touches touchesOf(const SurfaceTree& tree, const TriangleDistance* begin, const 
 void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int ordinal) {
   ContactData& c = d.contact;
   const Quad& ball = c.ball[n.sphere];
-  const int body = bodyOfSphere(d, n.sphere);
+  const int body = c.bodyOf[n.sphere];
   Contact& contact = c.contacts.emplace_back();
   contact.key =
       kStaticKey | std::uint64_t{n.shape} << 34 | std::uint64_t{n.sphere} << 2 | static_cast<std::uint64_t>(ordinal);
@@ -131,14 +125,14 @@ void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int o
   contact.ends = 1;
   contact.sphere[0] = n.sphere;
   contact.weight[0] = 1;
-  contact.reach[0] = -(ball.v[3] + 0.5 * contact.gap);
+  contact.reach[1] = -(ball.v[3] + 0.5 * contact.gap);
 }
 
 }  // namespace
 
 std::array<int, 2> bodiesOf(const WorldData& d, std::uint64_t key) {
   const std::vector<Collider>& colliders = d.contact.colliders;
-  if (key & kStaticKey) return {bodyOfSphere(d, static_cast<std::uint32_t>(key >> 2)), -1};
+  if (key & kStaticKey) return {d.contact.bodyOf[static_cast<std::uint32_t>(key >> 2)], -1};
   return {colliders[key >> 32].body, colliders[key & 0xffffffff].body};
 }
 
@@ -149,7 +143,7 @@ void listStaticNeighbours(WorldData& d) {
   for (std::uint32_t k = 0; k < c.statics.size(); ++k) {
     const StaticContactShape& shape = c.statics[k];
     for (std::uint32_t i = 0; i < c.ball.size(); ++i) {
-      if (c.inverseCellMass[i] == 0 || d.rest[bodyOfSphere(d, i)].asleep) continue;  // fixed or a pad, or asleep
+      if (c.inverseCellMass[i] == 0 || d.rest[c.bodyOf[i]].asleep) continue;  // fixed or a pad, or asleep
       const Vector3d p = vectorOf(c.ball[i]);
       const double radius = c.ball[i].v[3];
       const int first = static_cast<int>(c.nearTriangles.size());
