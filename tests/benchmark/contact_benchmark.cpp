@@ -32,6 +32,7 @@ std::vector<StaticShape> caseOf(const Eigen::Vector3d& size) {
 
 struct Packing {
   int columns = 1, depth = 2;  // rods side by side along x (their length) and z; layers are stacked as needed
+  bool alike = true;           // or each has a model of its own: like bodies share their constants
 };
 
 Packing cubeOf(int spheres) {
@@ -44,12 +45,16 @@ Packing troughOf(int spheres) {
   return {1, (spheres / 4 + 1) / 2};
 }
 
+Packing unlikeInTrough(int spheres) {
+  return {1, (spheres / 4 + 1) / 2, false};
+}
+
 World packedRods(int spheres, ContactMode mode, const Packing& packing) {
   const auto rod = synthetic::chainModel(synthetic::straightTube(4, 3 * kPitch, kRadius, 5, 8));
   const int rods = spheres / 4, columns = packing.columns, depth = packing.depth;
   std::vector<BodyDescription> bodies;
   for (int k = 0; k < rods; ++k) {
-    bodies.push_back(synthetic::body(rod, 5e3));
+    bodies.push_back(synthetic::body(packing.alike ? rod : std::make_shared<SoftBodyModel>(*rod), 5e3));
     const int x = k % columns, z = k / columns % depth, y = k / columns / depth;
     bodies.back().worldFromModel.translation() =
         Eigen::Vector3d(kRadius + 4 * kPitch * x, kRadius + kPitch * y, kRadius + kPitch * z);
@@ -93,6 +98,8 @@ BENCHMARK_CAPTURE(packedSubstep, cubeBalls, ContactMode::balls, cubeOf)->Apply(f
 BENCHMARK_CAPTURE(packedSubstep, cubeSwept, ContactMode::swept, cubeOf)->Apply(fromFortyToTenThousand);
 BENCHMARK_CAPTURE(packedSubstep, troughBalls, ContactMode::balls, troughOf)->Apply(fromFortyToTenThousand);
 BENCHMARK_CAPTURE(packedSubstep, troughSwept, ContactMode::swept, troughOf)->Apply(fromFortyToTenThousand);
+BENCHMARK_CAPTURE(packedSubstep, unlikeNone, ContactMode::none, unlikeInTrough)->Apply(fromFortyToTenThousand);
+BENCHMARK_CAPTURE(packedSubstep, unlikeSwept, ContactMode::swept, unlikeInTrough)->Apply(fromFortyToTenThousand);
 
 static void contactStage(benchmark::State& state, ContactMode mode, void (*stage)(WorldData&)) {
   const int spheres = static_cast<int>(state.range(0));
