@@ -4,6 +4,7 @@
 #include "physics/dynamics/identified_measures.h"
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"
+#include "physics/dynamics/link_blocks.h"
 #include "physics/dynamics/skin_map.h"
 
 // Identified links and skins in an implicit step: G^T K G of the measures, and the skins' map with its transpose.
@@ -52,34 +53,49 @@ Column timesStiffness(const IdentifiedLinkGroup& link, const Column& a) {
   return out;
 }
 
+// scale a^T K b for the three columns each from a and b on.
+Matrix3Lanes product(const Column* a, const Column* kb, Lanes scale) {
+  Lanes entry[3][3];
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      entry[i][j] = a[i].c[0] * kb[j].c[0];
+      for (int e = 1; e < 6; ++e) entry[i][j] = fma(a[i].c[e], kb[j].c[e], entry[i][j]);
+      entry[i][j] = scale * entry[i][j];
+    }
+  }
+  Matrix3Lanes out;
+  for (int i = 0; i < 3; ++i) out.row[i] = {entry[i][0], entry[i][1], entry[i][2]};
+  return out;
+}
+
+void setBlocks(const IdentifiedLinkGroup& link, const Column (&g)[9], Lanes scale, LinkBlocks& to) {
+  Column kg[9];
+  for (int j = 0; j < 9; ++j) kg[j] = timesStiffness(link, g[j]);
+  to.line = product(g, kg, scale);
+  to.line0 = product(g, kg + 3, scale);
+  to.line1 = product(g, kg + 6, scale);
+  to.turn0 = product(g + 3, kg + 3, scale);
+  to.between = product(g + 3, kg + 6, scale);
+  to.turn1 = product(g + 6, kg + 6, scale);
+}
+
 }  // namespace
 
 void addIdentifiedStiffness(const WorldData& d, ImplicitData& s) {
   const Identified& identified = d.identified;
-  std::size_t pair = d.links.count;
+  int next = d.links.count;
   for (const IdentifiedLinkGroup& link : identified.links) {
     const FrameState* frames = identified.frames.data();
     const LinkTurn m = measureLink(link, gatherFrames(frames, link.frame0), gatherFrames(frames, link.frame1));
     Column g[9];
     setColumns(link, m, gatherArms(identified.carried, link.frame0), gatherArms(identified.carried, link.frame1), g);
-    const Lanes h = splat(s.duration), scale = h * (h + link.relaxation);
-    Lanes product[9][9];
-    for (int j = 0; j < 9; ++j) {
-      const Column kg = timesStiffness(link, g[j]);
-      for (int i = 0; i <= j; ++i) {
-        Lanes sum = g[i].c[0] * kg.c[0];
-        for (int e = 1; e < 6; ++e) sum = fma(g[i].c[e], kg.c[e], sum);
-        product[i][j] = product[j][i] = scale * sum;
-      }
-    }
-    for (int lane = 0; lane < 4; ++lane) {
-      if (link.frame0[lane] == link.frame1[lane]) continue;  // fills the group up
-      LinkMatrix matrix;
-      for (int i = 0; i < 9; ++i)
-        for (int j = 0; j < 9; ++j) matrix(i, j) = product[i][j][lane];
-      addLinkMatrix(matrix, s, pair);
-      ++pair;
-    }
+    const Lanes h = splat(s.duration);
+    LinkBlocks blocks;
+    setBlocks(link, g, h * (h + link.relaxation), blocks);
+    int pair[4];
+    for (int lane = 0; lane < 4; ++lane)  // some fill the group up
+      pair[lane] = link.frame0[lane] == link.frame1[lane] ? -1 : next++;
+    addLinkBlocks(blocks, pair, s);
   }
 }
 

@@ -19,6 +19,10 @@ struct StageStart {
   Motion motion;  // angular velocities are the first guess only: angularMomentum is what forces add to
 };
 
+struct InertiaGroup {  // kg m2, sphere frames: xx, yy, zz, xy, xz, yz; 0 on pads
+  Lanes entry[6];
+};
+
 // One direction of a load at a point: its velocity is the sum of coefficient . motion[quad], and impulses return by the
 // same coefficients. `weight` (kg) is impulse per velocity.
 struct LoadRow {
@@ -38,7 +42,7 @@ struct ImplicitData {
   double duration = 0;  // s, of a stage
   // Constants.
   std::vector<Quad> freedom;              // as Motion: 1, or 0 where a freedom is held or led
-  std::vector<Eigen::Matrix3d> inertia;   // kg m2, per sphere, in its frame
+  std::vector<InertiaGroup> inertia;      // four spheres each
   std::vector<double> pull, carriedMass;  // kg, per node: the attachments' share; what a host feels of node and spring
   std::vector<double> nodeMobility;       // 1/kg, per node: of itself, its attachment and its edges; 0: held
   std::vector<std::array<int, 2>> pairs;  // spheres of each link, identified ones last; -1: held

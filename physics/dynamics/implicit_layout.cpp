@@ -39,12 +39,15 @@ void layOutNodes(const WorldData& d, ImplicitData& s) {
 
 void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
   s.duration = duration;
+  s.inertia.resize(d.spheres.groups.size(), InertiaGroup{});
   for (int i = 0; i < d.spheres.count; ++i) {
     const SphereGroup& g = d.spheres.groups[i / 4];
     const int l = i % 4;
     s.freedom.push_back(all(g.inverseMass[l] > 0));
     s.freedom.push_back(all(g.freeToTurn[l] > 0));
-    s.inertia.push_back(inverseInertiaOf(g, l).inverse());
+    const Eigen::Matrix3d m = inverseInertiaOf(g, l).inverse();
+    const double entries[6] = {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)};
+    for (int e = 0; e < 6; ++e) s.inertia[i / 4].entry[e][l] = entries[e];
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) s.freedom.push_back(all(d.nodes.inverseMass[i] > 0));
   layOutNodes(d, s);

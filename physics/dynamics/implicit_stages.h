@@ -5,6 +5,8 @@
 // The stages of an implicit step, in their order. All work on the state as it stands in WorldData.
 namespace medulla {
 
+struct LinkBlocks;  // link_blocks.h
+
 // implicit_layout.cpp: what never changes; `duration` is that of a stage (s).
 void layOutImplicit(const WorldData& d, double duration, ImplicitData& s);
 
@@ -27,9 +29,8 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& loads);  // 
 
 // link_stiffness.cpp: adds the links' stiffness and damping, times the squared duration, to `diagonal`; sets `beside`.
 void addLinkStiffness(const WorldData& d, ImplicitData& s);
-// Of one link by the line between its ends and the turning of its spheres, `pair`-th in ImplicitData::pairs.
-using LinkMatrix = Eigen::Matrix<double, 9, 9>;
-void addLinkMatrix(const LinkMatrix& m, ImplicitData& s, std::size_t pair);
+// Of four links, whose places in ImplicitData::pairs are `pair`; -1: none.
+void addLinkBlocks(const LinkBlocks& m, const int (&pair)[4], ImplicitData& s);
 
 // identified_implicit.cpp: the same of links and nodes between frames.
 void addIdentifiedStiffness(const WorldData& d, ImplicitData& s);

@@ -16,27 +16,57 @@ namespace medulla {
 
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kGamma = 0.29289321881345248;  // 1 - 1/sqrt(2)
 
-// exp(turn) q
-Quad turned(const Quad& q, const Vector3d& turn) {
-  const double angle = turn.norm();
-  if (!(angle > 0)) return q;
-  Lanes c, s;
-  cosineSine(splat(0.5 * angle), c, s);
-  const Vector3d axis = s[0] / angle * turn;
-  const Quaterniond out = (Quaterniond(c[0], axis.x(), axis.y(), axis.z()) * quaternionOf(q)).normalized();
-  return {{out.x(), out.y(), out.z(), out.w()}};
+struct Orientation {
+  Lanes3 q;
+  Lanes w;
+};
+
+Orientation gatherOrientations(const std::vector<Quad>& q, std::size_t i) {
+  Orientation out;
+  out.q = gather(q[i], q[i + 1], q[i + 2], q[i + 3], out.w);
+  return out;
 }
 
-Vector3d angularMomentum(const ImplicitData& s, const Quad& orientation, int sphere, const Vector3d& omega) {
-  const Matrix3d r = quaternionOf(orientation).toRotationMatrix();
-  const Vector3d inSphere = s.inertia[sphere] * (r.transpose() * omega);
-  return r * inSphere;
+// exp(turn) q; what does not turn keeps its bits.
+Orientation turned(const Orientation& from, const Lanes3& turn) {
+  const Lanes zero = splat(0);
+  const Lanes angle = squareRoot(dot(turn, turn)), half = splat(0.5) * angle, turns = isLess(zero, angle);
+  Lanes c, s;
+  if (any(isLess(splat(kSmallAngle), half))) {
+    cosineSine(half, c, s);
+  } else {
+    smallCosineSine(half, c, s);
+  }
+  const Lanes3 axis = (s / select(turns, angle, splat(1))) * turn;
+  const Lanes3 q = fma(c, from.q, fma(from.w, axis, cross(axis, from.q)));
+  const Lanes w = c * from.w - dot(axis, from.q);
+  const Lanes scale = splat(1) / squareRoot(fma(w, w, dot(q, q)));
+  const Lanes3 unit = scale * q;
+  return {{select(turns, unit.x, from.q.x), select(turns, unit.y, from.q.y), select(turns, unit.z, from.q.z)},
+          select(turns, scale * w, from.w)};
+}
+
+// Of the four spheres of a group as they stand.
+Lanes3 angularMomenta(const WorldData& d, const ImplicitData& s, std::size_t group) {
+  const Orientation o = gatherOrientations(d.spheres.orientation, 4 * group);
+  const Rotation r = rotationOf(o.q, o.w);
+  const Lanes3 omega = gatherFour(d.spheres.angularVelocity, 4 * group);
+  return rotate(r, timesSymmetric(s.inertia[group].entry, rotateBack(r, omega)));
+}
+
+// `visit(sphere, momentum)` of every sphere.
+template <class Visit>
+void visitAngularMomenta(const WorldData& d, const ImplicitData& s, const Visit& visit) {
+  for (int i = 0; i < d.spheres.count; i += 4) {
+    const Lanes3 momenta = angularMomenta(d, s, i / 4);
+    Lanes l[4] = {momenta.x, momenta.y, momenta.z, splat(0)};
+    transpose(l[0], l[1], l[2], l[3]);
+    for (int k = 0; k < std::min(4, d.spheres.count - i); ++k) visit(i + k, l[k]);
+  }
 }
 
 // out = a + f b, three numbers each
@@ -47,9 +77,9 @@ void addTo(const Quad& a, double f, const Quad& b, Quad& out) {
 // The present state becomes the one that the stage sets out from.
 void beginHere(const WorldData& d, StageStart& start) {
   const Spheres& s = d.spheres;
-  start.position.assign(s.position.begin(), s.position.begin() + s.count);
-  start.orientation.assign(s.orientation.begin(), s.orientation.begin() + s.count);
-  start.angularMomentum.assign(s.angularMomentum.begin(), s.angularMomentum.begin() + s.count);
+  start.position = s.position;
+  start.orientation = s.orientation;
+  start.angularMomentum = s.angularMomentum;
   start.nodePosition.assign(d.nodes.position.begin(), d.nodes.position.begin() + d.nodes.dynamicEnd / 4);
   start.unwoundTwist = d.links.unwoundTwist;
   for (int i = 0; i < s.count; ++i) {
@@ -63,11 +93,17 @@ void beginHere(const WorldData& d, StageStart& start) {
 void place(WorldData& d, const ImplicitData& s, double time) {
   Spheres& to = d.spheres;
   for (int i = 0; i < to.count; ++i) {
-    const Quad &v = s.motion[2 * i], &omega = s.motion[2 * i + 1];
+    const Quad& v = s.motion[2 * i];
     addTo(s.start.position[i], time, v, to.position[i]);
-    to.orientation[i] = turned(s.start.orientation[i], time * vectorOf(omega));
     to.velocity[i] = v;
-    to.angularVelocity[i] = omega;
+    to.angularVelocity[i] = s.motion[2 * i + 1];
+  }
+  for (std::size_t i = 0; i < to.orientation.size(); i += 4) {
+    const Orientation now =
+        turned(gatherOrientations(s.start.orientation, i), splat(time) * gatherFour(to.angularVelocity, i));
+    Lanes q[4] = {now.q.x, now.q.y, now.q.z, now.w};
+    transpose(q[0], q[1], q[2], q[3]);
+    for (int l = 0; l < 4; ++l) store(to.orientation[i + l], q[l]);
   }
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
     d.nodes.velocity[g] = gatherFour(s.motion, 2 * to.count + 4 * g);
@@ -79,20 +115,20 @@ void place(WorldData& d, const ImplicitData& s, double time) {
 // M u - p0 - T f at the placed state, without loads at points.
 void balanceForces(WorldData& d, const ImplicitData& s, Motion& out) {
   runStage(d, evaluateForces);
-  const double t = s.duration;
+  const Lanes t = splat(s.duration);
   for (int i = 0; i < d.spheres.count; ++i) {
-    const double mass = d.spheres.groups[i / 4].mass[i % 4];
-    const Vector3d v = vectorOf(s.motion[2 * i]) - vectorOf(s.start.motion[2 * i]);
-    out[2 * i] = quadOf(mass * v - t * vectorOf(d.spheres.force[i]));
-    out[2 * i + 1] = quadOf(angularMomentum(s, d.spheres.orientation[i], i, vectorOf(s.motion[2 * i + 1])) -
-                            vectorOf(s.start.angularMomentum[i]) - t * vectorOf(d.spheres.torque[i]));
+    const Lanes mass = splat(d.spheres.groups[i / 4].mass[i % 4]);
+    const Lanes v = load(s.motion[2 * i]) - load(s.start.motion[2 * i]);
+    store(out[2 * i], mass * v - t * load(d.spheres.force[i]));
   }
-  const Vector3d gravity = vectorOf(d.gravity);
-  for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
-    const int k = 2 * d.spheres.count + i;
-    const double m = d.nodes.mass[i];
-    out[k] = quadOf(m * (vectorOf(s.motion[k]) - vectorOf(s.start.motion[k]) - t * gravity) -
-                    t * vectorAt(d.nodes.force, i));
+  visitAngularMomenta(d, s, [&](int i, Lanes momentum) {
+    store(out[2 * i + 1], momentum - load(s.start.angularMomentum[i]) - t * load(d.spheres.torque[i]));
+  });
+  const Lanes3 fallen = t * splat(d.gravity);
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
+    const std::size_t k = 2 * static_cast<std::size_t>(d.spheres.count) + 4 * g;
+    const Lanes3 gained = gatherFour(s.motion, k) - gatherFour(s.start.motion, k) - fallen;
+    storeFour(_mm256_loadu_pd(&d.nodes.mass[4 * g]) * gained - t * d.nodes.force[g], out, k);
   }
 }
 
@@ -206,11 +242,10 @@ ImplicitData& implicitLevel(WorldData& d, std::size_t level) {
 // by the velocity and the force found there.
 void beginSecondStage(WorldData& d, ImplicitData& s, double late) {
   const double gain = (1 - kGamma) / kGamma;  // p1 - p0 is the force times the first stage's duration
-  for (int i = 0; i < d.spheres.count; ++i) {
-    Quad& start = s.start.angularMomentum[i];
-    const Vector3d end = angularMomentum(s, d.spheres.orientation[i], i, vectorOf(s.motion[2 * i + 1]));
-    start = quadOf(vectorOf(start) + gain * (end - vectorOf(start)));
-  }
+  visitAngularMomenta(d, s, [&](int i, Lanes end) {
+    const Lanes start = load(s.start.angularMomentum[i]);
+    store(s.start.angularMomentum[i], fma(splat(gain), end - start, start));
+  });
   place(d, s, late);
   for (std::size_t i = 0; i < s.motion.size(); ++i) {
     const Lanes start = load(s.start.motion[i]);
@@ -226,11 +261,10 @@ void beginSecondStage(WorldData& d, ImplicitData& s, double late) {
 // J
 double kineticEnergy(const WorldData& d, const ImplicitData& s) {
   double kinetic = 0;
-  for (int i = 0; i < d.spheres.count; ++i) {
-    const Vector3d omega = vectorOf(d.spheres.angularVelocity[i]);
+  visitAngularMomenta(d, s, [&](int i, Lanes momentum) {
     kinetic += d.spheres.groups[i / 4].mass[i % 4] * vectorOf(d.spheres.velocity[i]).squaredNorm() +
-               omega.dot(angularMomentum(s, d.spheres.orientation[i], i, omega));
-  }
+               dotProduct(load(d.spheres.angularVelocity[i]), momentum);
+  });
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) kinetic += d.nodes.mass[i] * vectorAt(d.nodes.velocity, i).squaredNorm();
   return 0.5 * kinetic;
 }
@@ -266,9 +300,9 @@ void slowDown(WorldData& d, double share) {
 // Puts back the state that `start` holds.
 void restore(WorldData& d, const StageStart& start) {
   Spheres& s = d.spheres;
-  std::copy(start.position.begin(), start.position.end(), s.position.begin());
-  std::copy(start.orientation.begin(), start.orientation.end(), s.orientation.begin());
-  std::copy(start.angularMomentum.begin(), start.angularMomentum.end(), s.angularMomentum.begin());
+  s.position = start.position;
+  s.orientation = start.orientation;
+  s.angularMomentum = start.angularMomentum;
   std::copy(start.nodePosition.begin(), start.nodePosition.end(), d.nodes.position.begin());
   d.links.unwoundTwist = start.unwoundTwist;
   for (int i = 0; i < s.count; ++i) {
@@ -304,9 +338,7 @@ bool attempt(WorldData& d, ImplicitData& s, std::size_t level, const Loads& load
   if (settled || level > kMustSettle) settled = runStage(d, s, {&loads, time.end, time.remaining});
   addToolImpulses(d, s.duration, s.toolImpulses);
   if (!settled && level <= kMustSettle) return false;
-  for (int i = 0; i < d.spheres.count; ++i)
-    d.spheres.angularMomentum[i] =
-        quadOf(angularMomentum(s, d.spheres.orientation[i], i, vectorOf(s.motion[2 * i + 1])));
+  visitAngularMomenta(d, s, [&](int i, Lanes momentum) { store(d.spheres.angularMomentum[i], momentum); });
   // Backward Euler loses energy where the potential is convex; elsewhere this decides. Order 2 swings about it.
   const double given = workOf(d, s), elastic = elasticEnergy(d), kinetic = kineticEnergy(d, s);
   const double scale = energyBefore + std::abs(given), allowed = energyBefore + given - elastic;

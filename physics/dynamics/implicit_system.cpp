@@ -4,6 +4,7 @@
 
 #include "physics/dynamics/edge_springs.h"
 #include "physics/dynamics/implicit_stages.h"
+#include "physics/dynamics/link_blocks.h"
 
 // The linear system of an implicit stage. With J the map from the motion of the spheres to that of the anchors, S the
 // spheres' masses and links, M the nodes' masses and G the springs of the surface (attachments and edges, constant
@@ -26,6 +27,11 @@ Vector6 blockOf(const Motion& m, std::size_t sphere) {
 void putBlock(const Vector6& b, Motion& m, std::size_t sphere) {
   m[2 * sphere] = {{b[0], b[1], b[2], 0}};
   m[2 * sphere + 1] = {{b[3], b[4], b[5], 0}};
+}
+
+// Some of the sphere's freedoms are.
+bool isHeld(const ImplicitData& s, std::size_t sphere) {
+  return s.freedom[2 * sphere].v[0] == 0 || s.freedom[2 * sphere + 1].v[0] == 0;
 }
 
 // Adds the hosts' pressures, each a row of rank one, to the impulses `given` of what stands in `carried`. The factor of
@@ -84,21 +90,24 @@ void lumpRows(const WorldData& d, ImplicitData& s) {
 // Held freedoms: a row and column of the unit matrix.
 void loadFactor(const WorldData& d, ImplicitData& s) {
   s.spheres.setZero();
-  const auto mask = [&s](int sphere) {
-    Vector6 m = blockOf(s.freedom, sphere);
-    return m;
-  };
   for (int i = 0; i < d.spheres.count; ++i) {
-    const Vector6 m = mask(i);
     Block6& to = s.spheres.diagonal(i);
+    to = s.lumped[i];
+    if (!isHeld(s, i)) continue;
+    const Vector6 m = blockOf(s.freedom, i);
     to = m.asDiagonal() * s.lumped[i] * m.asDiagonal();
     for (int k = 0; k < 6; ++k)
       if (m[k] == 0) to(k, k) = 1;
   }
   int blocks = 0;
   for (std::size_t k = 0; k < s.pairs.size(); ++k) {
-    if (s.pairs[k][1] < 0) continue;
-    const Vector6 m0 = mask(s.pairs[k][0]), m1 = mask(s.pairs[k][1]);
+    const auto [i, j] = s.pairs[k];
+    if (j < 0) continue;
+    if (!isHeld(s, i) && !isHeld(s, j)) {
+      s.spheres.addBlock(blocks++, s.lumpedBeside[k]);
+      continue;
+    }
+    const Vector6 m0 = blockOf(s.freedom, i), m1 = blockOf(s.freedom, j);
     s.spheres.addBlock(blocks++, m0.asDiagonal() * s.lumpedBeside[k] * m1.asDiagonal());
   }
 }
@@ -143,14 +152,31 @@ void addScaled(double f, const Motion& b, Motion& a) {
   for (std::size_t i = 0; i < a.size(); ++i) store(a[i], fma(splat(f), load(b[i]), load(a[i])));
 }
 
-void assembleSystem(WorldData& d, ImplicitData& s) {
-  for (int i = 0; i < d.spheres.count; ++i) {
-    Block6& b = s.diagonal[i];
-    const Eigen::Matrix3d r = quaternionOf(d.spheres.orientation[i]).toRotationMatrix();
-    b.setZero();
-    b.topLeftCorner<3, 3>().diagonal().setConstant(d.spheres.groups[i / 4].mass[i % 4]);
-    b.bottomRightCorner<3, 3>() = r * s.inertia[i] * r.transpose();
+static void setMasses(const WorldData& d, ImplicitData& s) {
+  const Lanes zero = splat(0);
+  const Matrix3Lanes none = zeroMatrix();
+  for (int i = 0; i < d.spheres.count; i += 4) {
+    const Spheres& from = d.spheres;
+    Lanes w;
+    const Lanes3 q =
+        gather(from.orientation[i], from.orientation[i + 1], from.orientation[i + 2], from.orientation[i + 3], w);
+    const Rotation r = rotationOf(q, w);
+    const Lanes(&inertia)[6] = s.inertia[i / 4].entry;
+    const Lanes mass = from.groups[i / 4].mass;
+    Matrix3Lanes turning = none;  // R I R^T, of the columns of R and of R I
+    addOuter(rotate(r, {inertia[0], inertia[3], inertia[4]}), r.x, turning);
+    addOuter(rotate(r, {inertia[3], inertia[1], inertia[5]}), r.y, turning);
+    addOuter(rotate(r, {inertia[4], inertia[5], inertia[2]}), r.z, turning);
+    const int end = std::min(4, from.count - i);
+    visitBlocks({{{mass, zero, zero}, {zero, mass, zero}, {zero, zero, mass}}}, none, none, turning,
+                [&](int lane, int k, Lanes quad) {
+                  if (lane < end) _mm256_storeu_pd(s.diagonal[i + lane].data() + 4 * k, quad);
+                });
   }
+}
+
+void assembleSystem(WorldData& d, ImplicitData& s) {
+  setMasses(d, s);
   addLinkStiffness(d, s);
   s.lumped = s.diagonal;
   s.lumpedBeside = s.beside;

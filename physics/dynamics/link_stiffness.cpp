@@ -1,5 +1,6 @@
 #include "physics/dynamics/angles.h"
 #include "physics/dynamics/implicit_stages.h"
+#include "physics/dynamics/link_blocks.h"
 
 // The links' stiffness matrices: G^T K G with the gradients G of their measures and K the stiffnesses between them
 // (Gauss and Newton), plus what a tension adds across the line. Both are positive semidefinite at any pose, so that
@@ -9,22 +10,9 @@ namespace medulla {
 
 namespace {
 
-// Gradient of a measure by the line between the link's ends and by the two spheres' turning about their frames.
-struct Row {
-  Lanes3 line, turn0, turn1;
-};
-
-struct Frame {
-  Lanes3 n, arm0, arm1;
-  Lanes inverseLength;
-};
-
-Row rowOf(const Frame& f, const Lanes3& byLine, const Lanes3& turn0, const Lanes3& turn1) {
-  return {byLine, turn0 - cross(f.arm0, byLine), turn1 + cross(f.arm1, byLine)};
-}
-
-Row rowByDirection(const Frame& f, const Lanes3& byN, const Lanes3& turn0, const Lanes3& turn1) {
-  return rowOf(f, f.inverseLength * fnma(dot(f.n, byN), f.n, byN), turn0, turn1);
+// Gradient by the line of what has the gradient `byN` by its direction.
+MEDULLA_INLINE Lanes3 lineGradient(const LinkFrame& f, const Lanes3& byN) {
+  return f.inverseLength * fnma(dot(f.n, byN), f.n, byN);
 }
 
 // d(f n.u) and d(f n.v) by n: link_force.cpp, flexionRate.
@@ -41,34 +29,18 @@ EndGradients endGradients(const LinkGroup& g, const Spheres& s, const std::uint3
   return {fnma(angle.slope * dot(n, u), t, angle.value * u), fnma(angle.slope * dot(n, v), t, angle.value * v)};
 }
 
-struct Matrix9 {  // upper triangle, row after row: line, turn0, turn1
-  Lanes entry[45];
+// Gradients of an end's two flexions: by the line, and by the turning of its own sphere.
+struct EndRows {
+  Lanes3 lineA, lineB, turnA, turnB;
 };
 
-void components(const Row& r, Lanes (&c)[9]) {
-  const Lanes3* parts[3] = {&r.line, &r.turn0, &r.turn1};
-  for (int k = 0; k < 3; ++k) {
-    c[3 * k] = parts[k]->x;
-    c[3 * k + 1] = parts[k]->y;
-    c[3 * k + 2] = parts[k]->z;
-  }
+MEDULLA_INLINE EndRows endRows(const LinkGroup& g, const Spheres& s, const std::uint32_t* i, const LinkFrame& f) {
+  const EndGradients e = endGradients(g, s, i, f.n);
+  return {lineGradient(f, e.a), lineGradient(f, e.b), cross(e.a, f.n), cross(e.b, f.n)};
 }
 
-void addProduct(Matrix9& m, const Row& left, const Row& right) {
-  Lanes a[9], b[9];
-  components(left, a);
-  components(right, b);
-  int e = 0;
-  for (int i = 0; i < 9; ++i)
-    for (int j = i; j < 9; ++j, ++e) m.entry[e] = fma(a[i], b[j], m.entry[e]);
-}
-
-Row scaled(Lanes s, const Row& r) {
-  return {s * r.line, s * r.turn0, s * r.turn1};
-}
-Row combined(Lanes a, const Row& r, Lanes b, const Row& s, Lanes c, const Row& t) {
-  const auto sum = [&](const Lanes3& x, const Lanes3& y, const Lanes3& z) { return fma(c, z, fma(b, y, a * x)); };
-  return {sum(r.line, s.line, t.line), sum(r.turn0, s.turn0, t.turn0), sum(r.turn1, s.turn1, t.turn1)};
+MEDULLA_INLINE Lanes3 combined(Lanes a, const Lanes3& x, Lanes b, const Lanes3& y, Lanes c, const Lanes3& z) {
+  return fma(c, z, fma(b, y, a * x));
 }
 
 // Slope and value of the tension: link_force.cpp.
@@ -83,76 +55,130 @@ void elongationLaw(const LinkGroup& g, Lanes length, Lanes& slope, Lanes& tensio
   tension = g.elongation * fma(g.beam, hyper - linear, linear);
 }
 
-Matrix9 groupStiffness(const LinkGroup& g, const LinkFrame& f, const Spheres& s, double duration) {
-  const Lanes h2 = splat(duration * duration), damped = fma(splat(duration), g.relaxation, h2);
-  const Frame frame{f.n, f.arm0, f.arm1, f.inverseLength};
-  const Lanes3 none{splat(0), splat(0), splat(0)};
-  Lanes slope, tension;
-  elongationLaw(g, squareRoot(dot(f.line, f.line)), slope, tension);
-  const Row elongation = rowOf(frame, f.n, none, none);
-  const Row acrossU = rowOf(frame, f.axisU, none, none), acrossV = rowOf(frame, f.axisV, none, none);
-  const EndGradients end0 = endGradients(g, s, g.sphere0, f.n), end1 = endGradients(g, s, g.sphere1, f.n);
-  const Row a0 = rowByDirection(frame, end0.a, cross(end0.a, f.n), none);
-  const Row b0 = rowByDirection(frame, end0.b, cross(end0.b, f.n), none);
-  const Row a1 = rowByDirection(frame, end1.a, none, cross(end1.a, f.n));
-  const Row b1 = rowByDirection(frame, end1.b, none, cross(end1.b, f.n));
-  const Row twist = rowByDirection(frame, f.spinLever0 - f.spinLever1, splat(-1) * f.spinAxis0, f.spinAxis1);
+// Stiffnesses between the flexions of the two ends, times `damped`. Turned by the twist, a coupling larger than that
+// between unlike stiffnesses would not be positive.
+struct Couples {
+  Lanes a, b, sine;
+};
 
-  // Turned by the twist, a coupling larger than this between unlike stiffnesses would not be positive.
+MEDULLA_INLINE Couples couplesOf(const LinkGroup& g, const LinkFrame& f, Lanes damped) {
   const Lanes largest = squareRoot(_mm256_min_pd(g.flexionU0 * g.flexionV1, g.flexionV0 * g.flexionU1));
   const Lanes couple = select(isLess(largest, g.couple), largest, g.couple);
   Lanes cosine, sine;
   cosineSine(f.twist, cosine, sine);
-  const Lanes ca = damped * (couple * cosine + g.coupleDifference),
-              cb = damped * (couple * cosine - g.coupleDifference);
-  const Lanes cs = damped * couple * sine;
-  Matrix9 m{};
-  addProduct(m, elongation, scaled(damped * slope, elongation));
+  return {damped * (couple * cosine + g.coupleDifference), damped * (couple * cosine - g.coupleDifference),
+          damped * couple * sine};
+}
+
+// What flexions and torsion add.
+MEDULLA_INLINE void addTurning(const LinkGroup& g, const LinkFrame& f, const Spheres& s, Lanes damped, LinkBlocks& m) {
+  const EndRows e0 = endRows(g, s, g.sphere0, f), e1 = endRows(g, s, g.sphere1, f);
+  const Couples c = couplesOf(g, f, damped);
+  const Lanes minusSine = splat(0) - c.sine;
+  const Lanes a0 = damped * g.flexionV0, b0 = damped * g.flexionU0, a1 = damped * g.flexionV1,
+              b1 = damped * g.flexionU1, twist = damped * g.torsion;
+  const Lanes3 ofA0 = combined(a0, e0.lineA, c.a, e1.lineA, minusSine, e1.lineB);
+  const Lanes3 ofB0 = combined(b0, e0.lineB, c.sine, e1.lineA, c.b, e1.lineB);
+  const Lanes3 ofA1 = combined(a1, e1.lineA, c.a, e0.lineA, c.sine, e0.lineB);
+  const Lanes3 ofB1 = combined(b1, e1.lineB, minusSine, e0.lineA, c.b, e0.lineB);
+  const Lanes3 lineTwist = lineGradient(f, f.spinLever0 - f.spinLever1), ofTwist = twist * lineTwist;
+  const Lanes3 spin0 = splat(-1) * f.spinAxis0;
+  addOuter(e0.lineA, ofA0, m.line);
+  addOuter(e0.lineB, ofB0, m.line);
+  addOuter(e1.lineA, ofA1, m.line);
+  addOuter(e1.lineB, ofB1, m.line);
+  addOuter(lineTwist, ofTwist, m.line);
+  addOuter(ofA0, e0.turnA, m.line0);
+  addOuter(ofB0, e0.turnB, m.line0);
+  addOuter(ofTwist, spin0, m.line0);
+  addOuter(ofA1, e1.turnA, m.line1);
+  addOuter(ofB1, e1.turnB, m.line1);
+  addOuter(ofTwist, f.spinAxis1, m.line1);
+  addOuter(a0 * e0.turnA, e0.turnA, m.turn0);
+  addOuter(b0 * e0.turnB, e0.turnB, m.turn0);
+  addOuter(twist * spin0, spin0, m.turn0);
+  addOuter(a1 * e1.turnA, e1.turnA, m.turn1);
+  addOuter(b1 * e1.turnB, e1.turnB, m.turn1);
+  addOuter(twist * f.spinAxis1, f.spinAxis1, m.turn1);
+  addOuter(e0.turnA, fma(c.a, e1.turnA, minusSine * e1.turnB), m.between);
+  addOuter(e0.turnB, fma(c.sine, e1.turnA, c.b * e1.turnB), m.between);
+  addOuter(twist * spin0, f.spinAxis1, m.between);
+}
+
+// The ends lie on arms, so that turning moves them: turn0 += line x arm0, turn1 += arm1 x line in every gradient.
+MEDULLA_INLINE void addArms(const LinkFrame& f, LinkBlocks& m) {
+  const Lanes3 back1 = splat(-1) * f.arm1;
+  const Matrix3Lanes from0 = transposed(m.line0), from1 = transposed(m.line1);
+  m.line0 = m.line0 + rowsCrossed(m.line, f.arm0);
+  m.line1 = m.line1 + rowsCrossed(m.line, back1);
+  m.turn0 = m.turn0 + rowsCrossed(from0, f.arm0) + transposed(rowsCrossed(transposed(m.line0), f.arm0));
+  m.turn1 = m.turn1 + rowsCrossed(from1, back1) + transposed(rowsCrossed(transposed(m.line1), back1));
+  m.between = m.between + rowsCrossed(from0, back1) + transposed(rowsCrossed(transposed(m.line1), f.arm0));
+}
+
+// Of the elongation, and of a tension across the line.
+MEDULLA_INLINE Matrix3Lanes lineStiffness(const LinkGroup& g, const LinkFrame& f, Lanes damped, Lanes h2) {
+  Lanes slope, tension;
+  elongationLaw(g, squareRoot(dot(f.line, f.line)), slope, tension);
   const Lanes across = h2 * larger(tension, splat(0)) * f.inverseLength;
-  addProduct(m, acrossU, scaled(across, acrossU));
-  addProduct(m, acrossV, scaled(across, acrossV));
-  addProduct(m, a0, combined(damped * g.flexionV0, a0, ca, a1, splat(0) - cs, b1));
-  addProduct(m, b0, combined(damped * g.flexionU0, b0, cs, a1, cb, b1));
-  addProduct(m, a1, combined(damped * g.flexionV1, a1, ca, a0, cs, b0));
-  addProduct(m, b1, combined(damped * g.flexionU1, b1, splat(0) - cs, a0, cb, b0));
-  addProduct(m, twist, scaled(damped * g.torsion, twist));
+  Matrix3Lanes m = zeroMatrix();
+  m.row[0].x = m.row[1].y = m.row[2].z = across;
+  addOuter((damped * slope - across) * f.n, f.n, m);
   return m;
+}
+
+void setStiffness(const LinkGroup& g, const LinkFrame& f, const Spheres& s, double duration, LinkBlocks& m) {
+  const Lanes h2 = splat(duration * duration), damped = fma(splat(duration), g.relaxation, h2);
+  m.line = lineStiffness(g, f, damped, h2);
+  m.line0 = m.line1 = m.turn0 = m.between = m.turn1 = zeroMatrix();
+  addTurning(g, f, s, damped, m);
+  if (g.hasArms) addArms(f, m);
+}
+
+// Where a lane's blocks belong; none in a lane that fills up a group.
+struct LinkTargets {
+  Block6 *own0[4] = {}, *own1[4] = {}, *beside[4] = {};
+};
+
+void addTo(Block6* const (&blocks)[4], const Matrix3Lanes& line, const Matrix3Lanes& lineTurn,
+           const Matrix3Lanes& turn) {
+  visitBlocks(line, lineTurn, transposed(lineTurn), turn, [&](int lane, int k, Lanes quad) {
+    if (blocks[lane] == nullptr) return;
+    double* to = blocks[lane]->data() + 4 * k;
+    _mm256_storeu_pd(to, _mm256_loadu_pd(to) + quad);
+  });
 }
 
 }  // namespace
 
-void addLinkMatrix(const LinkMatrix& h, ImplicitData& s, std::size_t pair) {
-  const auto part = [&h](int i, int j) { return h.block<3, 3>(3 * i, 3 * j); };
-  const auto [sphere0, sphere1] = s.pairs[pair];
-  Block6& own0 = s.diagonal[sphere0];
-  own0.topLeftCorner<3, 3>() += part(0, 0);
-  own0.topRightCorner<3, 3>() -= part(0, 1);
-  own0.bottomLeftCorner<3, 3>() -= part(1, 0);
-  own0.bottomRightCorner<3, 3>() += part(1, 1);
-  if (sphere1 < 0) return;
-  Block6 &own1 = s.diagonal[sphere1], &beside = s.beside[pair];
-  own1.topLeftCorner<3, 3>() += part(0, 0);
-  own1.topRightCorner<3, 3>() += part(0, 2);
-  own1.bottomLeftCorner<3, 3>() += part(2, 0);
-  own1.bottomRightCorner<3, 3>() += part(2, 2);
-  beside.topLeftCorner<3, 3>() = -part(0, 0);
-  beside.topRightCorner<3, 3>() = -part(0, 2);
-  beside.bottomLeftCorner<3, 3>() = part(1, 0);
-  beside.bottomRightCorner<3, 3>() = part(1, 2);
+void addLinkBlocks(const LinkBlocks& m, const int (&pair)[4], ImplicitData& s) {
+  LinkTargets to;
+  for (int lane = 0; lane < 4; ++lane) {
+    if (pair[lane] < 0) continue;
+    const auto [sphere0, sphere1] = s.pairs[pair[lane]];
+    to.own0[lane] = &s.diagonal[sphere0];
+    if (sphere1 < 0) continue;
+    to.own1[lane] = &s.diagonal[sphere1];
+    to.beside[lane] = &s.beside[pair[lane]];
+  }
+  // The line goes from sphere 0 to sphere 1.
+  addTo(to.own0, m.line, -m.line0, m.turn0);
+  addTo(to.own1, m.line, m.line1, m.turn1);
+  visitBlocks(-m.line, -m.line1, transposed(m.line0), m.between, [&](int lane, int k, Lanes quad) {
+    if (to.beside[lane] != nullptr) _mm256_storeu_pd(to.beside[lane]->data() + 4 * k, quad);
+  });
 }
 
 void addLinkStiffness(const WorldData& d, ImplicitData& s) {
   for (std::size_t group = 0; group < d.links.groups.size(); ++group) {
-    const LinkGroup& g = d.links.groups[group];
-    const Matrix9 m = groupStiffness(g, d.links.frames[group], d.spheres, s.duration);
-    const int end = std::min(4, d.links.count - 4 * static_cast<int>(group));
-    for (int lane = 0; lane < end; ++lane) {
-      LinkMatrix h;
-      int e = 0;
-      for (int i = 0; i < 9; ++i)
-        for (int j = i; j < 9; ++j, ++e) h(i, j) = h(j, i) = m.entry[e][lane];
-      addLinkMatrix(h, s, 4 * group + lane);
+    LinkBlocks m;
+    setStiffness(d.links.groups[group], d.links.frames[group], d.spheres, s.duration, m);
+    int pair[4];
+    for (int lane = 0; lane < 4; ++lane) {
+      const int link = 4 * static_cast<int>(group) + lane;
+      pair[lane] = link < d.links.count ? link : -1;
     }
+    addLinkBlocks(m, pair, s);
   }
   addIdentifiedStiffness(d, s);
 }

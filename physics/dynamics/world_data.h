@@ -37,10 +37,13 @@ inline Eigen::Quaterniond quaternionOf(const Quad& q) {
   return {q.v[3], q.v[0], q.v[1], q.v[2]};
 }
 
-inline Lanes3 timesInverseInertia(const SphereGroup& g, const Lanes3& l) {
-  const Lanes* i = g.inverseInertia;
+// By a symmetric matrix: xx, yy, zz, xy, xz, yz.
+inline Lanes3 timesSymmetric(const Lanes (&i)[6], const Lanes3& l) {
   return {fma(i[4], l.z, fma(i[3], l.y, i[0] * l.x)), fma(i[5], l.z, fma(i[1], l.y, i[3] * l.x)),
           fma(i[2], l.z, fma(i[5], l.y, i[4] * l.x))};
+}
+inline Lanes3 timesInverseInertia(const SphereGroup& g, const Lanes3& l) {
+  return timesSymmetric(g.inverseInertia, l);
 }
 
 struct Spheres {
