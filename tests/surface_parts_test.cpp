@@ -41,7 +41,7 @@ Loads holding(const World& world, int node, const Vector3d& shift) {
 }
 
 bool isCarried(const WorldData& d, int node) {
-  return !d.surface.parts[d.surface.ofGroup[node / 4]].moves;
+  return isCarried(d.surface, node / 4);
 }
 
 // Of spheres and of the nodes that are masses of their own now.

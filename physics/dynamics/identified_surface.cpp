@@ -4,6 +4,7 @@
 #include "physics/dynamics/edge_springs.h"
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/skin_map.h"
+#include "physics/dynamics/stages.h"
 
 // The surface of bodies with identified links: its nodes hang on up to six frames each.
 namespace medulla {
@@ -80,8 +81,12 @@ void placeOnFrames(WorldData& d, const HostRange& range) {
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const SkinPlace place = placeSkin<true>(s, s.skin[s.ofNodeGroup[g]], statesOf(s, host));
     const Lanes3 offset = rotate(home.rotation, place.offset);
+    put(place.turn, s.turns[s.ofNodeGroup[g]]);
+    put(offset, n.offset[g]);
     put(home.position + offset + gatherFour(n.displaced, 4 * g), n.position[g]);
-    put(home.velocity + cross(home.omega, offset) + rotate(home.rotation, place.offsetRate), n.velocity[g]);
+    const Lanes3 velocity = home.velocity + cross(home.omega, offset) + rotate(home.rotation, place.offsetRate);
+    noteGain(d, g, velocity - n.velocity[g]);
+    put(velocity, n.velocity[g]);
     put(rotate(home.rotation, n.groups[g].restArea), n.area[g]);
   }
 }

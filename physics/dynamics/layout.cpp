@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <tuple>
 #include <utility>
 
 #include "physics/dynamics/identified_layout.h"
@@ -103,8 +104,10 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
   const auto hostOf = [&](int i) {
     return std::pair(mechanics.attachments[i].host, onFrames && !mechanics.nodeMoves[i]);
   };
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [&](int i, int j) { return std::pair(hostOf(i), -edges[i]) < std::pair(hostOf(j), -edges[j]); });
+  // Where nodes have the choice to move, those that are fixed come first: theirs is none.
+  const bool choose = d.bodies[b].surface == SurfaceMode::contact;
+  const auto placeOf = [&](int i) { return std::tuple(hostOf(i), choose && mechanics.nodeMoves[i], -edges[i]); };
+  std::stable_sort(sorted.begin(), sorted.end(), [&](int i, int j) { return placeOf(i) < placeOf(j); });
   for (std::size_t k = 0; k < sorted.size();) {
     const auto [host, held] = hostOf(sorted[k]);
     HostRange range{firstHost + host,

@@ -171,8 +171,9 @@ void listAwake(WorldData& d) {
   }
   std::size_t part = 0;
   const auto list = [&](const std::vector<HostRange>& from, std::vector<HostRange> Batch::*to) {
-    for (const HostRange& range : from) {
-      if (!d.surface.parts[part++].moves || d.rest[range.body].asleep) continue;
+    for (std::size_t k = 0; k < from.size(); ++k) {
+      const HostRange range = movingRange(d, part++);
+      if (range.firstGroup == range.endGroup || d.rest[range.body].asleep) continue;
       Batch& batch = a.batches[d.ranges[range.body].batch];
       (batch.*to).push_back(range);
       for (int g = range.firstGroup; g < range.endGroup; ++g) batch.nodeGroups.push_back(g);

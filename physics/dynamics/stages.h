@@ -35,7 +35,12 @@ void stepPositions(WorldData&, const Batch&);
 // surface_parts.cpp: which hosts' nodes move by themselves (SurfaceMode::contact).
 void layOutSurfaceParts(WorldData&, const std::vector<BodyMechanics>& mechanics);
 void moveLoadedParts(WorldData&, const Loads& loads);  // at a frame's start: what tools act on, and what is beside it
-void chooseSurfaceParts(WorldData&, const Loads& loads);  // at its end: what has come to rest is carried again
+void chooseSurfaceParts(WorldData&, const Loads& loads);    // at its end: what has come to rest is carried again
+HostRange movingRange(const WorldData&, std::size_t part);  // what of a host's nodes moves by itself now; may be empty
+// After placeCarriedNodes(): the weight of carried nodes acts where they hang, on the links and spheres that they hang
+// on, less what their body falls by.
+void weighCarriedNodes(WorldData&);
+void noteGain(WorldData&, int group, const Lanes3& gain);  // m/s in this frame, of the four carried nodes of a group
 
 // sleep.cpp
 void listAwake(WorldData&);  // WorldData::awake anew

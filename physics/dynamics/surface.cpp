@@ -113,17 +113,18 @@ void returnToSphere(WorldData& d, const HostRange& range) {
     sum = sum + on.force;
     moment = moment + on.turn;
   }
-  store(d.spheres.force[range.host], zero - sumOfLanes(sum, zero));
-  store(d.spheres.torque[range.host], zero - sumOfLanes(moment, zero));
+  Quad &force = d.spheres.force[range.host], &torque = d.spheres.torque[range.host];
+  store(force, load(force) - sumOfLanes(sum, zero));
+  store(torque, load(torque) - sumOfLanes(moment, zero));
 }
 
 }  // namespace
 
 void evaluateAttachments(WorldData& d, const Batch& batch) {
-  const Lanes zero = splat(0);
+  const std::vector<Quad>& weight = d.surface.weight;
   for (const int i : batch.spheres) {
-    store(d.spheres.force[i], zero);
-    store(d.spheres.torque[i], zero);
+    d.spheres.force[i] = weight.empty() ? Quad{} : weight[2 * i];
+    d.spheres.torque[i] = weight.empty() ? Quad{} : weight[2 * i + 1];
   }
   for (const HostRange& range : batch.onLinks) pullOnLink(d, range);
   for (const HostRange& range : batch.onSpheres) range.onFrames ? pullOnFrames(d, range) : pullOnSphere(d, range);
@@ -135,10 +136,18 @@ void finishNodeForces(WorldData& d, const Batch& batch) {
     range.onFrames ? returnToFrames(d, range, splat(pressureOf(d, range))) : returnToSphere(d, range);
 }
 
+void noteGain(WorldData& d, int group, const Lanes3& gain) {
+  if (4 * static_cast<std::size_t>(group) < d.surface.nodeWeight.size())
+    storeFour(gain, d.surface.nodeWeight, 4 * group);
+}
+
 void placeCarriedNodes(WorldData& d) {
   const auto place = [&d](const Anchor& anchor, int g) {
     put(positionOf(anchor) + gatherFour(d.nodes.displaced, 4 * g), d.nodes.position[g]);
-    put(velocityAt(anchor, anchor.offset), d.nodes.velocity[g]);
+    const Lanes3 velocity = velocityAt(anchor, anchor.offset);
+    noteGain(d, g, velocity - d.nodes.velocity[g]);
+    put(velocity, d.nodes.velocity[g]);
+    put(anchor.offset, d.nodes.offset[g]);
     put(anchor.area, d.nodes.area[g]);
   };
   const auto onLink = [&](const HostRange& range) {
@@ -168,11 +177,10 @@ double surfaceEnergy(const WorldData& d) {
       sum += 0.25 * s.stiffness[i % 4] * (other - own).squaredNorm();
     }
   }
-  for (const std::vector<HostRange>* ranges : {&d.nodes.onLinks, &d.nodes.onSpheres}) {
-    for (const HostRange& r : *ranges) {
-      const double pressure = pressureOf(d, r);
-      if (pressure != 0) sum += pressure * d.nodes.swollen[r.part] - 0.5 * pressure * pressure / r.bulk;
-    }
+  for (std::size_t k = 0; k < d.surface.parts.size(); ++k) {
+    const HostRange r = movingRange(d, k);
+    const double pressure = pressureOf(d, r);
+    if (pressure != 0) sum += pressure * d.nodes.swollen[r.part] - 0.5 * pressure * pressure / r.bulk;
   }
   return sum;
 }

@@ -3,12 +3,14 @@
 #include <utility>
 
 #include "physics/dynamics/edge_springs.h"
+#include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/node_motion.h"
 #include "physics/dynamics/stages.h"
 
 // SurfaceMode::contact: a host's nodes move by themselves only where something acts on them or what acts has spread to
 // them. The others are carried: they hang still from their anchors, and their mass is their spheres'. Parts join and
-// leave between frames.
+// leave between frames. Fixed nodes pull at hosts that move, and stay; with them, in the same groups of four, up to
+// three others.
 namespace medulla {
 
 namespace {
@@ -47,29 +49,37 @@ class StillNodes {
     return fnma(splat(pressure_) * giveAcross(g), d_->nodes.area[g], sag(g));
   }
   Lanes3 sag(int g) const {  // m, without pressure
-    const Lanes heavy = _mm256_and_pd(moves(g), _mm256_loadu_pd(&d_->nodes.mass[4 * g]) / stiffness(g));
-    const Lanes3 even = heavy * gravity_, area = d_->nodes.area[g];
+    const Lanes3 even = d_->surface.give[g].perGravity * gravity_, area = d_->nodes.area[g];
     if (d_->identified.ofNodeGroup[g] < 0) return even;
     return fnma(excess(g) * dot(area, even) * giveAcross(g), area, even);
   }
   double swollen() const { return swollen_; }  // m3
 
  private:
-  Lanes moves(int g) const { return isLess(splat(0), _mm256_loadu_pd(&d_->nodes.inverseMass[4 * g])); }
-  Lanes stiffness(int g) const { return select(moves(g), d_->nodes.groups[g].stiffness, splat(1)); }  // N/m
-  Lanes excess(int g) const {                                                                         // N/m5
-    const int skin = d_->identified.ofNodeGroup[g];
-    return skin < 0 ? splat(0) : d_->identified.skin[skin].normalExcess;
+  Lanes excess(int g) const {  // N/m5, of identified nodes
+    return d_->identified.skin[d_->identified.ofNodeGroup[g]].normalExcess;
   }
   Lanes giveAcross(int g) const {  // m/N, along the normal
+    const Lanes give = d_->surface.give[g].perForce;
+    if (d_->identified.ofNodeGroup[g] < 0) return give;
     const Lanes3 area = d_->nodes.area[g];
-    return _mm256_and_pd(moves(g), splat(1) / fma(excess(g), dot(area, area), stiffness(g)));
+    return give / fma(excess(g) * give, dot(area, area), splat(1));
   }
 
   const WorldData* d_;
   Lanes3 gravity_;
   double pressure_, swollen_;
 };
+
+void layOutGive(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  s.give.resize(d.nodes.dynamicEnd / 4);
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
+    const Lanes moves = isLess(splat(0), _mm256_loadu_pd(&d.nodes.inverseMass[4 * g]));
+    const Lanes give = _mm256_and_pd(moves, splat(1) / select(moves, d.nodes.groups[g].stiffness, splat(1)));
+    s.give[g] = {give, give * _mm256_loadu_pd(&d.nodes.mass[4 * g])};
+  }
+}
 
 double longest(Lanes squared) {
   return std::sqrt(std::max(std::max(squared[0], squared[1]), std::max(squared[2], squared[3])));
@@ -110,15 +120,19 @@ void listNeighbours(const WorldData& d, const std::vector<int>& ofGroup, const H
 void layOutPart(const WorldData& d, const BodyMechanics& mechanics, std::size_t k, SurfacePart& part) {
   const HostRange& range = rangeOf(d, k);
   part.always = d.bodies[range.body].surface != SurfaceMode::contact || d.settings.integrator == Integrator::implicit;
+  part.firstChoice = part.always ? range.endGroup : range.firstGroup;
   if (part.always) return;
   listNeighbours(d, d.surface.ofGroup, range, part);
   part.unrest = kUnrest * meanRadius(*d.bodies[range.body].model) + deepestSag(d, range);
   const bool held = isHeld(d, mechanics, k);
-  for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
-    if (d.nodes.mass[i] == 0) continue;
-    part.always = part.always || (d.nodes.inverseMass[i] == 0 && !held);
-  }
+  for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i)
+    if (d.nodes.mass[i] > 0 && d.nodes.inverseMass[i] == 0 && !held) part.firstChoice = i / 4 + 1;
+  part.always = part.firstChoice == range.endGroup;
   part.moves = part.always;
+  double give = 0;  // m5/N
+  for (int g = part.firstChoice; g < range.endGroup; ++g)
+    give += sumOfLanes(dot(d.nodes.area[g], d.nodes.area[g]) * d.surface.give[g].perForce);
+  part.heldBulk = range.bulk / (1 + range.bulk * give);
 }
 
 void listCarriedNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
@@ -126,11 +140,12 @@ void listCarriedNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics)
     if (d.bodies[b].surface != SurfaceMode::contact) continue;
     const SoftBodyModel& m = *d.bodies[b].model;
     for (std::size_t k = 0; k < mechanics[b].attachments.size(); ++k) {
-      const int part = d.surface.ofGroup[d.ranges[b].node[k] / 4], sphere = mechanics[b].attachments[k].massSphere;
+      const int group = d.ranges[b].node[k] / 4, part = d.surface.ofGroup[group],
+                sphere = mechanics[b].attachments[k].massSphere;
       const Vector3d r = m.restNodes[k] - m.spheres[sphere].restFrame;
       const double mass = mechanics[b].nodeMass[k];
       const Matrix3d inertia = mass * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose());
-      if (!d.surface.parts[part].always)
+      if (group >= d.surface.parts[part].firstChoice)
         d.surface.nodes.push_back({part, d.ranges[b].firstSphere + sphere, {mass, inertia}});
     }
   }
@@ -173,6 +188,7 @@ void partsChanged(WorldData& d) {
     if (k == d.nodes.onLinks.size()) s.firstOnSphere = s.carried.size();
     if (s.parts[k].moves) continue;
     s.carried.push_back(rangeOf(d, k));
+    s.carried.back().firstGroup = s.parts[k].firstChoice;
   }
   if (s.parts.size() == d.nodes.onLinks.size()) s.firstOnSphere = s.carried.size();
   listAwake(d);
@@ -196,16 +212,17 @@ std::vector<char> loadedParts(const WorldData& d, const Loads& loads) {
   return loaded;
 }
 
-// m: how far the part's nodes are from where they hang at rest, into `unrest`, per node. Returns the most.
+// m: how far the part's nodes that move are from where they hang at rest, into `unrest`, per node. Returns the most of
+// those that have the choice.
 double unrestOf(const WorldData& d, std::size_t part, std::vector<Quad>& unrest) {
-  const HostRange& range = rangeOf(d, part);
+  const HostRange range = movingRange(d, part);
   const StillNodes still(d, range);
   Lanes squared = splat(0);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const Lanes3 off = gatherFour(d.nodes.displaced, 4 * g) - still.displaced(g);
     const Lanes isNode = isLess(splat(0), _mm256_loadu_pd(&d.nodes.mass[4 * g]));  // pads drift
     storeFour(off, unrest, 4 * g);
-    squared = larger(squared, _mm256_and_pd(isNode, dot(off, off)));
+    if (g >= d.surface.parts[part].firstChoice) squared = larger(squared, _mm256_and_pd(isNode, dot(off, off)));
   }
   return longest(squared);
 }
@@ -214,7 +231,7 @@ double unrestOf(const WorldData& d, std::size_t part, std::vector<Quad>& unrest)
 double shiftOf(const WorldData& d, std::size_t part, const std::vector<Quad>& unrest) {
   const Lanes zero = splat(0);
   Lanes squared = zero;
-  for (int g = rangeOf(d, part).firstGroup; g < rangeOf(d, part).endGroup; ++g) {
+  for (int g = d.surface.parts[part].firstChoice; g < rangeOf(d, part).endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
     const Lanes3 pull = pullOfEdges(d.springs, d.nodes.groups.data(), unrest.data(), {zero, zero, zero}, g);
     const Lanes moves = isLess(zero, _mm256_loadu_pd(&d.nodes.inverseMass[4 * g]));
@@ -226,16 +243,42 @@ double shiftOf(const WorldData& d, std::size_t part, const std::vector<Quad>& un
 
 // The nodes of a part that does not move are where they hang still.
 void hang(WorldData& d, std::size_t part) {
-  const HostRange& range = rangeOf(d, part);
+  HostRange range = rangeOf(d, part);
+  const bool whole = range.firstGroup == d.surface.parts[part].firstChoice;
+  range.firstGroup = d.surface.parts[part].firstChoice;
   const StillNodes still(d, range);
-  d.nodes.swollen[range.part] = still.swollen();
+  if (whole) d.nodes.swollen[range.part] = still.swollen();
   for (int g = range.firstGroup; g < range.endGroup; ++g) storeFour(still.displaced(g), d.nodes.displaced, 4 * g);
+}
+
+// A link's frame is asked for its nodes' loads; where none moves there are none.
+void releaseLink(WorldData& d, std::size_t part) {
+  if (part < d.nodes.onLinks.size() && rangeOf(d, part).firstGroup == d.surface.parts[part].firstChoice)
+    d.links.loads[rangeOf(d, part).host] = {};
 }
 
 void carry(WorldData& d, std::size_t part) {
   d.surface.parts[part].moves = false;
-  if (part < d.nodes.onLinks.size()) d.links.loads[rangeOf(d, part).host] = {};
+  releaseLink(d, part);
   hang(d, part);
+}
+
+// m/s2, per body: gravity less the mean acceleration of its carried nodes in this frame.
+std::vector<Quad> feltGravity(const WorldData& d) {
+  std::vector<Quad> gained(d.bodies.size());
+  std::vector<double> mass(d.bodies.size(), 0);
+  for (const HostRange& range : d.surface.carried) {
+    Quad& sum = gained[range.body];
+    for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
+      store(sum, fma(splat(d.nodes.mass[i]), load(d.surface.nodeWeight[i]), load(sum)));
+      mass[range.body] += d.nodes.mass[i];
+    }
+  }
+  for (std::size_t b = 0; b < gained.size(); ++b) {
+    const double perFrame = mass[b] > 0 ? 1 / (mass[b] * d.settings.frameDuration) : 0;
+    store(gained[b], fnma(splat(perFrame), load(gained[b]), load(d.gravity)));
+  }
+  return gained;
 }
 
 bool hasChoice(const SurfaceParts& s) {
@@ -246,6 +289,8 @@ bool hasChoice(const SurfaceParts& s) {
 
 void layOutSurfaceParts(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   SurfaceParts& s = d.surface;
+  layOutGive(d);
+  s.unrest.resize(d.nodes.dynamicEnd);
   s.parts.resize(d.nodes.onLinks.size() + d.nodes.onSpheres.size());
   s.ofGroup.resize(d.nodes.dynamicEnd / 4);
   for (std::size_t k = 0; k < s.parts.size(); ++k)
@@ -274,19 +319,63 @@ void moveLoadedParts(WorldData& d, const Loads& loads) {
   if (changed) partsChanged(d);
 }
 
+HostRange movingRange(const WorldData& d, std::size_t part) {
+  HostRange range = rangeOf(d, part);
+  const SurfacePart& p = d.surface.parts[part];
+  if (p.moves) return range;
+  if (p.firstChoice > range.firstGroup) range.bulk = p.heldBulk;
+  range.endGroup = p.firstChoice;
+  return range;
+}
+
+// Less what the body falls by on the whole: one that falls freely would begin to turn.
+void weighCarriedNodes(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  const Lanes gravity = load(d.gravity);
+  if (!hasChoice(s) || dotProduct(gravity, gravity) == 0) return;
+  if (s.nodeWeight.empty()) {  // gains are noted from now on
+    s.nodeWeight.resize(d.nodes.dynamicEnd);
+    return;
+  }
+  const std::vector<Quad> felt = feltGravity(d);
+  s.weight.assign(2 * d.spheres.position.size(), Quad{});
+  for (std::size_t k = 0; k < s.ofGroup.size(); ++k) {
+    const Lanes of = load(felt[rangeOf(d, s.ofGroup[k]).body]);
+    for (std::size_t i = 4 * k; i < 4 * k + 4; ++i)
+      store(s.nodeWeight[i], isCarried(s, static_cast<int>(k)) ? splat(d.nodes.mass[i]) * of : splat(0));
+  }
+  returnImpulses(d, s.nodeWeight, s.weight);
+  for (const CarriedNode& node : s.nodes) {
+    if (s.parts[node.part].moves) continue;
+    Quad& on = s.weight[2 * node.sphere];
+    store(on, fnma(splat(node.mass.mass), load(felt[rangeOf(d, node.part).body]), load(on)));
+  }
+  for (std::size_t k = 0; k < s.parts.size(); ++k)
+    if (!s.parts[k].moves) releaseLink(d, k);
+}
+
 void chooseSurfaceParts(WorldData& d, const Loads& loads) {
   if (!hasChoice(d.surface)) return;
   std::vector<SurfacePart>& parts = d.surface.parts;
   std::vector<char> wanted = loadedParts(d, loads), beside(parts.size(), 0);
   std::vector<double> unrest(parts.size(), 0);
-  std::vector<Quad> ofNodes(d.nodes.dynamicEnd);
+  std::vector<Quad>& ofNodes = d.surface.unrest;
+  const auto isMeasured = [&](std::size_t k) {
+    const bool moves = parts[k].moves || parts[k].firstChoice > rangeOf(d, k).firstGroup;
+    return moves && !parts[k].neighbours.empty();
+  };
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    if (!parts[k].moves || parts[k].neighbours.empty()) continue;
+    if (!isMeasured(k)) continue;
     unrest[k] = unrestOf(d, k, ofNodes);
     for (const int other : parts[k].neighbours) beside[other] = 1;
   }
   for (std::size_t k = 0; k < parts.size(); ++k)
     if (!parts[k].moves && beside[k] && shiftOf(d, k, ofNodes) > parts[k].unrest) wanted[k] = 1;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    if (!isMeasured(k)) continue;
+    const HostRange range = movingRange(d, k);
+    std::fill(ofNodes.begin() + 4 * range.firstGroup, ofNodes.begin() + 4 * range.endGroup, Quad{});
+  }
   bool changed = false;
   for (std::size_t k = 0; k < parts.size(); ++k) {
     SurfacePart& part = parts[k];

@@ -254,6 +254,7 @@ FrameReport World::advance(const Loads& loads) {
   // The frames that readers hang nodes on are those of the state at the end.
   runStage(d, evaluateLinks);
   placeCarriedNodes(d);
+  weighCarriedNodes(d);
   requireFinite(d, time());
   return report;
 }
@@ -288,7 +289,7 @@ Energies World::energies() const {
     e.gravity -= mass * g.dot(vectorOf(d.spheres.position[i]));
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
-    if (!d.surface.parts[d.surface.ofGroup[i / 4]].moves) continue;  // its mass is its spheres'
+    if (isCarried(d.surface, i / 4)) continue;  // its mass is its spheres'
     e.kinetic += 0.5 * d.nodes.mass[i] * vectorAt(d.nodes.velocity, i).squaredNorm();
     e.gravity -= d.nodes.mass[i] * g.dot(vectorAt(d.nodes.position, i));
   }
@@ -316,7 +317,7 @@ int World::dynamicNodes(int body) const {
   const WorldData& d = *data_;
   if (d.rest[body].asleep) return 0;
   int count = 0;
-  for (const int i : d.ranges[body].node) count += !isSkin(d, i) && d.surface.parts[d.surface.ofGroup[i / 4]].moves;
+  for (const int i : d.ranges[body].node) count += !isSkin(d, i) && !isCarried(d.surface, i / 4);
   return count;
 }
 
@@ -352,6 +353,7 @@ std::uint64_t World::stateHash() const {
   }
   for (const SurfacePart& p : d.surface.parts)
     if (!p.always) hash.add(p.moves ? p.quietFrames : -1.0);
+  for (const Quad& q : d.surface.weight) hash.add(q, 3);
   for (const Rest& r : d.rest) hash.add(r.asleep ? -1.0 : r.stillFrames);
   for (const StillPlace& place : d.stillPlace) {
     hash.add(place.position, 3);

@@ -215,11 +215,13 @@ struct BodyRange {
 // spheres'.
 
 struct SurfacePart {            // of one host; part k is that of Nodes::onLinks[k], those on spheres follow
-  bool moves = true;            // state
+  bool moves = true;            // state: of the groups of nodes that have the choice
   int quietFrames = 0;          // in a row, in which nothing asked for it; state
-  bool always = true;           // there is no choice: another surface mode, or something acts on it all the time
-  std::vector<int> neighbours;  // parts that edges join to this one
+  int firstChoice = 0;          // groups of nodes before it have none: another surface mode, or fixed nodes in them
+  bool always = true;           // no group has
+  std::vector<int> neighbours;  // parts that edges join to this one, itself included
   double unrest = 0;            // m: it moves where its neighbours' edges would shift a node of it by more
+  double heldBulk = 0;          // N/m5: HostRange::bulk while only groups without choice move, and the others give way
 };
 
 // A sphere without any node's mass, kg and kg m2 in its frame; what a carried node adds.
@@ -232,14 +234,27 @@ struct CarriedNode {
   BareSphere mass;
 };
 
+struct NodeGive {              // of four nodes' attachments alone
+  Lanes perForce, perGravity;  // m/N, and m per m/s2
+};
+
 struct SurfaceParts {
   std::vector<SurfacePart> parts;
-  std::vector<int> ofGroup;  // per group of dynamic nodes
+  std::vector<int> ofGroup;      // per group of dynamic nodes
+  std::vector<NodeGive> give;    // per group of dynamic nodes
+  std::vector<Quad> unrest;      // m, per node; 0 outside chooseSurfaceParts()
+  std::vector<Quad> nodeWeight;  // per node that has the choice: N, and before m/s gained in the frame
+  std::vector<Quad> weight;      // N and N m, two per sphere: what these add for not hanging at its frame
   std::vector<BareSphere> spheres;
   std::vector<CarriedNode> nodes;  // of parts that have the choice; by sphere
   std::vector<HostRange> carried;  // those that do not move now, on links and, from firstOnSphere on, on spheres
   std::size_t firstOnSphere = 0;
 };
+
+inline bool isCarried(const SurfaceParts& s, int group) {
+  const SurfacePart& part = s.parts[s.ofGroup[group]];
+  return !part.moves && group >= part.firstChoice;
+}
 
 // ---- Bodies at rest sleep: nothing of them is evaluated until they wake.
 
