@@ -268,11 +268,13 @@ std::vector<Quad> feltGravity(const WorldData& d) {
   std::vector<Quad> gained(d.bodies.size());
   std::vector<double> mass(d.bodies.size(), 0);
   for (const HostRange& range : d.surface.carried) {
-    Quad& sum = gained[range.body];
-    for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
-      store(sum, fma(splat(d.nodes.mass[i]), load(d.surface.nodeWeight[i]), load(sum)));
-      mass[range.body] += d.nodes.mass[i];
+    Lanes sum = load(gained[range.body]), masses = splat(0);
+    for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; i += 4) {
+      masses = masses + _mm256_loadu_pd(&d.nodes.mass[i]);
+      for (int l = 0; l < 4; ++l) sum = fma(splat(d.nodes.mass[i + l]), load(d.surface.nodeWeight[i + l]), sum);
     }
+    store(gained[range.body], sum);
+    mass[range.body] += sumOfLanes(masses);
   }
   for (std::size_t b = 0; b < gained.size(); ++b) {
     const double perFrame = mass[b] > 0 ? 1 / (mass[b] * d.settings.frameDuration) : 0;
@@ -341,8 +343,8 @@ void weighCarriedNodes(WorldData& d) {
   s.weight.assign(2 * d.spheres.position.size(), Quad{});
   for (std::size_t k = 0; k < s.ofGroup.size(); ++k) {
     const Lanes of = load(felt[rangeOf(d, s.ofGroup[k]).body]);
-    for (std::size_t i = 4 * k; i < 4 * k + 4; ++i)
-      store(s.nodeWeight[i], isCarried(s, static_cast<int>(k)) ? splat(d.nodes.mass[i]) * of : splat(0));
+    const Lanes weight = isCarried(s, static_cast<int>(k)) ? of : splat(0);
+    for (std::size_t i = 4 * k; i < 4 * k + 4; ++i) store(s.nodeWeight[i], splat(d.nodes.mass[i]) * weight);
   }
   returnImpulses(d, s.nodeWeight, s.weight);
   for (const CarriedNode& node : s.nodes) {
