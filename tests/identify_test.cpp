@@ -277,7 +277,7 @@ Reduced reduce(bool held) {
   std::vector<Ball> balls;
   for (const FillingSphere& s : cylinderModel().spheres) balls.push_back({s.restBallCentre, s.radius});
   r.cells = makeCellFrames(r.mesh, balls, r.solid);
-  r.responses = solveFrames(r.solid, r.cells, {});
+  r.responses = solveFrames(r.solid, r.cells, VectorXd::Ones(static_cast<Index>(r.mesh.vertices.size())), {});
   return r;
 }
 

@@ -40,7 +40,9 @@ struct IdentifiedLinkGroup {
 
 struct SkinTerms {  // four of those frames; a host's last are filled up with its home
   std::uint32_t frame[4];
-  Lanes3 restPlace;  // m, from the home's
+  Lanes3 restPlace;             // m, from the home's
+  Lanes3 axis;                  // unit: along that line; 0 of home
+  Lanes length, inverseLength;  // m, 1/m, of it; 0 of home
 };
 
 // The frames as they are seen from home; four at a time, so that number i of the one in a lane is 4 i + lane doubles
@@ -48,13 +50,16 @@ struct SkinTerms {  // four of those frames; a host's last are filled up with it
 struct SkinTermState {
   Lanes3 way, turn;          // m, how far they are from where they are at rest; twice their quaternion's vector part
   Lanes3 wayRate, turnRate;  // m/s, 1/s
+  Lanes3 spare, spareRate;   // m, m/s: the part of the way along the axis beyond what thins the body
   Lanes3 place;              // m, from home
   Lanes cosine;              // of half the angle
+  Lanes spareSlope;          // of the spare part, by the way along the axis
 };
 
 struct SkinHost {
   int home;  // a frame
   int firstTerms, endTerms;
+  double poisson;
 };
 
 // What one frame's way and turn do to four nodes' places, and its share of how far their own frames are turned.
@@ -62,6 +67,7 @@ struct SkinHost {
 struct alignas(16) SkinShare {
   float map[18][4];  // 1 and m: on way and turn, six numbers for x, y and z each; loaded by 16 bytes, as weights
   float weight[4];
+  float along[4];            // 1: of a way along the term's axis, what it does along that axis
   std::int32_t state, load;  // offsets in doubles of the frame's first number in SkinTermState, and in SkinTermLoad
 };
 
@@ -73,8 +79,8 @@ struct SkinGroup {  // four nodes
   Lanes normalExcess;  // N/m5: what the attachment is stiffer along the node's area, over that area's square
 };
 
-struct SkinTermLoad {  // of one frame, per node in each lane: on way and turn
-  Lanes onWay[3], onTurn[3];
+struct SkinTermLoad {  // of one frame, per node in each lane: on way, turn and spare
+  Lanes onWay[3], onTurn[3], onSpare[3];
 };
 
 struct IdentifiedBody {              // nothing of others

@@ -92,9 +92,9 @@ void addLinks(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
 // The host of a range of nodes, its frames numbered as the nodes ask for them.
 class HostTerms {
  public:
-  HostTerms(Identified& s, int home, const Vector3d& homePlace) : s_(&s), homePlace_(homePlace) {
+  HostTerms(Identified& s, int home, const Vector3d& homePlace, double poisson) : s_(&s), homePlace_(homePlace) {
     host_ = static_cast<int>(s.hosts.size());
-    s.hosts.push_back({home, static_cast<int>(s.terms.size()), static_cast<int>(s.terms.size())});
+    s.hosts.push_back({home, static_cast<int>(s.terms.size()), static_cast<int>(s.terms.size()), poisson});
   }
   int host() const { return host_; }
   const Vector3d& homePlace() const { return homePlace_; }
@@ -109,8 +109,15 @@ class HostTerms {
       s_->terms.push_back(terms);
       ++host.endTerms;
     }
-    s_->terms.back().frame[lane] = static_cast<std::uint32_t>(frame);
-    setLane(s_->terms.back().restPlace, lane, restPlace - homePlace_);
+    SkinTerms& terms = s_->terms.back();
+    const Vector3d line = restPlace - homePlace_;
+    terms.frame[lane] = static_cast<std::uint32_t>(frame);
+    setLane(terms.restPlace, lane, line);
+    if (line.norm() > 0) {
+      setLane(terms.axis, lane, line.normalized());
+      terms.length[lane] = line.norm();
+      terms.inverseLength[lane] = 1 / line.norm();
+    }
     return found->second;
   }
 
@@ -121,8 +128,10 @@ class HostTerms {
   std::map<int, int> number_;
 };
 
-void setMap(SkinShare& share, int lane, const SkinRow& row, double weight) {
+// `axis`: from home to the frame.
+void setMap(SkinShare& share, int lane, const SkinRow& row, double weight, const Vector3d& axis) {
   share.weight[lane] = static_cast<float>(weight);
+  share.along[lane] = static_cast<float>(axis.dot(row.onWay * axis));
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       share.map[6 * i + j][lane] = static_cast<float>(row.onWay(i, j));
@@ -147,12 +156,13 @@ void addSkin(WorldData& d, int body, const BodyMechanics& mechanics, const std::
     for (std::size_t k = 0; k < skin.size() && mechanics.nodeMoves[nodes[l]]; ++k) {
       const int frame = frames.of(skin[k].frame, skin[k].restPoint);
       if (frame == s.hosts[terms.host()].home) continue;
-      const int term = terms.of(frame, frames.restPoint(skin[k].frame, skin[k].restPoint));
+      const Vector3d place = frames.restPoint(skin[k].frame, skin[k].restPoint);
+      const int term = terms.of(frame, place);
       SkinShare& share = shares[term];
       constexpr int kDoubles = sizeof(SkinTermState) / sizeof(double);
       share.load = term;
       share.state = kDoubles * (term / 4) + term % 4;
-      setMap(share, l, rows[k], skin[k].weight);
+      setMap(share, l, rows[k], skin[k].weight, (place - terms.homePlace()).normalized());
     }
     setLane(group.restOffset, l, m.restNodes[nodes[l]] - terms.homePlace());
     setLane(group.lever, l, skinLever(m, skin, nodes[l]));
@@ -174,7 +184,8 @@ void addSkins(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
       const SkinFrame& first = mechanics.skin[node].front();
       // Held nodes all hang on patches, which do not move against each other.
       const int home = mechanics.nodeMoves[node] ? range.host - d.ranges[body].firstSphere : first.frame;
-      HostTerms terms(d.identified, frames.of(home, first.restPoint), frames.restPoint(home, first.restPoint));
+      HostTerms terms(d.identified, frames.of(home, first.restPoint), frames.restPoint(home, first.restPoint),
+                      d.bodies[body].tissue.poisson);
       for (int g = range.firstGroup; g < range.endGroup; ++g) {
         d.identified.ofNodeGroup[g] = static_cast<int>(d.identified.skin.size());
         addSkin(d, body, mechanics, {nodeAt[4 * g], nodeAt[4 * g + 1], nodeAt[4 * g + 2], nodeAt[4 * g + 3]}, terms,

@@ -72,12 +72,16 @@ HostPoint hostPointOnFrames(const WorldData& d, int node) {
     if (onWay.isZero(0) && onTurn.isZero(0) && share.weight[lane] == 0) continue;  // another node's
     onTurn += static_cast<double>(share.weight[lane]) * second.transpose();
     const SkinTermState& at = seen.states[share.load / 4];
+    const SkinTerms& term = s.terms[host.firstTerms + share.load / 4];
     const int l = share.load % 4;
+    const Vector3d axis = vectorOf(term.axis, l);
+    const double along = share.along[lane];
+    onWay += at.spareSlope[l] * axis * (along * axis - onWay.transpose() * axis).transpose();
     const Matrix3d f = onWay * r.transpose(), t = onTurn * r.transpose();
     const Matrix3d torque = at.cosine[l] * t + 0.5 * crossMatrix(vectorOf(at.turn, l)) * t;
     force -= f;
     moment -= torque + crossMatrix(vectorOf(at.place, l)) * f;
-    add(p, s.carried[s.terms[host.firstTerms + share.load / 4].frame[l]], r * f, r * torque);
+    add(p, s.carried[term.frame[l]], r * f, r * torque);
   }
   add(p, s.carried[host.home], r * force, r * moment);
   return p;

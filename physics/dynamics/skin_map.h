@@ -6,9 +6,14 @@
 // How nodes follow the frames they hang on (physics/model/identified_network.h), seen from the frame of their home
 // sphere: with e_k and s_k how far frame k is from its place at rest and twice the vector part of its quaternion, both
 // in the home frame,
-//   node = home + R (restOffset + sum map_k (e_k, s_k) + s x (s x lever) / 2),   s = sum weight_k s_k.
-// The maps are the skin's first derivatives, the last term what turning adds to second order. Rates and the transpose
-// are exact:
+//   node = home + R (restOffset + sum (map_k (e_k - g_k, s_k) + along_k g_k) + s x (s x lever) / 2),
+//   s = sum weight_k s_k.
+// The maps are the skin's first derivatives, the last term what turning adds to second order. Stretch thins by
+// 1 / sqrt(1 + 2 nu y), not by 1 - nu y: with a the line between the two frames at rest, l its length and y = a.e_k /
+// l,
+//   g_k = a l (y - (1 - 1 / sqrt(1 + 2 nu y)) / nu),   along_k = a.map_k a,
+// keeps what a way along the line does along that line, and takes from what it does across. Rates and the transpose are
+// exact:
 //   e_k' = R^T (v_k - v - omega x (x_k - home)),   s_k' = c_k D + D x s_k / 2,   D = R^T (omega_k - omega).
 namespace medulla {
 
@@ -31,9 +36,23 @@ MEDULLA_INLINE HomeFrame homeFrame(const Identified& s, const SkinHost& host) {
   return out;
 }
 
+// The spare part of a way `along` (m) the term's axis, over that axis, and its slope; (1 - 1 / s) / nu is
+// 2 y / (s (s + 1)). Straight below kStraightBelow.
+struct Spare {
+  Lanes value, slope;
+};
+MEDULLA_INLINE Spare spareOf(const SkinTerms& term, Lanes poisson, Lanes along) {
+  const Lanes one = splat(1), two = splat(2);
+  const Lanes all = term.inverseLength * along, y = larger(all, splat(kStraightBelow - 1));
+  const Lanes s = squareRoot(fma(two * poisson, y, one)), inverse = one / (s * (s + one));
+  const Lanes kept = inverse * (s + one);  // 1 / s
+  const Lanes slope = fnma(kept * kept, kept, one);
+  return {term.length * fma(slope, all - y, fnma(two * inverse, y, y)), slope};
+}
+
 // Sets the host's SkinTermStates; `states` has one for each of its terms.
 MEDULLA_INLINE void seeFrames(const Identified& s, const SkinHost& host, const HomeFrame& home, SkinTermState* states) {
-  const Lanes half = splat(0.5);
+  const Lanes half = splat(0.5), poisson = splat(host.poisson);
   for (int t = host.firstTerms; t < host.endTerms; ++t, ++states) {
     const SkinTerms& terms = s.terms[t];
     const FrameLanes frames = gatherFrames(s.frames.data(), terms.frame);
@@ -49,6 +68,13 @@ MEDULLA_INLINE void seeFrames(const Identified& s, const SkinHost& host, const H
     const Lanes3 apart =
         rotateBack(home.rotation, gatherQuads(s.frames.data(), terms.frame, &FrameState::angularVelocity) - home.omega);
     put(fma(r.cosine, apart, half * cross(apart, turn)), states->turnRate);
+    const Spare spare = spareOf(terms, poisson, dot(states->way, terms.axis));
+    const Lanes spareRate = spare.slope * dot(states->wayRate, terms.axis);
+    states->spareSlope = spare.slope;
+    put(spare.value * terms.axis, states->spare);
+    put(spareRate * terms.axis, states->spareRate);
+    put(states->way - states->spare, states->way);
+    put(states->wayRate - states->spareRate, states->wayRate);
   }
 }
 
@@ -78,12 +104,15 @@ MEDULLA_INLINE SkinPlace placeSkin(const Identified& s, const SkinGroup& g, cons
   for (int k = g.firstShare; k < g.endShare; ++k) {
     const SkinShare& share = s.shares[k];
     const double* at = numbers + share.state;
-    const Lanes3 way = broadcastThree(at), turned = broadcastThree(at + 12);
+    const Lanes3 way = broadcastThree(at), turned = broadcastThree(at + 12), spare = broadcastThree(at + 48);
     Lanes3 wayRate, turnedRate;
     if (withRates) {
       put(broadcastThree(at + 24), wayRate);
       put(broadcastThree(at + 36), turnedRate);
     }
+    const Lanes along = shareEntry(share.along);
+    put(fma(along, spare, y), y);
+    if (withRates) put(fma(along, broadcastThree(at + 60), yRate), yRate);
     const Lanes weight = shareEntry(share.weight);
     Lanes* rows[3] = {&y.x, &y.y, &y.z};
     Lanes* rates[3] = {&yRate.x, &yRate.y, &yRate.z};
@@ -123,7 +152,7 @@ MEDULLA_INLINE void giveToTerms(const Identified& s, const SkinGroup& g, const L
   for (int k = g.firstShare; k < g.endShare; ++k) {
     const SkinShare& share = s.shares[k];
     SkinTermLoad& to = loads[share.load];
-    const Lanes weight = shareEntry(share.weight);
+    const Lanes weight = shareEntry(share.weight), along = shareEntry(share.along);
     for (int j = 0; j < 3; ++j) {
       Lanes way = to.onWay[j], turning = fma(weight, own[j], to.onTurn[j]);
       for (int i = 0; i < 3; ++i) {
@@ -132,6 +161,7 @@ MEDULLA_INLINE void giveToTerms(const Identified& s, const SkinGroup& g, const L
       }
       to.onWay[j] = way;
       to.onTurn[j] = turning;
+      to.onSpare[j] = fma(along, f[j], to.onSpare[j]);
     }
   }
 }
@@ -154,7 +184,10 @@ MEDULLA_INLINE HomeLoad giveToFrames(const Identified& s, const SkinHost& host, 
       };
       return Lanes3{sum(0), sum(1), sum(2)};
     };
-    const Lanes3 onWay = sums(&SkinTermLoad::onWay), onTurn = sums(&SkinTermLoad::onTurn);
+    Lanes3 onWay = sums(&SkinTermLoad::onWay);
+    const Lanes3 onTurn = sums(&SkinTermLoad::onTurn), onSpare = sums(&SkinTermLoad::onSpare);
+    const Lanes3& axis = s.terms[t].axis;
+    put(fma(states->spareSlope * dot(onSpare - onWay, axis), axis, onWay), onWay);
     const Lanes3 torque = fma(states->cosine, onTurn, splat(0.5) * cross(states->turn, onTurn));
     force = force - onWay;
     moment = moment - torque - cross(states->place, onWay);

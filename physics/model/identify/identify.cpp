@@ -155,6 +155,16 @@ VectorXd largestOf(const MatrixXd& displacements) {
   return out;
 }
 
+VectorXd freeAreas(const NodeSurface& surface) {
+  VectorXd out(static_cast<Index>(surface.areas.size()));
+  for (Index n = 0; n < out.size(); ++n) out[n] = surface.held[n] ? 0 : surface.areas[n];
+  return out;
+}
+
+// Bodies are loaded on their surface: nodes follow frames as they do there. Loads spread over cells, which alone leave
+// a body's end unstretched and untwisted, count so much less; they settle what tractions leave open.
+constexpr double kTractions = 1000;
+
 // Random loads; of a free body with forces, spread by area, that balance them, and displacements without their rigid
 // part, in which two answers may differ at will.
 class Trials {
@@ -256,13 +266,14 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   for (const FillingSphere& s : model.spheres) balls.push_back({s.restBallCentre, s.radius});
   const VoxelSolid solid = makeSolid(model, mesh, settings, solidSettings, stage(0, 0.2));
   const CellFrames cells = makeCellFrames(mesh, balls, solid);
-  Responses responses = solveFrames(solid, cells, stage(0.2, 0.4));
+  Responses responses = solveFrames(solid, cells, freeAreas(measureNodes(mesh, out.patches)), stage(0.2, 0.4));
   if (held.empty()) responses = balancedResponses(mesh, cells, responses);
   out.voxel = solid.grid.size;
   out.lengthScale = cells.lengthScale;
   out.links = layOutLinks(mesh, cells, out.patches, patchTriangles);
   fitLinks(responses.frames, responses.grounding, out.lengthScale, settings.links, out.links, stage(0.4, 0.85));
-  out.skin = fitSkin(mesh, cells, out.patches, responses.frames, responses.nodes);
+  out.skin = fitSkin(mesh, cells, out.patches, responses.frames + kTractions * responses.framesUnderTractions,
+                     responses.nodes + kTractions * responses.nodesUnderTractions);
   out.frames = cells.frames;
   fitLayerAndMeasure(mesh, solid, solidSettings, responses.grounding, result, stage(0.85, 1));
   requireFinite(out);

@@ -98,7 +98,7 @@ IdentifiedLayer fitLayer(const TriangleMesh& mesh, const NodeSurface& surface, c
   Eigen::SimplicialLLT<SparseMatrix> factors;
   factors.analyzePattern(SparseMatrix(parts[0] + parts[1] + parts[2] + held));
   const Vector3d units(1 / lengthScale, 1 / lengthScale, lengthScale);
-  const Vector3d low(0, 0, std::log(1e-3)), high(std::log(1e3), std::log(1e3), std::log(0.1));
+  const Vector3d low(0, 0, std::log(1e-3)), high(std::log(1e3), std::log(2.), std::log(0.1));
   const auto objective = [&](const VectorXd& x, VectorXd& gradient) {
     if ((x - low).minCoeff() < 0 || (x - high).maxCoeff() > 0) return std::numeric_limits<double>::infinity();
     const Vector3d k = units.cwiseProduct(Vector3d(x.array().exp()));
@@ -109,7 +109,7 @@ IdentifiedLayer fitLayer(const TriangleMesh& mesh, const NodeSurface& surface, c
     for (int p = 0; p < 3; ++p) gradient[p] = 2 * k[p] * pull.cwiseProduct(MatrixXd(parts[p] * moved)).sum();
     return (off * weights.asDiagonal()).cwiseProduct(off).sum();
   };
-  VectorXd x = Vector3d(std::log(3.), std::log(2.), std::log(0.02));
+  VectorXd x = Vector3d(std::log(3.), std::log(1.5), std::log(0.02));
   descend(objective, {40, 1e-6, 10}, x);
   const Vector3d k = units.cwiseProduct(Vector3d(x.array().exp()));
   return {k[0], k[1], k[2]};

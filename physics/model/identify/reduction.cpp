@@ -9,6 +9,7 @@ namespace medulla {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
+using Eigen::VectorXd;
 
 MatrixXd solvePositive(const MatrixXd& matrix, const MatrixXd& right) {
   const Eigen::LLT<MatrixXd> factors(matrix);
@@ -17,21 +18,57 @@ MatrixXd solvePositive(const MatrixXd& matrix, const MatrixXd& right) {
   return factors.solve(right);
 }
 
-Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const std::function<void(double)>& progress) {
+namespace {
+
+// The covariance of random forces on the mesh's nodes, times displacements: by area, and of a free body balanced.
+class RandomTractions {
+ public:
+  RandomTractions(const VoxelSolid& solid, const CellFrames& cells, const VectorXd& areas) {
+    variance_ = areas.transpose().replicate<3, 1>().reshaped();
+    if (!solid.isFree) return;
+    rigid_ =
+        solid.loading.transpose() * rigidMotions(solid.grid.nodes, cells.frames[0].restPosition, 3, cells.lengthScale);
+    weighted_ = variance_.asDiagonal() * rigid_;
+    resultants_ = (rigid_.transpose() * weighted_).ldlt();
+  }
+  RowMatrix operator()(const RowMatrix& displacements) const {
+    RowMatrix out = variance_.asDiagonal() * displacements;
+    if (rigid_.size() > 0) out -= weighted_ * resultants_.solve(MatrixXd(weighted_.transpose() * displacements));
+    return out;
+  }
+
+ private:
+  VectorXd variance_;
+  MatrixXd rigid_, weighted_;  // of a free body: what its nodes' forces work on, and that times their variance
+  Eigen::LDLT<MatrixXd> resultants_;
+};
+
+}  // namespace
+
+Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const VectorXd& areas,
+                      const std::function<void(double)>& progress) {
   constexpr Index block = 48;
-  const Index n = cells.motion.rows();
-  Responses out{MatrixXd(n, n), MatrixXd(solid.surface.rows(), n), {}};
+  const Index n = cells.motion.rows(), nodes = solid.surface.rows();
+  Responses out{MatrixXd(n, n), MatrixXd(nodes, n), {}, MatrixXd(n, n), MatrixXd(nodes, n)};
+  const RandomTractions tractions(solid, cells, areas);
   for (Index first = 0; first < n; first += block) {
     const Index count = std::min(block, n - first);
     RowMatrix x = RowMatrix(cells.motion.middleRows(first, count)).transpose();
     solve(solid.plan, solid.factors, x);
     out.frames.middleCols(first, count) = cells.motion * x;
     out.nodes.middleCols(first, count) = solid.surface * x;
+    // With the frames' motion A K^-1 L f under forces f: E[f f^T] L^T K^-1 A^T as forces.
+    x = displacementsUnder(solid, tractions(solid.loading.transpose() * x));
+    out.framesUnderTractions.middleCols(first, count) = cells.motion * x;
+    out.nodesUnderTractions.middleCols(first, count) = solid.surface * x;
     if (progress) progress(static_cast<double>(first + count) / static_cast<double>(n));
   }
   for (std::size_t i = 0; i < cells.heldGive.size(); ++i)
     out.frames.block<6, 6>(6 * static_cast<Index>(i), 6 * static_cast<Index>(i)) += cells.heldGive[i];
   out.frames = (out.frames + out.frames.transpose()).eval() / 2;
+  const double scale = out.frames.trace() / out.framesUnderTractions.trace();
+  out.framesUnderTractions = scale / 2 * (out.framesUnderTractions + out.framesUnderTractions.transpose()).eval();
+  out.nodesUnderTractions *= scale;
   return out;
 }
 
@@ -62,6 +99,8 @@ Responses balancedResponses(const TriangleMesh& mesh, const CellFrames& cells, c
   // Nodes under unit motions of the frames: the pinned solution, and the rigid motion that it lacks.
   const MatrixXd lacking = rigid.colPivHouseholderQr().solve(MatrixXd::Identity(n, n) - pinned.frames * stiffness);
   out.nodes = (pinned.nodes * stiffness + nodesRigid * lacking) * out.frames;
+  out.framesUnderTractions = pinned.framesUnderTractions;
+  out.nodesUnderTractions = pinned.nodesUnderTractions;
   return out;
 }
 

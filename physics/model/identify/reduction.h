@@ -11,12 +11,17 @@ namespace medulla {
 struct Responses {
   Eigen::MatrixXd frames, nodes;  // 6 frames and 3 nodes x 6 frames
   Eigen::MatrixXd grounding;      // of a free body: what has been added to its stiffness, 6 frames square
+  // Under random tractions, alike all over the surface: second moments of the frames' motions, in sum over the diagonal
+  // as large as `frames`, and of the nodes' with them.
+  Eigen::MatrixXd framesUnderTractions, nodesUnderTractions;
 };
 
 // Throws std::runtime_error where the matrix is not positive definite.
 Eigen::MatrixXd solvePositive(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 
-Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const std::function<void(double)>& progress);
+// `areas`: of the mesh's nodes, 0 where held.
+Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const Eigen::VectorXd& areas,
+                      const std::function<void(double)>& progress);
 
 // Of a free body from that of the pins it stands on, which its balanced loads do not feel. Its own stiffness is the
 // least energy over all rigid motions; on these a stiffness like the others' mean is added, so that there is a

@@ -207,7 +207,8 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
                     8e-9 * solid.plan.factorNumbers, 1e-9 * settings.memoryMax));
   }
   const HeldCells held = heldCells(mesh, settings, grid);
-  const auto pinned = pinnedFreedoms(grid, held.empty() ? isostaticPins(grid) : std::vector<GridPin>());
+  solid.isFree = held.empty();
+  const auto pinned = pinnedFreedoms(grid, solid.isFree ? isostaticPins(grid) : std::vector<GridPin>());
   // A batch of cells at once makes their matrices by one large product.
   constexpr std::size_t batch = 32;
   const MatrixXd perPoint = stiffnessPerPoint(settings.poisson);

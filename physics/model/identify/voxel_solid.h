@@ -22,6 +22,7 @@ using RowSparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 struct VoxelSolid {
   VoxelBody voxels;            // of all the body, HexGrid::kVoxels of them along a cell's edge
   std::vector<bool> isBehind;  // of each piece of them: has no cell and does not move
+  bool isFree = false;         // nothing is held
   HexGrid grid;
   DissectionPlan plan;
   FrontFactors factors;
