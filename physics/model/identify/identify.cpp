@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -161,10 +162,6 @@ VectorXd freeAreas(const NodeSurface& surface) {
   return out;
 }
 
-// Bodies are loaded on their surface: nodes follow frames as they do there. Loads spread over cells, which alone leave
-// a body's end unstretched and untwisted, count so much less; they settle what tractions leave open.
-constexpr double kTractions = 1000;
-
 // Random loads; of a free body with forces, spread by area, that balance them, and displacements without their rigid
 // part, in which two answers may differ at will.
 class Trials {
@@ -209,16 +206,36 @@ class Trials {
   MatrixXd rigid_, weighted_;  // of a free body: 3 nodes x 6, and times the nodes' areas
 };
 
-// Fits the layer to loads of its own, and measures the network on others, which nothing was fitted to; then solves
-// those again in cells a third larger.
-void fitLayerAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const SolidSettings& settings,
-                        const MatrixXd& grounding, Identification& result, const Progress& progress) {
+// Bodies are loaded on their surface, where loads spread over cells would leave a body's end unstretched and untwisted;
+// responses to tractions alone leave maps too free, which send loads to the frames by the same numbers. So tractions
+// get the weight among loads on the frames with which the network answers `forces` best.
+void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Responses& responses, const Trials& trials,
+                const RowMatrix& forces, const MatrixXd& under, IdentifiedNetwork& out) {
+  double least = std::numeric_limits<double>::infinity();
+  std::vector<std::vector<SkinFrame>> best;
+  for (const double weight : {0., 3., 10., 30., 100., 300., 1000.}) {
+    out.skin = fitSkin(mesh, cells, out.patches, responses.frames + weight * responses.framesUnderTractions,
+                       responses.nodes + weight * responses.nodesUnderTractions);
+    const double error = errorOf(trials.ofFrames(forces), under).rms;
+    if (!(error < least)) continue;
+    least = error;
+    best = out.skin;
+  }
+  out.skin = best;
+}
+
+// Fits skin and layer to loads of their own, and measures the network on others, which nothing was fitted to; then
+// solves those again in cells a third larger.
+void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const SolidSettings& settings,
+                          const CellFrames& cells, const Responses& responses, Identification& result,
+                          const Progress& progress) {
   constexpr int count = 16;
   IdentifiedNetwork& out = result.network;
-  const Trials trials(mesh, out, grounding);
+  const Trials trials(mesh, out, responses.grounding);
   RowMatrix teaching(3 * static_cast<Index>(mesh.vertices.size()), 2 * count);
   teaching << trials.loads(LoadKind::bulk, count, 1), trials.loads(LoadKind::poke, count, 1);
   const MatrixXd under = trials.exact(solid, teaching);
+  chooseSkin(mesh, cells, responses, trials, teaching, under, out);
   out.layer =
       fitLayer(mesh, trials.surface, teaching, under - trials.ofFrames(teaching), largestOf(under), out.lengthScale);
   progress(0.4);
@@ -272,10 +289,8 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   out.lengthScale = cells.lengthScale;
   out.links = layOutLinks(mesh, cells, out.patches, patchTriangles);
   fitLinks(responses.frames, responses.grounding, out.lengthScale, settings.links, out.links, stage(0.4, 0.85));
-  out.skin = fitSkin(mesh, cells, out.patches, responses.frames + kTractions * responses.framesUnderTractions,
-                     responses.nodes + kTractions * responses.nodesUnderTractions);
   out.frames = cells.frames;
-  fitLayerAndMeasure(mesh, solid, solidSettings, responses.grounding, result, stage(0.85, 1));
+  fitSurfaceAndMeasure(mesh, solid, solidSettings, cells, responses, result, stage(0.85, 1));
   requireFinite(out);
   return result;
 }
