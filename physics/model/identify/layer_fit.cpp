@@ -98,6 +98,7 @@ IdentifiedLayer fitLayer(const TriangleMesh& mesh, const NodeSurface& surface, c
   Eigen::SimplicialLLT<SparseMatrix> factors;
   factors.analyzePattern(SparseMatrix(parts[0] + parts[1] + parts[2] + held));
   const Vector3d units(1 / lengthScale, 1 / lengthScale, lengthScale);
+  // Skins leave next to nothing to give across; stiffer springs there would only shorten the step.
   const Vector3d low(0, 0, std::log(1e-3)), high(std::log(1e3), std::log(2.), std::log(0.1));
   const auto objective = [&](const VectorXd& x, VectorXd& gradient) {
     if ((x - low).minCoeff() < 0 || (x - high).maxCoeff() > 0) return std::numeric_limits<double>::infinity();
