@@ -12,6 +12,11 @@ using Eigen::Vector3d;
 
 namespace {
 
+// A patch counts as nearer than it is: what hangs on moving frames alone has to follow their common rigid motion
+// exactly, which ties its maps where all of them are held by what is near. On a bed the pokes' RMS error was a third
+// larger without.
+constexpr double kPatchNearness = 2. / 3;
+
 // The node's nearest frames, nearest first, with rest points and weights.
 std::vector<SkinFrame> nearestFrames(const TriangleMesh& mesh, const CellFrames& cells,
                                      const std::vector<FixedPatch>& patches, const Vector3d& node) {
@@ -21,8 +26,11 @@ std::vector<SkinFrame> nearestFrames(const TriangleMesh& mesh, const CellFrames&
   for (const FixedPatch& patch : patches)
     all.push_back({static_cast<int>(all.size()), 0, mesh.vertices[nearestNode(mesh, patch, node)]});
   const auto distance = [&](const SkinFrame& f) { return (f.restPoint - node).norm(); };
+  const auto rank = [&](const SkinFrame& f) {
+    return (f.frame < static_cast<int>(cells.frames.size()) ? 1 : kPatchNearness) * distance(f);
+  };
   std::stable_sort(all.begin(), all.end(),
-                   [&](const SkinFrame& a, const SkinFrame& b) { return distance(a) < distance(b); });
+                   [&](const SkinFrame& a, const SkinFrame& b) { return rank(a) < rank(b); });
   all.resize(std::min<std::size_t>(all.size(), kSkinFrames));
   double sum = 0;
   for (SkinFrame& f : all) sum += f.weight = std::pow(std::max(distance(f), 0.1 * cells.lengthScale), -2);
