@@ -12,30 +12,25 @@ using Eigen::Vector3d;
 
 namespace {
 
-// A patch counts as nearer than it is: what hangs on moving frames alone has to follow their common rigid motion
-// exactly, which ties its maps where all of them are held by what is near. On a bed the pokes' RMS error was a third
-// larger without.
-constexpr double kPatchNearness = 2. / 3;
-
-// The node's nearest frames, nearest first, with rest points and weights.
-std::vector<SkinFrame> nearestFrames(const TriangleMesh& mesh, const CellFrames& cells,
-                                     const std::vector<FixedPatch>& patches, const Vector3d& node) {
+// All frames, nearest first, with rest points.
+std::vector<SkinFrame> framesByDistance(const TriangleMesh& mesh, const CellFrames& cells,
+                                        const std::vector<FixedPatch>& patches, const Vector3d& node) {
   std::vector<SkinFrame> all;
   for (std::size_t i = 0; i < cells.frames.size(); ++i)
     all.push_back({static_cast<int>(i), 0, cells.frames[i].restPosition});
   for (const FixedPatch& patch : patches)
     all.push_back({static_cast<int>(all.size()), 0, mesh.vertices[nearestNode(mesh, patch, node)]});
   const auto distance = [&](const SkinFrame& f) { return (f.restPoint - node).norm(); };
-  const auto rank = [&](const SkinFrame& f) {
-    return (f.frame < static_cast<int>(cells.frames.size()) ? 1 : kPatchNearness) * distance(f);
-  };
   std::stable_sort(all.begin(), all.end(),
-                   [&](const SkinFrame& a, const SkinFrame& b) { return rank(a) < rank(b); });
-  all.resize(std::min<std::size_t>(all.size(), kSkinFrames));
-  double sum = 0;
-  for (SkinFrame& f : all) sum += f.weight = std::pow(std::max(distance(f), 0.1 * cells.lengthScale), -2);
-  for (SkinFrame& f : all) f.weight /= sum;
+                   [&](const SkinFrame& a, const SkinFrame& b) { return distance(a) < distance(b); });
   return all;
+}
+
+void setWeights(const CellFrames& cells, const Vector3d& node, std::vector<SkinFrame>& frames) {
+  double sum = 0;
+  for (SkinFrame& f : frames)
+    sum += f.weight = std::pow(std::max((f.restPoint - node).norm(), 0.1 * cells.lengthScale), -2);
+  for (SkinFrame& f : frames) f.weight /= sum;
 }
 
 // Rows: the motions of the frames, (u, lengthScale theta) each, in rigid motions about the node; columns: translation
@@ -52,9 +47,9 @@ MatrixXd rigidMotions(const std::vector<SkinFrame>& frames, const Vector3d& node
 }
 
 // The maps B of least tr (Phi - B) C (Phi - B)^T whose rigid motions are the node's: with C and Phi C restricted to
-// the node's frames, B C = Phi C + multipliers.
-void fitNode(const MatrixXd& compliance, const Eigen::Ref<const MatrixXd>& response, const Vector3d& node,
-             double lengthScale, std::vector<SkinFrame>& frames) {
+// the node's frames, B C = Phi C + multipliers. Returns that trace, less what does not depend on B.
+double fitNode(const MatrixXd& compliance, const Eigen::Ref<const MatrixXd>& response, const Vector3d& node,
+               double lengthScale, std::vector<SkinFrame>& frames) {
   const auto m = 6 * static_cast<Index>(frames.size()), spheres = compliance.rows() / 6;
   MatrixXd system = MatrixXd::Zero(m + 6, m + 6), right = MatrixXd::Zero(m + 6, 3);
   for (std::size_t a = 0; a < frames.size(); ++a) {
@@ -67,6 +62,7 @@ void fitNode(const MatrixXd& compliance, const Eigen::Ref<const MatrixXd>& respo
     }
     right.middleRows<6>(row) = response.middleCols<6>(6 * frames[a].frame).transpose();
   }
+  const MatrixXd among = system.topLeftCorner(m, m), toNode = right.topRows(m);
   const double scale = system.trace() / static_cast<double>(m);
   if (scale > 0) {
     system /= scale;
@@ -82,6 +78,8 @@ void fitNode(const MatrixXd& compliance, const Eigen::Ref<const MatrixXd>& respo
   solution += factors.solve(right - system * solution);
   for (std::size_t k = 0; k < frames.size(); ++k)
     frames[k].map = solution.middleRows<6>(6 * static_cast<Index>(k)).transpose();
+  const MatrixXd maps = solution.topRows(m);
+  return (maps.transpose() * (among * maps - 2 * toNode)).trace();
 }
 
 }  // namespace
@@ -106,9 +104,27 @@ std::vector<std::vector<SkinFrame>> fitSkin(const TriangleMesh& mesh, const Cell
   }
   for (std::size_t n = 0; n < skin.size(); ++n) {
     if (!skin[n].empty()) continue;
-    skin[n] = nearestFrames(mesh, cells, patches, mesh.vertices[n]);
-    fitNode(compliance, nodesUnderLoads.middleRows<3>(3 * static_cast<Index>(n)), mesh.vertices[n], cells.lengthScale,
-            skin[n]);
+    const Vector3d& node = mesh.vertices[n];
+    const auto fit = [&](std::vector<SkinFrame>& frames) {
+      setWeights(cells, node, frames);
+      return fitNode(compliance, nodesUnderLoads.middleRows<3>(3 * static_cast<Index>(n)), node, cells.lengthScale,
+                     frames);
+    };
+    const std::vector<SkinFrame> all = framesByDistance(mesh, cells, patches, node);
+    const auto end = all.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(all.size(), kSkinFrames));
+    skin[n].assign(all.begin(), end);
+    const double left = fit(skin[n]);
+    // Moving frames alone have to carry the node along with their common rigid motion, which ties its maps where all of
+    // them are held by what is near: then a patch may tell more than the farthest of them. What is far from it turns
+    // too much for maps that are linear.
+    constexpr double kPatchReach = 1.5;  // of the farthest frame's distance
+    const auto patch = std::find_if(
+        all.begin(), all.end(), [&](const SkinFrame& f) { return f.frame >= static_cast<int>(cells.frames.size()); });
+    const double farthest = (skin[n].back().restPoint - node).norm();
+    if (patch == all.end() || patch < end || (patch->restPoint - node).norm() > kPatchReach * farthest) continue;
+    std::vector<SkinFrame> grounded(all.begin(), end - 1);
+    grounded.push_back(*patch);
+    if (fit(grounded) < left) skin[n] = std::move(grounded);
   }
   return skin;
 }

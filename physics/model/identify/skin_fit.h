@@ -6,7 +6,7 @@
 
 namespace medulla {
 
-constexpr int kSkinFrames = 6;  // a node hangs on so many of its nearest frames; four are nearly as good, one is bad
+constexpr int kSkinFrames = 6;  // a node hangs on so many frames, the nearest; four are nearly as good, one is bad
 
 // Hangs the mesh's nodes on frames so that they answer loads on all frames as near to finite elements as rigid motion
 // of all together allows, which is reproduced exactly. `compliance` is that of the frames (6 frames square),
