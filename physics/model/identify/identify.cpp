@@ -11,6 +11,7 @@
 #include "physics/model/identify/layer_fit.h"
 #include "physics/model/identify/reduction.h"
 #include "physics/model/identify/skin_fit.h"
+#include "physics/model/identify/thin_parts.h"
 
 namespace medulla {
 
@@ -114,9 +115,8 @@ CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const V
       const double neck = 2 * std::sqrt(link.sections[k].area / std::numbers::pi);
       const Vector3d place = from + (k + 0.5) / ElasticLink::kSections * (to - from);
       if (neck / perNeck >= out.size || behind(place)) continue;
-      out = {neck / perNeck,
-             fmt::format("the neck of {:.2g} mm between spheres {} and {}, near ({:.3g}, {:.3g}, {:.3g})", 1e3 * neck,
-                         link.sphere0, link.sphere1, place.x(), place.y(), place.z())};
+      out = {neck / perNeck, fmt::format("the neck of {:.2g} mm between spheres {} and {}, near {} m", 1e3 * neck,
+                                         link.sphere0, link.sphere1, placeText(place))};
     }
   }
   return out;
@@ -128,7 +128,7 @@ VoxelSolid makeSolid(const SoftBodyModel& model, const TriangleMesh& mesh, const
   const CellSize cell = chooseSize(model, behindHeld(solid.heldSpaces));
   try {
     return makeVoxelSolid(mesh, cell.size, solid, progress);
-  } catch (const std::runtime_error& error) {
+  } catch (const OverBudget& error) {
     const std::string why = cell.neck.empty()
                                 ? fmt::format("fewer spheres than {} would do with larger ones", model.spheres.size())
                                 : "it is too thin for its size: " + cell.neck;
@@ -292,12 +292,14 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   std::vector<Ball> balls;
   for (const FillingSphere& s : model.spheres) balls.push_back({s.restBallCentre, s.radius});
   const VoxelSolid solid = makeSolid(model, mesh, settings, solidSettings, stage(0, 0.2));
+  requireWithinReach(solid.grid, mesh, solidSettings.heldTriangles);
   const CellFrames cells = makeCellFrames(mesh, balls, solid);
   Responses responses = solveFrames(solid, cells, freeAreas(measureNodes(mesh, out.patches)), stage(0.2, 0.4));
   if (held.empty()) responses = balancedResponses(mesh, cells, responses);
   out.voxel = solid.grid.size;
   out.lengthScale = cells.lengthScale;
   out.links = layOutLinks(mesh, cells, out.patches, patchTriangles);
+  requireLinked(mesh, cells, out.links, out.voxel);
   fitLinks(responses.frames, responses.grounding, out.lengthScale, settings.links, out.links, stage(0.4, 0.85));
   out.frames = cells.frames;
   fitSurfaceAndMeasure(mesh, solid, solidSettings, cells, responses, result, stage(0.85, 1));

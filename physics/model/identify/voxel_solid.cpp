@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "physics/model/identify/hex_stiffness.h"
+#include "physics/model/identify/thin_parts.h"
 #include "physics/model/mass_properties.h"
 #include "physics/model/surface_queries.h"
 
@@ -191,8 +192,8 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
   // Beyond, even the plan would take long; what fits has a tenth of these.
   constexpr double cellsMax = 1e5;
   if (volume / (cellSize * cellSize * cellSize) > cellsMax) {
-    throw std::runtime_error(fmt::format("finite elements of {:.3g} mm would be {:.2g}, expected at most {:.2g}",
-                                         1e3 * cellSize, volume / (cellSize * cellSize * cellSize), cellsMax));
+    throw OverBudget(fmt::format("finite elements of {:.3g} mm would be {:.2g}, expected at most {:.2g}",
+                                 1e3 * cellSize, volume / (cellSize * cellSize * cellSize), cellsMax));
   }
   solid.voxels = voxelise(mesh, volume, static_cast<int>(volume / (voxel * voxel * voxel)));
   const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
@@ -202,12 +203,14 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
   const HexGrid& grid = solid.grid;
   solid.plan = planDissection(grid);
   if (8 * solid.plan.factorNumbers > settings.memoryMax) {
-    throw std::runtime_error(
-        fmt::format("finite elements of {:.3g} mm would take {:.1f} GB, expected at most {:.1f} GB", 1e3 * grid.size,
-                    8e-9 * solid.plan.factorNumbers, 1e-9 * settings.memoryMax));
+    throw OverBudget(fmt::format("finite elements of {:.3g} mm would take {:.1f} GB, expected at most {:.1f} GB",
+                                 1e3 * grid.size, 8e-9 * solid.plan.factorNumbers, 1e-9 * settings.memoryMax));
   }
   const HeldCells held = heldCells(mesh, settings, grid);
   solid.isFree = held.empty();
+  std::vector<bool> isHeld(grid.cells.size(), false);
+  for (const auto& [cell, springs] : held) isHeld[cell] = true;
+  requireConnected(grid, isHeld);
   const auto pinned = pinnedFreedoms(grid, solid.isFree ? isostaticPins(grid) : std::vector<GridPin>());
   // A batch of cells at once makes their matrices by one large product.
   constexpr std::size_t batch = 32;

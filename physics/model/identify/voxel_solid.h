@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/SparseCore>
 #include <functional>
+#include <stdexcept>
 #include <vector>
 
 #include "physics/model/identify/held_region.h"
@@ -37,7 +38,13 @@ struct SolidSettings {
   double memoryMax = 3e9;  // bytes for the factors
 };
 
-// `cellSize` is met within a percent. Throws std::runtime_error where the factors would not fit.
+// Cells that would be too many, or whose factors would take more memory than they may.
+struct OverBudget : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// `cellSize` is met within a percent. Throws OverBudget, and std::runtime_error where the body is so thin that its
+// cells do not hang together.
 VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
                           const std::function<void(double)>& progress = {});
 

@@ -1,0 +1,81 @@
+#include <fmt/core.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "physics/model/identify/thin_parts.h"
+#include "tests/program_run.h"
+#include "tests/temporary_folder.h"
+#include "tests/test_shapes.h"
+
+// Bodies too thin for the finite elements that they may have: refused with the part of them that is.
+namespace medulla {
+namespace {
+
+using Eigen::Vector3d;
+
+// A body of revolution along x, 120 mm long, that is held at x = 0. `radius` (mm) of x (mm).
+std::string turnedObj(const std::function<double(double)>& radius) {
+  std::string text;
+  const TriangleMesh mesh = cylinderMesh(120, 1, 18, 48);
+  for (const Vector3d& x : mesh.vertices)
+    text += fmt::format("v {} {} {}\n", x.x(), x.y() * radius(x.x()), x.z() * radius(x.x()));
+  for (const auto& [a, b, c] : mesh.triangles) text += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
+  return text;
+}
+
+// Its ends are blunt, so that there are balls for them.
+double lobes(double x, double neck) {
+  const double end = std::max(0., std::abs(x - 60) - 50) / 11;
+  return (neck + (20 - neck) * (1 - std::exp(-std::pow((x - 60) / 8, 2)))) * std::sqrt(std::max(0.05, 1 - end * end));
+}
+
+void expectRefused(const std::function<double(double)>& radius, const std::vector<std::string>& says) {
+  const TemporaryFolder folder;
+  folder.write("body.obj", turnedObj(radius));
+  const ProgramResult r =
+      runProgram({"build", folder / "body.obj", "--unit", "mm", "--overshoot", "0", "--render-levels", "0",
+                  "--identify", "--fix", "plane=1,0,0,0.001", "-o", folder / "body.xml"});
+  EXPECT_EQ(r.exitCode, 1);
+  EXPECT_EQ(r.out, "");
+  const std::size_t line = r.err.find("medulla: " + (folder / "body.obj"));  // after what was repaired
+  ASSERT_NE(line, std::string::npos) << r.err;
+  EXPECT_EQ(r.err.find('\n', line), r.err.size() - 1) << r.err;
+  for (const std::string& words : says) EXPECT_NE(r.err.find(words, line), std::string::npos) << r.err;
+  EXPECT_EQ(folder.contents(), std::vector<std::string>{"body.obj"});
+}
+
+TEST(ThinMesh, ANeckThatAsksForMoreFiniteElementsThanMemoryHoldsIsRefusedWithItsPlace) {
+  expectRefused([](double x) { return lobes(x, 2); },
+                {"GB, expected at most 3.0 GB", "too thin for its size: the neck of 4 mm between spheres",
+                 "near (0.0599, 0.0000, 0.0000) m"});
+}
+
+// So short that no station of a link lies in it.
+TEST(ThinMesh, AHairThinNeckIsRefusedWithItsPlace) {
+  for (const double neck : {0.5, 0.1})
+    expectRefused([&](double x) { return lobes(x, neck); }, {"too thin near (0.0600, 0.0000, 0.0000) m: the neck of"});
+}
+
+// What hangs on a neck and is less than a fiftieth of the body asks for no smaller elements: it moves with the neck,
+// if there are any there.
+TEST(ThinMesh, ASpikeThatReachesBeyondAllFiniteElementsIsRefusedWithItsEnd) {
+  expectRefused([](double x) { return x < 70 ? 20 : std::max(0.3, 20 * std::exp((70 - x) / 6)); },
+                {"too thin near (0.1200, ", "finite elements of 3.9", "before it"});
+}
+
+TEST(ThinMesh, AKnobOnAHairIsRefusedWithThePlaceBeforeIt) {
+  const auto radius = [](double x) {
+    if (x > 106) return 5.;
+    return x < 70 ? 20 : std::max(0.2, 20 * std::exp((70 - x) / 3));
+  };
+  expectRefused(radius, {"too thin near (0.", "finite elements of", "fall apart there"});
+}
+
+TEST(ThinMesh, PlacesAreSaidWithoutNegativeZeros) {
+  EXPECT_EQ(placeText({-1e-7, 0.05994, -0.12}), "(0.0000, 0.0599, -0.1200)");
+}
+
+}  // namespace
+}  // namespace medulla
