@@ -94,7 +94,10 @@ static void resolvePatches(const Scene& scene, const SoftBodyModel& model, Scene
 static void resolveFixes(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
   if (body.links == LinkModel::identified) {
     resolvePatches(scene, model, body);
-    if (!model.identified->usesFormulas) return;
+    if (!model.identified->usesFormulas) {
+      for (const int sphere : spheresBehindPatches(*model.identified)) body.fixed.push_back({sphere});
+      return;
+    }
     body.links = LinkModel::beam;
     body.fixedNodes.clear();
   }

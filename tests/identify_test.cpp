@@ -10,6 +10,8 @@
 #include <limits>
 #include <numbers>
 
+#include "physics/dynamics/fixation.h"
+#include "physics/dynamics/world.h"
 #include "physics/model/build.h"
 #include "physics/model/identify/check_loads.h"
 #include "physics/model/identify/hex_stiffness.h"
@@ -359,6 +361,35 @@ TEST(IdentifiedNetwork, AnswersLoadsAsFiniteElementsDo) {
   ASSERT_EQ(held.patches.size(), 1u);
   EXPECT_EQ(held.patches[0].nodes.size(), 19u);
   for (const int n : held.patches[0].nodes) EXPECT_EQ(held.skin[n].front().frame, static_cast<int>(held.frames.size()));
+}
+
+// Frames behind a patch stand still in finite elements; held altogether they do not set the step.
+TEST(IdentifiedNetwork, SpheresBehindAPatchAreHeld) {
+  HeldRegion region{"plane=1,0,0,0.0451", {}, true};
+  const TriangleMesh mesh = cylinder();
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
+    if (mesh.vertices[n].x() <= 0.0451) region.nodes.push_back(static_cast<int>(n));
+  const IdentifiedNetwork network = identifyNetwork(cylinderModel(), {region}, {}).network;
+  std::vector<int> behind;
+  for (std::size_t k = 0; k < network.frames.size(); ++k)
+    if (network.frames[k].restPosition.x() < 0.035) behind.push_back(static_cast<int>(k));
+  ASSERT_GE(behind.size(), 1u);
+  EXPECT_EQ(spheresBehindPatches(network), behind);
+  EXPECT_TRUE(spheresBehindPatches(heldCylinder().network).empty());
+  EXPECT_TRUE(spheresBehindPatches(freeCylinder().network).empty());
+
+  BodyDescription body;
+  body.model = [&] {
+    auto model = std::make_shared<SoftBodyModel>(cylinderModel());
+    model->identified = std::make_shared<IdentifiedNetwork>(network);
+    return model;
+  }();
+  body.links = LinkModel::identified;
+  body.tissue = {.young = 5e3, .poisson = 0.45, .density = 1000};
+  body.fixedNodes = network.patches[0].nodes;
+  const double loose = World({}, {body}).substep();
+  for (const int sphere : behind) body.fixed.push_back({sphere});
+  EXPECT_GT(World({}, {body}).substep(), 2 * loose);
 }
 
 std::string refusal(const std::vector<HeldRegion>& regions, const IdentifySettings& settings) {

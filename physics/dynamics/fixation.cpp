@@ -1,6 +1,9 @@
 #include "physics/dynamics/fixation.h"
 
+#include <algorithm>
+
 #include "physics/model/attachment.h"
+#include "physics/model/identify/voxel_solid.h"
 
 namespace medulla {
 
@@ -31,6 +34,23 @@ std::vector<int> spheresHeldBy(const SoftBodyModel& model, const std::vector<int
         fixed[s].ownNodes >= 3 && fixed[s].own >= 0.5 * all[s].own && all[s].own >= kLeastOwn * all[s].shared;
     if (ofAll || ofOwn) out.push_back(static_cast<int>(s));
   }
+  return out;
+}
+
+std::vector<int> spheresBehindPatches(const IdentifiedNetwork& network) {
+  // 1/m2, of translation: a cell wholly behind has its volume times this. One with a third of it still carried some of
+  // a gallbladder's bending: held, it took the error from 3.9 to 6.8 %.
+  const double penalty = kHeldPenalty / (network.voxel * network.voxel);
+  constexpr double share = 0.5;
+  std::vector<int> out;
+  const int frames = static_cast<int>(network.frames.size());
+  for (const IdentifiedLink& link : network.links) {
+    if (link.frame1 < frames) continue;
+    const double translation = link.stiffness.topLeftCorner<3, 3>().trace() / 3;
+    if (translation > share * penalty * network.frames[link.frame0].volume) out.push_back(link.frame0);
+  }
+  std::sort(out.begin(), out.end());
+  out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;
 }
 
