@@ -1,11 +1,12 @@
 """The bodies and load cases of the references: what is held, what is loaded, how much. Lengths in mm, forces in mN."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 import meshes
+import other_meshes
 
 
 @dataclass
@@ -195,5 +196,35 @@ def stomach():
                 grids={"root": grids(1, 2, 1, 4, 1, 6)}, kept={"root": 1}, modes=0)
 
 
+# The same bodies and loads on meshes that other_meshes.py makes: bending and a pull each.
+
+
+def liver_stretched():
+    stretch = np.array(other_meshes.LIVER_STRETCH)
+    body = liver()
+    regions = {name: lambda x, n, inside=inside: inside(x / stretch, n) for name, inside in body.regions.items()}
+    cases = [Case("tip", "root", Load("tip", (0, 0, 200))), Case("axial", "root", Load("tip", (1000, 0, 0)))]
+    return replace(body, name="liver_stretched", mesh="tests/accuracy/liver_stretched.obj", regions=regions, cases=cases,
+                   kept={"root": 0}, modes=0)
+
+
+def gallbladder_remeshed(name, rim):
+    body = gallbladder()
+    along = {case.name: case for case in body.cases}["axial"].load.force
+    pull = Case("pull", "root", Load("tip", tuple(np.array(along) / 7)), 4)
+    cases = [case for case in body.cases if case.name == "tip_large"] + [pull]
+    return replace(body, name=name, mesh=f"tests/accuracy/{name}.obj", cases=cases, grids={"root": rim}, kept={"root": 0},
+                   modes=0)
+
+
+def kidney():
+    regions = {"root": within((17, 0, 0), 20), "pole": beyond((0, 1, 0), 44)}
+    cases = [Case("tip", "root", Load("pole", (0, 0, 300))), Case("axial", "root", Load("pole", (0, 1000, 0)), 4)]
+    return Body("kidney", "tests/accuracy/kidney.obj", 6e3, 1050, regions, cases, grids={"root": grids(1, 2, 1, 4, 1, 6)},
+                kept={"root": 0}, modes=0)
+
+
 def bodies():
-    return [cylinder(), gallbladder(), liver(), stomach()]
+    remeshed = [gallbladder_remeshed("gallbladder_halved", grids(2, 4, 3, 4)),
+                gallbladder_remeshed("gallbladder_doubled", grids(1, 4, 2, 4))]
+    return [cylinder(), gallbladder(), liver(), stomach(), liver_stretched(), *remeshed, kidney()]

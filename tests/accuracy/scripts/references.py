@@ -9,6 +9,7 @@ import sys
 import cases
 import dynamics
 import meshes
+import other_meshes
 import result_files
 import study
 
@@ -36,8 +37,9 @@ def make(project, results, work, wanted):
     cylinder = os.path.join(project, "tests/accuracy/cylinder.obj")
     meshes.write_obj(cylinder + ".part", "cylinder", *meshes.cylinder())
     os.replace(cylinder + ".part", cylinder)
-    chosen = lambda name: not wanted or name in wanted or name.split("_")[0] in wanted
+    other_meshes.write_missing(project)
     for body in cases.bodies():
+        chosen = lambda name: not wanted or name in wanted or body.name in wanted
         body.read(project)
         solved = study.Study(work, body, say)
         for case in body.cases:
