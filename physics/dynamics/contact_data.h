@@ -45,7 +45,7 @@ struct StaticNeighbour {
 // Four lines of the cache: contacts of a heap outgrow it, and all are read in every pass.
 struct alignas(64) Contact {
   std::uint64_t key;  // which pair: what ties it to the substep before
-  std::uint32_t ends = 0, firstSideEnds = 0;
+  std::int32_t ends = 0, firstSideEnds = 0;
   std::array<std::uint32_t, 4> sphere;
   std::array<double, 4> weight;        // < 0 on the side that the normal points away from
   std::array<double, 2> reach;         // m, per side: from the ball's centre to the point of contact, along the normal
@@ -65,7 +65,7 @@ static_assert(sizeof(Contact) == 256);
 // m, from the frame of the contact's end `e` to the point of contact, moved along with its side. Not kept: too large.
 // `arm` is ContactData::arm of the end's sphere.
 MEDULLA_INLINE Lanes leverOf(const Quad& arm, const Contact& c, int e) {
-  return fma(splat(c.reach[e >= static_cast<int>(c.firstSideEnds)]), c.normal, load(arm));
+  return fma(splat(c.reach[e >= c.firstSideEnds]), c.normal, load(arm));
 }
 
 struct CarriedImpulse {
