@@ -207,13 +207,15 @@ class Trials {
 
 // Bodies are loaded on their surface, where loads spread over cells would leave a body's end unstretched and untwisted;
 // responses to tractions alone leave maps too free, which send loads to the frames by the same numbers. So tractions
-// get the weight among loads on the frames with which the network answers both halves of `forces` best. The bound keeps
+// get the largest weight among loads on the frames that costs the answer to either half of `forces` no more than these
+// scatter: concentrated and random, they say little of ends, by a percent or two where few spheres are. The bound keeps
 // pokes: of many spheres, neighbours' maps grow against one another before random loads tell.
 void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Responses& responses, const Trials& trials,
                 const RowMatrix& forces, const MatrixXd& under, IdentifiedNetwork& out) {
+  constexpr double kScatter = 1.02;
   const double most = 5600 / std::pow(static_cast<double>(cells.frames.size()), 1.5);
   const Index half = forces.cols() / 2;
-  double least = 0, first = 0, second = 0;
+  double first = 0, second = 0;
   std::vector<std::vector<SkinFrame>> best;
   for (const double weight : {0., 3., 10., 100., 300.}) {
     if (weight > most) break;
@@ -226,9 +228,7 @@ void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Respons
       first = bulk;
       second = poke;
     }
-    const double error = std::max(bulk / first, poke / second);
-    if (weight > 0 && !(error < least)) continue;
-    least = error;
+    if (weight > 0 && !(std::max(bulk / first, poke / second) < kScatter)) continue;
     best = out.skin;
   }
   out.skin = best;
