@@ -33,7 +33,8 @@ class EdgePull {
     displaced_ = reinterpret_cast<std::uintptr_t>(d.nodes.displaced.data()) - 4 * sizeof(Quad) * toConstants_;
   }
   MEDULLA_INLINE Lanes3 at(int g, const Lanes3& own) const {
-    return pullOfEdges(springs_, groups_, reinterpret_cast<const Quad*>(displaced_), own, g + toConstants_);
+    const auto* displaced = reinterpret_cast<const Quad*>(displaced_);  // NOLINT(performance-no-int-to-ptr)
+    return pullOfEdges(springs_, groups_, displaced, own, g + toConstants_);
   }
 
  private:

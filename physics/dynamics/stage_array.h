@@ -31,7 +31,8 @@ class StageArray {
   // From now on place `first` is the first one of the shared memory.
   void useShared(std::size_t first) {
     // As an integer: a pointer before the memory's beginning is not defined.
-    at_ = reinterpret_cast<T*>(reinterpret_cast<std::uintptr_t>(shared_.data()) - first * sizeof(T));
+    const std::uintptr_t place = reinterpret_cast<std::uintptr_t>(shared_.data()) - first * sizeof(T);
+    at_ = reinterpret_cast<T*>(place);  // NOLINT(performance-no-int-to-ptr)
   }
   void useWhole() { at_ = whole_.data(); }
 

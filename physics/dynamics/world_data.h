@@ -127,7 +127,7 @@ struct Links {
   StageArray<LinkFrame> frames;
   std::vector<LinkLoads> loads;    // per link, padded to four
   std::vector<Quad> unwoundTwist;  // rad per link, state: counts turns beyond 180 degrees
-  StageArray<Slot> slots;         // 2 per link: end 0, end 1
+  StageArray<Slot> slots;          // 2 per link: end 0, end 1
 };
 
 // ---- Surface nodes: sorted by host, each host's range padded to four.
@@ -179,7 +179,8 @@ struct Nodes {
 inline const NodeGroup* constantsOf(const Nodes& n, const HostRange& range) {
   // As an integer: it may lie before the memory's beginning.
   const std::ptrdiff_t shift = range.toConstants * static_cast<std::ptrdiff_t>(sizeof(NodeGroup));
-  return reinterpret_cast<const NodeGroup*>(reinterpret_cast<std::uintptr_t>(n.groups.data()) + shift);
+  const std::uintptr_t first = reinterpret_cast<std::uintptr_t>(n.groups.data()) + shift;
+  return reinterpret_cast<const NodeGroup*>(first);  // NOLINT(performance-no-int-to-ptr)
 }
 
 // ---- Edge springs between dynamic nodes, each listed at both of its nodes: sums without a store, and no spring waits
