@@ -45,9 +45,7 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
     const int l = i % 4;
     s.freedom.push_back(all(g.inverseMass[l] > 0));
     s.freedom.push_back(all(g.freeToTurn[l] > 0));
-    const Eigen::Matrix3d m = inverseInertiaOf(g, l).inverse();
-    const double entries[6] = {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)};
-    for (int e = 0; e < 6; ++e) s.inertia[i / 4].entry[e][l] = entries[e];
+    setSymmetric(s.inertia[i / 4].entry, l, inverseInertiaOf(g, l).inverse());
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) s.freedom.push_back(all(d.nodes.inverseMass[i] > 0));
   layOutNodes(d, s);

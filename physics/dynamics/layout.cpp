@@ -37,7 +37,7 @@ void addSpheres(WorldData& d, const BodyDescription& body, const BodyMechanics& 
     g.mass[l] = mechanics.sphereMass[i];
     g.inverseMass[l] = mechanics.moves[i] ? 1 / mechanics.sphereMass[i] : 0;
     g.freeToTurn[l] = mechanics.turns[i] ? 1 : 0;
-    setInverseInertia(g, l, mechanics.sphereInertia[i].inverse());
+    setSymmetric(g.inverseInertia, l, mechanics.sphereInertia[i].inverse());
   }
 }
 
@@ -162,7 +162,8 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   Nodes& n = d.nodes;
   n.count = static_cast<int>(order.node.size());
   n.displaced.resize(n.count);
-  for (std::vector<Lanes3>* a : {&n.position, &n.velocity}) a->resize(n.count / 4, Lanes3{splat(0), splat(0), splat(0)});
+  for (std::vector<Lanes3>* a : {&n.position, &n.velocity})
+    a->resize(n.count / 4, Lanes3{splat(0), splat(0), splat(0)});
   for (StageArray<Lanes3>* a : {&n.force, &n.offset, &n.area}) a->resize(n.count / 4);
   n.mass.resize(n.count, 0);
   n.inverseMass.resize(n.count, 0);

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <numeric>
 #include <utility>
 
 #include "physics/dynamics/contact_stages.h"
 #include "physics/dynamics/stages.h"
+#include "physics/model/disjoint_sets.h"
 
 // Bodies that have come to rest are left alone, together with all that touches them (islands, as in Box2D): what lies
 // still needs no model. Stillness is one of place, not of speed: contacts that bear a heap chatter by micrometres at
@@ -57,19 +57,13 @@ std::vector<char> busyBodies(const WorldData& d, const Loads& loads) {
 
 // Per body, the first body of its island: those that contacts join.
 std::vector<int> islandsOf(const WorldData& d, const std::vector<CarriedImpulse>& impulses) {
-  std::vector<int> first(d.bodies.size());
-  std::iota(first.begin(), first.end(), 0);
-  const auto rootOf = [&first](int b) {
-    while (first[b] != b) b = first[b] = first[first[b]];
-    return b;
-  };
+  DisjointSets islands(d.bodies.size());
   for (const CarriedImpulse& c : impulses) {
     const auto [a, b] = bodiesOf(d, c.key);
-    if (b < 0) continue;
-    const int rootA = rootOf(a), rootB = rootOf(b);
-    first[std::max(rootA, rootB)] = std::min(rootA, rootB);
+    if (b >= 0) islands.join(a, b);
   }
-  for (std::size_t b = 0; b < first.size(); ++b) first[b] = rootOf(static_cast<int>(b));
+  std::vector<int> first(d.bodies.size());
+  for (std::size_t b = 0; b < first.size(); ++b) first[b] = islands.of(static_cast<int>(b));
   return first;
 }
 
@@ -106,6 +100,15 @@ void shareOutLinkGroups(WorldData& d) {
   }
 }
 
+// `visit(array, groups, perGroup)` of all that lies in such arrays: the batch's groups, and places for each of them.
+template <class Visit>
+void visitStageArrays(WorldData& d, const Batch& batch, const Visit& visit) {
+  for (StageArray<Lanes3>* of : {&d.nodes.force, &d.nodes.offset, &d.nodes.area}) visit(*of, batch.nodeGroups, 1);
+  visit(d.nodes.displaced, batch.nodeGroups, 4);
+  visit(d.links.frames, batch.linkGroups, 1);
+  visit(d.links.slots, batch.linkGroups, 8);
+}
+
 // A surface that moves as a whole needs what its stages leave within its batch alone; contact mode weighs it at the
 // frame's end, and loads on skins between the stages. A world of one batch has nothing to share with.
 void shareStages(WorldData& d) {
@@ -118,36 +121,23 @@ void shareStages(WorldData& d) {
   for (Batch& batch : d.awake.batches) {
     batch.sharesStages = a.batches.size() > 1 && std::all_of(batch.bodies.begin(), batch.bodies.end(), keepsNothing);
     if (!batch.sharesStages) continue;
-    const auto extent = [](const std::vector<int>& groups) {
-      return groups.empty() ? 0 : static_cast<std::size_t>(groups.back() - groups.front() + 1);
-    };
-    const std::size_t nodes = extent(batch.nodeGroups), links = extent(batch.linkGroups);
-    for (StageArray<Lanes3>* of : {&d.nodes.force, &d.nodes.offset, &d.nodes.area}) of->reserveShared(nodes);
-    d.nodes.displaced.reserveShared(4 * nodes);
-    d.links.frames.reserveShared(links);
-    d.links.slots.reserveShared(8 * links);
+    visitStageArrays(d, batch, [](auto& array, const std::vector<int>& groups, std::size_t perGroup) {
+      if (!groups.empty()) array.reserveShared(perGroup * static_cast<std::size_t>(groups.back() - groups.front() + 1));
+    });
   }
 }
 
 }  // namespace
 
 void shareStageArrays(WorldData& d, const Batch& batch) {
-  if (!batch.sharesStages) return useWholeStageArrays(d);
-  const auto first = [](const std::vector<int>& groups) {
-    return groups.empty() ? 0 : static_cast<std::size_t>(groups.front());
-  };
-  const std::size_t node = first(batch.nodeGroups), link = first(batch.linkGroups);
-  for (StageArray<Lanes3>* of : {&d.nodes.force, &d.nodes.offset, &d.nodes.area}) of->useShared(node);
-  d.nodes.displaced.useShared(4 * node);
-  d.links.frames.useShared(link);
-  d.links.slots.useShared(8 * link);
+  if (!batch.sharesStages) return;
+  visitStageArrays(d, batch, [](auto& array, const std::vector<int>& groups, std::size_t perGroup) {
+    if (!groups.empty()) array.useShared(perGroup * static_cast<std::size_t>(groups.front()));
+  });
 }
 
-void useWholeStageArrays(WorldData& d) {
-  for (StageArray<Lanes3>* of : {&d.nodes.force, &d.nodes.offset, &d.nodes.area}) of->useWhole();
-  d.nodes.displaced.useWhole();
-  d.links.frames.useWhole();
-  d.links.slots.useWhole();
+void useWholeStageArrays(WorldData& d, const Batch& batch) {
+  visitStageArrays(d, batch, [](auto& array, const std::vector<int>&, std::size_t) { array.useWhole(); });
 }
 
 void listAwake(WorldData& d) {

@@ -46,7 +46,7 @@ void noteGain(WorldData&, int group, const Lanes3& gain);  // m/s in this frame,
 void listAwake(WorldData&);  // WorldData::awake anew
 // The memory of a batch's stages: shared with the other batches where it can be, until useWholeStageArrays().
 void shareStageArrays(WorldData&, const Batch&);
-void useWholeStageArrays(WorldData&);
+void useWholeStageArrays(WorldData&, const Batch&);
 void frameLoadedSkins(WorldData&,
                       const Loads& loads);  // at a frame's start: Awake::loadedSkins, and the lists after it
 void layOutRest(WorldData&);                // all bodies awake

@@ -158,7 +158,7 @@ void setMass(WorldData& d, int sphere, const BareSphere& mass) {
   const int l = sphere % 4;
   g.mass[l] = mass.mass;
   if (g.inverseMass[l] > 0) g.inverseMass[l] = 1 / mass.mass;
-  setInverseInertia(g, l, mass.inertia.inverse());
+  setSymmetric(g.inverseInertia, l, mass.inertia.inverse());
   const Matrix3d r = quaternionOf(d.spheres.orientation[sphere]).toRotationMatrix();
   d.spheres.angularMomentum[sphere] =
       quadOf(r * mass.inertia * r.transpose() * vectorOf(d.spheres.angularVelocity[sphere]));
@@ -263,24 +263,24 @@ void carry(WorldData& d, std::size_t part) {
   hang(d, part);
 }
 
-// m/s2, per body: gravity less the mean acceleration of its carried nodes in this frame.
-std::vector<Quad> feltGravity(const WorldData& d) {
-  std::vector<Quad> gained(d.bodies.size());
-  std::vector<double> mass(d.bodies.size(), 0);
-  for (const HostRange& range : d.surface.carried) {
-    Lanes sum = load(gained[range.body]), masses = splat(0);
-    for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; i += 4) {
-      masses = masses + _mm256_loadu_pd(&d.nodes.mass[i]);
-      for (int l = 0; l < 4; ++l) sum = fma(splat(d.nodes.mass[i + l]), load(d.surface.nodeWeight[i + l]), sum);
+// SurfaceParts::felt. The w of each sum is the mass that it goes over.
+void feelGravity(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  s.felt.assign(d.bodies.size(), Quad{});
+  for (const HostRange& range : s.carried) {
+    Lanes sum = load(s.felt[range.body]);
+    for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
+      Lanes gained = load(s.nodeWeight[i]);
+      gained[3] = 1;
+      sum = fma(splat(d.nodes.mass[i]), gained, sum);
     }
-    store(gained[range.body], sum);
-    mass[range.body] += sumOfLanes(masses);
+    store(s.felt[range.body], sum);
   }
-  for (std::size_t b = 0; b < gained.size(); ++b) {
-    const double perFrame = mass[b] > 0 ? 1 / (mass[b] * d.settings.frameDuration) : 0;
-    store(gained[b], fnma(splat(perFrame), load(gained[b]), load(d.gravity)));
+  for (Quad& felt : s.felt) {
+    const double perFrame = felt.v[3] > 0 ? 1 / (felt.v[3] * d.settings.frameDuration) : 0;
+    felt.v[3] = 0;
+    store(felt, fnma(splat(perFrame), load(felt), load(d.gravity)));
   }
-  return gained;
 }
 
 bool hasChoice(const SurfaceParts& s) {
@@ -339,10 +339,10 @@ void weighCarriedNodes(WorldData& d) {
     s.nodeWeight.resize(d.nodes.dynamicEnd);
     return;
   }
-  const std::vector<Quad> felt = feltGravity(d);
+  feelGravity(d);
   s.weight.assign(2 * d.spheres.position.size(), Quad{});
   for (std::size_t k = 0; k < s.ofGroup.size(); ++k) {
-    const Lanes of = load(felt[rangeOf(d, s.ofGroup[k]).body]);
+    const Lanes of = load(s.felt[rangeOf(d, s.ofGroup[k]).body]);
     const Lanes weight = isCarried(s, static_cast<int>(k)) ? of : splat(0);
     for (std::size_t i = 4 * k; i < 4 * k + 4; ++i) store(s.nodeWeight[i], splat(d.nodes.mass[i]) * weight);
   }
@@ -350,7 +350,7 @@ void weighCarriedNodes(WorldData& d) {
   for (const CarriedNode& node : s.nodes) {
     if (s.parts[node.part].moves) continue;
     Quad& on = s.weight[2 * node.sphere];
-    store(on, fnma(splat(node.mass.mass), load(felt[rangeOf(d, node.part).body]), load(on)));
+    store(on, fnma(splat(node.mass.mass), load(s.felt[rangeOf(d, node.part).body]), load(on)));
   }
   for (std::size_t k = 0; k < s.parts.size(); ++k)
     if (!s.parts[k].moves) releaseLink(d, k);

@@ -53,7 +53,7 @@ void applyForces(WorldData& d, const Batch& batch) {
   dampBodies(d, batch);
   dragVelocities(d, batch);
   stepVelocities(d, batch);
-  useWholeStageArrays(d);
+  useWholeStageArrays(d, batch);
 }
 
 // What joins bodies to tools and to each other; `remaining` is the time (s) from the substep's end to the frame's.

@@ -29,9 +29,10 @@ inline Eigen::Matrix3d inverseInertiaOf(const SphereGroup& g, int lane) {
   const double xx = e[0][lane], yy = e[1][lane], zz = e[2][lane], xy = e[3][lane], xz = e[4][lane], yz = e[5][lane];
   return (Eigen::Matrix3d() << xx, xy, xz, xy, yy, yz, xz, yz, zz).finished();
 }
-inline void setInverseInertia(SphereGroup& g, int lane, const Eigen::Matrix3d& inverse) {
-  const double entries[6] = {inverse(0, 0), inverse(1, 1), inverse(2, 2), inverse(0, 1), inverse(0, 2), inverse(1, 2)};
-  for (int e = 0; e < 6; ++e) g.inverseInertia[e][lane] = entries[e];
+// As xx, yy, zz, xy, xz, yz.
+inline void setSymmetric(Lanes (&to)[6], int lane, const Eigen::Matrix3d& m) {
+  const double entries[6] = {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)};
+  for (int e = 0; e < 6; ++e) to[e][lane] = entries[e];
 }
 inline Eigen::Quaterniond quaternionOf(const Quad& q) {
   return {q.v[3], q.v[0], q.v[1], q.v[2]};
@@ -245,7 +246,8 @@ struct SurfaceParts {
   std::vector<NodeGive> give;    // per group of dynamic nodes
   std::vector<Quad> unrest;      // m, per node; 0 outside chooseSurfaceParts()
   std::vector<Quad> nodeWeight;  // per node that has the choice: N, and before m/s gained in the frame
-  std::vector<Quad> weight;      // N and N m, two per sphere: what these add for not hanging at its frame
+  std::vector<Quad> felt;    // m/s2, per body: gravity less the mean acceleration of its carried nodes in this frame
+  std::vector<Quad> weight;  // N and N m, two per sphere: what these add for not hanging at its frame
   std::vector<BareSphere> spheres;
   std::vector<CarriedNode> nodes;  // of parts that have the choice; by sphere
   std::vector<HostRange> carried;  // those that do not move now, on links and, from firstOnSphere on, on spheres

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+
+#include "physics/model/disjoint_sets.h"
 
 namespace medulla {
 
@@ -12,23 +13,6 @@ struct Candidate {
   double score;
   std::array<int, 2> spheres;
 };
-
-int rootOf(std::vector<int>& parent, int a) {
-  while (parent[a] != a) a = parent[a] = parent[parent[a]];
-  return a;
-}
-
-bool unite(std::vector<int>& parent, int a, int b) {
-  const int ra = rootOf(parent, a), rb = rootOf(parent, b);
-  parent[std::max(ra, rb)] = std::min(ra, rb);
-  return ra != rb;
-}
-
-std::vector<int> singletons(int count) {
-  std::vector<int> parent(count);
-  std::iota(parent.begin(), parent.end(), 0);
-  return parent;
-}
 
 bool staysInside(const SurfaceTree& tree, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   for (int k = 1; k < 8; ++k) {
@@ -58,14 +42,15 @@ SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const st
   const std::vector<Candidate> candidates = candidatesOf(tree, cells);
   SphereLinks links;
   std::vector<Candidate> further;
-  std::vector<int> parent = singletons(static_cast<int>(balls.size())), degree(balls.size(), 0);
+  DisjointSets sets(balls.size());
+  std::vector<int> degree(balls.size(), 0);
   const auto add = [&](const std::array<int, 2>& pair) {
     links.push_back(pair);
     ++degree[pair[0]];
     ++degree[pair[1]];
   };
   for (const Candidate& c : candidates) {
-    if (unite(parent, c.spheres[0], c.spheres[1])) {
+    if (sets.join(c.spheres[0], c.spheres[1])) {
       add(c.spheres);
     } else if (c.score > contactRatioMin) {
       further.push_back(c);
@@ -84,15 +69,15 @@ SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const st
 
 void joinComponents(const std::vector<Eigen::Vector3d>& centres, SphereLinks& links) {
   const int count = static_cast<int>(centres.size());
-  std::vector<int> parent = singletons(count);
-  for (const std::array<int, 2>& link : links) unite(parent, link[0], link[1]);
+  DisjointSets sets(centres.size());
+  for (const std::array<int, 2>& link : links) sets.join(link[0], link[1]);
   for (;;) {
     double shortest = std::numeric_limits<double>::infinity();
     std::array<int, 2> best{};
     for (int i = 0; i < count; ++i) {
       for (int j = i + 1; j < count; ++j) {
         const double length = (centres[i] - centres[j]).norm();
-        if (length < shortest && rootOf(parent, i) != rootOf(parent, j)) {
+        if (length < shortest && sets.of(i) != sets.of(j)) {
           shortest = length;
           best = {i, j};
         }
@@ -100,14 +85,14 @@ void joinComponents(const std::vector<Eigen::Vector3d>& centres, SphereLinks& li
     }
     if (!std::isfinite(shortest)) return;
     links.push_back(best);
-    unite(parent, best[0], best[1]);
+    sets.join(best[0], best[1]);
   }
 }
 
 int countComponents(int spheres, const SphereLinks& links) {
-  std::vector<int> parent = singletons(spheres);
+  DisjointSets sets(static_cast<std::size_t>(spheres));
   int components = spheres;
-  for (const std::array<int, 2>& link : links) components -= unite(parent, link[0], link[1]) ? 1 : 0;
+  for (const std::array<int, 2>& link : links) components -= sets.join(link[0], link[1]) ? 1 : 0;
   return components;
 }
 

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <span>
 
+#include "physics/model/disjoint_sets.h"
+
 namespace medulla {
 
 namespace {
@@ -148,23 +150,15 @@ double boundsDiagonal(const TriangleMesh& mesh) {
 }
 
 std::vector<int> componentOfTriangles(const TriangleMesh& mesh, int& components) {
-  // Edges of three and more triangles connect too, which adjacentTriangles would not tell: union-find over the sides.
-  std::vector<int> parent(mesh.triangles.size());
-  for (std::size_t t = 0; t < parent.size(); ++t) parent[t] = static_cast<int>(t);
-  const auto root = [&parent](int t) {
-    while (parent[t] != t) t = parent[t] = parent[parent[t]];
-    return t;
-  };
-  forEachEdge(sortedSides(mesh), [&parent, &root](std::span<const Side> sides) {
-    for (const Side& side : sides) {
-      const int a = root(sides[0].triangle), b = root(side.triangle);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
+  // Edges of three and more triangles connect too, which adjacentTriangles would not tell.
+  DisjointSets sets(mesh.triangles.size());
+  forEachEdge(sortedSides(mesh), [&sets](std::span<const Side> sides) {
+    for (const Side& side : sides) sets.join(sides[0].triangle, side.triangle);
   });
   components = 0;
-  std::vector<int> component(parent.size());
-  for (int t = 0; t < static_cast<int>(parent.size()); ++t) {
-    const int r = root(t);
+  std::vector<int> component(mesh.triangles.size());
+  for (int t = 0; t < static_cast<int>(component.size()); ++t) {
+    const int r = sets.of(t);
     component[t] = r == t ? components++ : component[r];
   }
   return component;

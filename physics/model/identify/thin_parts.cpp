@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <stdexcept>
 
+#include "physics/model/disjoint_sets.h"
 #include "physics/model/plane_section.h"
 
 namespace medulla {
@@ -20,26 +20,9 @@ Vector3d middleOf(const HexGrid& grid, const std::array<int, 3>& cell) {
   return grid.low + grid.size * (Vector3d(cell[0], cell[1], cell[2]) + Vector3d::Constant(0.5));
 }
 
-// Parts of what is joined pair by pair: each is known by its lowest number.
-class Parts {
- public:
-  explicit Parts(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
-  int of(int i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(int i, int j) {
-    const int a = of(i), b = of(j);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> parent_;
-};
-
 // Of each cell the part that it hangs together with, by nodes in common.
 std::vector<int> partsOf(const HexGrid& grid) {
-  Parts parts(grid.cells.size());
+  DisjointSets parts(grid.cells.size());
   std::vector<int> cellOfNode(grid.nodes.size(), -1), out;
   for (int c = 0; c < static_cast<int>(grid.cells.size()); ++c) {
     for (const int node : grid.cellNodes[c]) {
@@ -111,7 +94,7 @@ void requireConnected(const HexGrid& grid, const std::vector<bool>& isHeld) {
 void requireLinked(const TriangleMesh& mesh, const CellFrames& cells, const std::vector<IdentifiedLink>& links,
                    double cellSize) {
   const int count = static_cast<int>(cells.frames.size());
-  Parts parts(cells.frames.size() + 1);  // all patches are one: they do not move
+  DisjointSets parts(cells.frames.size() + 1);  // all patches are one: they do not move
   bool held = false;
   for (const IdentifiedLink& link : links) {
     parts.join(link.frame0, std::min(link.frame1, count));
