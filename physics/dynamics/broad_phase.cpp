@@ -105,17 +105,17 @@ Grid fillGrid(const std::vector<AxisBox>& boxes, double size, BroadPhase& phase)
 
 // One outcome for all axes: which of them parts two boxes is anybody's guess.
 bool overlap(const AxisBox& a, const AxisBox& b) {
-  bool apart = false;
-  for (int k = 0; k < 3; ++k) apart = apart | (a.low[k] > b.high[k]) | (b.low[k] > a.high[k]);
-  return !apart;
+  int apart = 0;
+  for (int k = 0; k < 3; ++k) apart |= static_cast<int>(a.low[k] > b.high[k]) | static_cast<int>(b.low[k] > a.high[k]);
+  return apart == 0;
 }
 
 // Whether `c`, a cell of both boxes, is where the lower corner of what they share lies: a pair that meets in several
 // cells is taken there. Rounding down keeps order, so that this corner's cell is the later one of the two boxes' own.
 bool holdsSharedCorner(const Cell& c, const Cell& low0, const Cell& low1) {
-  bool holds = true;
-  for (int k = 0; k < 3; ++k) holds = holds & (std::max(low0[k], low1[k]) == c[k]);
-  return holds;
+  int holds = 1;
+  for (int k = 0; k < 3; ++k) holds &= static_cast<int>(std::max(low0[k], low1[k]) == c[k]);
+  return holds == 1;
 }
 
 }  // namespace

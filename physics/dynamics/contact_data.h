@@ -96,8 +96,9 @@ struct ContactData {
   double margin = 0;    // m: pairs nearer than this are listed
   double freeMove = 0;  // m: what a ball may move before the lists are made anew
 
-  // Lists, and the balls' places when they were made.
-  std::vector<Quad> ballAtList;
+  // Lists, and the balls' places when they were made. Pairs are chosen from those of overlapping boxes, which are wide
+  // enough to serve several lists.
+  std::vector<Quad> ballAtList, ballAtBoxes;
   std::vector<PairGroup> pairs;
   std::vector<StaticNeighbour> staticNeighbours;
   std::vector<TriangleDistance> nearTriangles;  // at the time of the list
@@ -109,11 +110,12 @@ struct ContactData {
   std::vector<Quad> arm;   // m, per sphere: from its frame to the ball's centre; w = 0
   std::vector<Contact> contacts;
   std::vector<ContactSphere> spheres;
+  std::vector<signed char> changedInPass;  // per sphere: the solver's last pass that changed it by more than a little
 
   // State: the impulses that the last substep ended with, ascending in key; the next one starts from them.
   std::vector<CarriedImpulse> carried;
   std::vector<CarriedImpulse> resting;  // those of contacts of bodies that sleep, likewise
-  bool listsAreOld = false;             // whatever the balls have moved: bodies fell asleep or woke
+  bool listsAreOld = true;              // whatever the balls have moved: bodies fell asleep or woke, or none yet
 
   PenetrationReport penetration;
   std::vector<BodyOverlap> startOverlaps;

@@ -70,7 +70,7 @@ void findPairContacts(WorldData& d, double moved) {
 void findContacts(WorldData& d) {
   ContactData& c = d.contact;
   placeBalls(d);
-  double moved = farthestMove(c);
+  double moved = farthestMove(c, c.ballAtList);
   if (c.listsAreOld || !(moved <= c.freeMove)) {
     listNeighbours(d);
     moved = 0;

@@ -175,6 +175,7 @@ void layOutContact(WorldData& d, const std::vector<StaticShape>& statics) {
   placeBalls(d);
   listNeighbours(d);
   excludeWhatOverlapsAtRest(d);
+  c.listsAreOld = true;
   listNeighbours(d);
   noteStartOverlaps(c);
 }

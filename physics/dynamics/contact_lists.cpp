@@ -29,12 +29,12 @@ void placeBalls(WorldData& d) {
   }
 }
 
-double farthestMove(const ContactData& c) {
+double farthestMove(const ContactData& c, const std::vector<Quad>& from) {
   Lanes largest = splat(0);
   for (std::size_t i = 0; i < c.ball.size(); i += 4) {
     Lanes move[4];
     for (std::size_t k = 0; k < 4; ++k) {
-      const Lanes change = load(c.ball[i + k]) - load(c.ballAtList[i + k]);
+      const Lanes change = load(c.ball[i + k]) - load(from[i + k]);
       move[k] = change * change;
     }
     largest = larger(largest, sumsOfLanes(move[0], move[1], move[2], move[3]));
@@ -42,12 +42,17 @@ double farthestMove(const ContactData& c) {
   return std::sqrt(std::max(std::max(largest[0], largest[1]), std::max(largest[2], largest[3])));
 }
 
+// What a ball may move before pairs are looked for anew, over that for which lists are made from them anew: more takes
+// more pairs through every list, less finds them more often.
+constexpr double kBoxMoves = 3;
+
 static void placeBoxes(ContactData& c) {
+  const double margin = 0.5 * c.margin + kBoxMoves * c.freeMove;
   for (std::size_t i = 0; i < c.colliders.size(); ++i) {
     const Quad &b0 = c.ball[c.colliders[i].sphere0], &b1 = c.ball[c.colliders[i].sphere1];
     for (int a = 0; a < 3; ++a) {
-      c.boxes[i].low[a] = std::min(b0.v[a] - b0.v[3], b1.v[a] - b1.v[3]) - 0.5 * c.margin;
-      c.boxes[i].high[a] = std::max(b0.v[a] + b0.v[3], b1.v[a] + b1.v[3]) + 0.5 * c.margin;
+      c.boxes[i].low[a] = std::min(b0.v[a] - b0.v[3], b1.v[a] - b1.v[3]) - margin;
+      c.boxes[i].high[a] = std::max(b0.v[a] + b0.v[3], b1.v[a] + b1.v[3]) + margin;
     }
   }
 }
@@ -110,13 +115,20 @@ static void dropPairsThatNeverMeet(const WorldData& d, std::vector<BoxPair>& pai
   pairs.resize(kept);
 }
 
-void listNeighbours(WorldData& d) {
+// Every pair that may come nearer than the margin while no ball moves by more than kBoxMoves free moves.
+static void findPairsOfBoxes(WorldData& d) {
   ContactData& c = d.contact;
-  c.ballAtList = c.ball;
+  c.ballAtBoxes = c.ball;
   placeBoxes(c);
   findOverlaps(c.boxes, c.broadPhase);
-  std::vector<BoxPair>& pairs = c.broadPhase.pairs;
-  dropPairsThatNeverMeet(d, pairs);
+  dropPairsThatNeverMeet(d, c.broadPhase.pairs);
+}
+
+void listNeighbours(WorldData& d) {
+  ContactData& c = d.contact;
+  if (c.listsAreOld || !(farthestMove(c, c.ballAtBoxes) <= kBoxMoves * c.freeMove)) findPairsOfBoxes(d);
+  c.ballAtList = c.ball;
+  const std::vector<BoxPair>& pairs = c.broadPhase.pairs;
   PairList list(c.pairs);
   for (std::size_t k = 0; k < pairs.size(); k += 4) {
     PairGroup g{};

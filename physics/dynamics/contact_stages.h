@@ -15,13 +15,13 @@ namespace medulla {
 void layOutContact(WorldData& d, const std::vector<StaticShape>& statics);
 
 // contact_lists.cpp
-void placeBalls(WorldData& d);              // ContactData::ball at the current state
-double farthestMove(const ContactData& c);  // m, of any ball since the lists were made
-void listNeighbours(WorldData& d);          // both lists anew, at ContactData::ball
-void listStaticNeighbours(WorldData& d);    // contact_static.cpp: the part of it that concerns static shapes
+void placeBalls(WorldData& d);            // ContactData::ball at the current state
+void listNeighbours(WorldData& d);        // both lists anew, at ContactData::ball
+void listStaticNeighbours(WorldData& d);  // contact_static.cpp: the part of it that concerns static shapes
+double farthestMove(const ContactData& c, const std::vector<Quad>& from);  // m, of any ball since it was there
 
 // Appends a contact for every pair that overlaps or might before the substep's end; ascending in key. `moved` is
-// farthestMove() or more.
+// what the farthest ball has moved since ContactData::ballAtList, or more.
 void findPairContacts(WorldData& d, double moved);    // contact_find.cpp
 void findStaticContacts(WorldData& d, double moved);  // contact_static.cpp
 
