@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "physics/dynamics/broad_phase.h"
+#include "physics/dynamics/contact_stages.h"
 #include "tests/contact_bodies.h"
 #include "tests/dynamics_states.h"
 #include "tests/touch_shapes.h"
@@ -110,6 +111,47 @@ TEST(BroadPhase, FindsEveryPairOnceInOrder) {
       }
     }
     EXPECT_EQ(at, phase.pairs.size());
+  }
+}
+
+// Sticks that wander at up to the speed that lists allow for, some of them far faster than the rest: lists that outlive
+// many substeps find the contacts that lists made anew for each find.
+TEST(NeighbourLists, FindWhatListsMadeAnewFind) {
+  const auto stick = synthetic::ballModel({{{0, 0, 0}, 0.012}, {{0.03, 0, 0}, 0.008}}, {{0, 1}});
+  for (const ContactMode mode : {ContactMode::balls, ContactMode::swept}) {
+    WorldSettings settings;
+    settings.contact = mode;
+    settings.frameDuration = 0.001;
+    settings.substeps = 1;
+    Random random(3);
+    std::vector<BodyDescription> bodies;
+    for (int i = 0; i < 150; ++i) bodies.push_back(synthetic::ballBody("b", stick, 0.1 * random.vector()));
+    World kept(settings, bodies, {StaticShape{}}), anew(settings, bodies, {StaticShape{}});
+    std::size_t found = 0, listed = 0;
+    for (int step = 0; step < 400; ++step) {
+      for (int b = 0; b < 150; ++b) {
+        const Vector3d move = (b % 10 ? 1e-4 : 1e-3) * random.vector();
+        for (World* w : {&kept, &anew})
+          for (int k = 0; k < 2; ++k) {
+            Quad& position = w->data().spheres.position[w->data().ranges[b].firstSphere + k];
+            position = quadOf(vectorOf(position) + move);
+          }
+      }
+      const Quad before = kept.data().contact.ballAtList[0];
+      anew.data().contact.listsAreOld = true;
+      findContacts(kept.data());
+      findContacts(anew.data());
+      listed += kept.data().contact.ballAtList[0].v[0] != before.v[0];
+      const auto keys = [](const World& w) {
+        std::vector<std::uint64_t> all;
+        for (const Contact& c : w.data().contact.contacts) all.push_back(c.key);
+        return all;
+      };
+      ASSERT_EQ(keys(kept), keys(anew)) << step;
+      found += kept.data().contact.contacts.size();
+    }
+    EXPECT_GT(found, 40000u);
+    EXPECT_LT(listed, 350u);
   }
 }
 
