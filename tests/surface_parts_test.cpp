@@ -138,6 +138,32 @@ TEST(SurfaceParts, PartsLeaveAgainUnderTheirWeight) {
   EXPECT_EQ(movingAfterATouch(slab, 300, {0, 0, -9.81}), 0);
 }
 
+// What slows spheres allows for what hangs on them, moving or carried: a tube that sinks under its weight keeps pace.
+TEST(SurfaceParts, WeightMovesABodyAsItMovesAFullSurface) {
+  const auto sinking = [](SurfaceMode surface) {
+    BodyDescription body = tube(surface, false);
+    body.fixed = {{0, FixedFreedom::all}, {1, FixedFreedom::all}};
+    return worldOf(body, {0, -2, 0});
+  };
+  World part = sinking(SurfaceMode::contact), full = sinking(SurfaceMode::full);
+  ASSERT_GT(full.data().ranges[0].massDamping, 0);
+  DynamicsFrame rest, frame, expected;
+  full.readFrame(rest);
+  double farthest = 0, largest = 0;
+  for (int k = 0; k < 100; ++k) {
+    part.advance({});
+    full.advance({});
+    part.readFrame(frame);
+    full.readFrame(expected);
+    for (std::size_t i = 0; i < frame.bodies[0].nodes.size(); ++i) {
+      farthest = std::max(farthest, (frame.bodies[0].nodes[i] - expected.bodies[0].nodes[i]).norm());
+      largest = std::max(largest, (rest.bodies[0].nodes[i] - expected.bodies[0].nodes[i]).norm());
+    }
+  }
+  EXPECT_GT(largest, kRadius);
+  EXPECT_LT(farthest, 0.01 * largest);
+}
+
 // A free tube is pulled along: what the tool gives is what spheres and moving nodes have, while nodes join and leave.
 // Not to rounding: what edges pull at carried nodes is nobody's until these join, a frame later.
 TEST(SurfaceParts, JoiningAndLeavingKeepMomentum) {

@@ -4,7 +4,8 @@
 
 // The mass-proportional part of Rayleigh's damping: it slows low modes, which the links' part reaches only at the price
 // of the step. Textbooks let it act against the world; here it acts against the body's own rigid motion, so that both
-// momenta stay and neither free fall nor free rotation is slowed.
+// momenta stay and neither free fall nor free rotation is slowed. Of what a sphere weighs its own mass alone counts:
+// alpha allows for what hangs on it (rest_modes.cpp), and must not do so twice where nodes are carried.
 namespace medulla {
 
 namespace {
@@ -19,12 +20,12 @@ struct RigidMotion {
 };
 
 // One pass: sums about the body's first sphere, moved to the centre of mass by Steiner's theorem.
-RigidMotion rigidMotionOf(const Spheres& s, const BodyRange& r) {
+RigidMotion rigidMotionOf(const Spheres& s, const std::vector<double>& ownShare, const BodyRange& r) {
   const Lanes reference = load(s.position[r.firstSphere]), zero = splat(0);
   Lanes first = zero, momentum = zero, angularMomentum = zero, squares = zero, products = zero;
   double mass = 0;
   for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
-    const double m = s.groups[i / 4].mass[i % 4];
+    const double m = ownShare[i] * s.groups[i / 4].mass[i % 4];
     const Lanes x = load(s.position[i]) - reference, mx = splat(m) * x, v = load(s.velocity[i]);
     mass += m;
     first = first + mx;
@@ -56,16 +57,17 @@ RigidMotion rigidMotionOf(const Spheres& s, const BodyRange& r) {
 // Implicit, so that no alpha is too much for a step. Spins and nodes follow through links and attachments.
 void dampBodies(WorldData& d, const Batch& batch) {
   Spheres& s = d.spheres;
+  const std::vector<double>& ownShare = d.surface.ownShare;
   for (const int b : batch.bodies) {
     const BodyRange& r = d.ranges[b];
     if (r.massDamping == 0) continue;
     const double lost = 1 - 1 / (1 + d.substep * r.massDamping);
     const Lanes zero = splat(0);
-    const RigidMotion motion = r.held ? RigidMotion{zero, zero, zero} : rigidMotionOf(s, r);
+    const RigidMotion motion = r.held ? RigidMotion{zero, zero, zero} : rigidMotionOf(s, ownShare, r);
     for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
       const Lanes v = load(s.velocity[i]);
       const Lanes rigid = motion.linear + crossProduct(motion.angular, load(s.position[i]) - motion.centre);
-      store(s.velocity[i], fma(splat(-lost), v - rigid, v));
+      store(s.velocity[i], fma(splat(-lost * ownShare[i]), v - rigid, v));
     }
   }
 }

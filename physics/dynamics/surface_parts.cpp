@@ -156,6 +156,7 @@ void listCarriedNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics)
 void setMass(WorldData& d, int sphere, const BareSphere& mass) {
   SphereGroup& g = d.spheres.groups[sphere / 4];
   const int l = sphere % 4;
+  d.surface.ownShare[sphere] = d.surface.spheres[sphere].mass / mass.mass;
   g.mass[l] = mass.mass;
   if (g.inverseMass[l] > 0) g.inverseMass[l] = 1 / mass.mass;
   setSymmetric(g.inverseInertia, l, mass.inertia.inverse());
@@ -299,6 +300,7 @@ void layOutSurfaceParts(WorldData& d, const std::vector<BodyMechanics>& mechanic
     for (int g = rangeOf(d, k).firstGroup; g < rangeOf(d, k).endGroup; ++g) s.ofGroup[g] = static_cast<int>(k);
   for (std::size_t k = 0; k < s.parts.size(); ++k) layOutPart(d, mechanics[rangeOf(d, k).body], k, s.parts[k]);
   s.spheres.resize(d.spheres.position.size());
+  s.ownShare.resize(d.spheres.position.size(), 1);
   for (std::size_t b = 0; b < mechanics.size(); ++b)
     for (std::size_t i = 0; i < mechanics[b].sphereMass.size(); ++i)
       s.spheres[d.ranges[b].firstSphere + i] = {mechanics[b].sphereMass[i], mechanics[b].sphereInertia[i]};

@@ -249,6 +249,7 @@ struct SurfaceParts {
   std::vector<Quad> felt;    // m/s2, per body: gravity less the mean acceleration of its carried nodes in this frame
   std::vector<Quad> weight;  // N and N m, two per sphere: what these add for not hanging at its frame
   std::vector<BareSphere> spheres;
+  std::vector<double> ownShare;    // per sphere: of its mass now, without what carried nodes add
   std::vector<CarriedNode> nodes;  // of parts that have the choice; by sphere
   std::vector<HostRange> carried;  // those that do not move now, on links and, from firstOnSphere on, on spheres
   std::size_t firstOnSphere = 0;
