@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "haptics/tool_input.h"
+#include "physics/dynamics/simd.h"
 
 namespace medulla {
 
@@ -27,10 +28,8 @@ struct Bucket {
   int index = 0;
   double largestRadius = 0, inflation = 0;  // m
   std::vector<int> triangles;
-  std::vector<int> nodes;              // of the triangles, each once
-  Vector3d centre = Vector3d::Zero();  // of the bounding sphere around both frames, not inflated
-  double radius = 0;
-  bool fitted = true;  // the scene bounds the surface's frames, not older ones
+  std::vector<int> nodes;  // of the triangles, each once
+  bool fitted = true;      // the scene bounds the surface's frames, not older ones
 };
 }  // namespace
 
@@ -38,6 +37,9 @@ struct Buckets::Data {
   RTCDevice device = nullptr;
   BlendedSurface surface;
   std::vector<Bucket> buckets;
+  // Per bucket the sphere around both frames, its radius (m) inflated as the bucket's bounds are; padded to four. Every
+  // query asks them all: side by side they fit a first-level cache.
+  std::vector<Quad> bounds;
   std::vector<int> near;  // result of the last near(): reserved for all triangles
 
   Data() = default;
@@ -173,16 +175,37 @@ static void copyNodes(const DynamicsFrame& frame, std::vector<Vector3d>& nodes) 
   assert(n == nodes.size());
 }
 
-static void renewBoundingSphere(Bucket& bucket) {
+static Lanes loadNode(const Vector3d& x) {  // (x, y, z, 0)
+  return _mm256_maskload_pd(x.data(), _mm256_setr_epi64x(-1, -1, -1, 0));
+}
+
+// Of four nodes, or fewer where fewer are left.
+static Lanes squaredDistances(const std::vector<Vector3d>& all, const int* nodes, std::size_t left, Lanes centre) {
+  Lanes a = loadNode(all[nodes[0]]) - centre, b = loadNode(all[nodes[left > 1 ? 1 : 0]]) - centre;
+  Lanes c = loadNode(all[nodes[left > 2 ? 2 : 0]]) - centre, d = loadNode(all[nodes[left > 3 ? 3 : 0]]) - centre;
+  return sumsOfLanes(a * a, b * b, c * c, d * d);
+}
+
+// About the middle of the box around both frames.
+static Quad boundingSphere(const Bucket& bucket) {
   const BlendedSurface& surface = *bucket.surface;
-  Vector3d lower, upper;
-  bound(surface, bucket.nodes, lower, upper);
-  bucket.centre = 0.5 * (lower + upper);
-  double radius2 = 0;
-  for (const int n : bucket.nodes)
-    radius2 = std::max(
-        {radius2, (surface.from[n] - bucket.centre).squaredNorm(), (surface.to[n] - bucket.centre).squaredNorm()});
-  bucket.radius = std::sqrt(radius2);
+  Lanes lower = splat(std::numeric_limits<double>::infinity()), upper = splat(0) - lower;
+  for (const int n : bucket.nodes) {
+    const Lanes from = loadNode(surface.from[n]), to = loadNode(surface.to[n]);
+    lower = _mm256_min_pd(lower, _mm256_min_pd(from, to));
+    upper = larger(upper, larger(from, to));
+  }
+  const Lanes centre = splat(0.5) * (lower + upper);
+  Lanes squared = splat(0);
+  for (std::size_t i = 0; i < bucket.nodes.size(); i += 4) {
+    const std::size_t left = bucket.nodes.size() - i;
+    squared = larger(squared, larger(squaredDistances(surface.from, &bucket.nodes[i], left, centre),
+                                     squaredDistances(surface.to, &bucket.nodes[i], left, centre)));
+  }
+  Quad sphere;
+  store(sphere, centre);
+  sphere.v[3] = std::sqrt(std::max({squared[0], squared[1], squared[2], squared[3]})) + bucket.inflation;
+  return sphere;
 }
 
 bool isEmbreeIsa(const std::string& isa) {
@@ -210,6 +233,7 @@ Buckets::Buckets(const std::vector<std::shared_ptr<const SoftBodyModel>>& bodies
   for (const auto& model : bodies) appendBody(*model, surface, data_->buckets);
   listTrianglesOfNodes(surface);
   data_->near.reserve(surface.triangles.size());
+  data_->bounds.resize((data_->buckets.size() + 3) / 4 * 4);
   surface.from.resize(surface.bodyOfNode.size());
   surface.to.resize(surface.bodyOfNode.size());
   copyNodes(rest, surface.from);
@@ -223,7 +247,7 @@ Buckets::Buckets(const std::vector<std::shared_ptr<const SoftBodyModel>>& bodies
     bucket.largestRadius = largestRadius;
     bucket.inflation = largestRadius * boundsFactor + boundsMargin;
     openBucket(data_->device, bucket);
-    renewBoundingSphere(bucket);
+    data_->bounds[k] = boundingSphere(bucket);
   }
   if (rtcGetDeviceError(data_->device) != RTC_ERROR_NONE)
     throw std::runtime_error("Embree failed to build the triangle buckets");
@@ -247,23 +271,33 @@ void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to, const s
   surface.stepBefore = stepBefore;
   for (std::size_t n = 0; n < surface.step.size(); ++n) surface.step[n] = surface.to[n] - surface.from[n];
   for (Bucket& bucket : data_->buckets) {
-    renewBoundingSphere(bucket);
+    data_->bounds[bucket.index] = boundingSphere(bucket);
     bucket.fitted = false;
   }
 }
 
-static bool isNear(const Bucket& bucket, const Vector3d& centre, double distance) {
-  const double reach = bucket.radius + bucket.inflation + distance;
-  return (centre - bucket.centre).squaredNorm() <= reach * reach;
+// Calls `visit` with every bucket whose bounding sphere comes within `distance` of `centre`, in their order.
+template <typename List, typename Visit>
+static void visitNear(List& buckets, const std::vector<Quad>& bounds, const Vector3d& centre, double distance,
+                      const Visit& visit) {
+  const Lanes3 from{splat(centre.x()), splat(centre.y()), splat(centre.z())};
+  for (std::size_t first = 0; first < buckets.size(); first += 4) {
+    Lanes radius;
+    const Lanes3 away = gather(bounds[first], bounds[first + 1], bounds[first + 2], bounds[first + 3], radius) - from;
+    const Lanes reach = radius + splat(distance);
+    const int far = _mm256_movemask_pd(isLess(reach * reach, dot(away, away)));
+    for (std::size_t k = 0; far != 15 && k < 4 && first + k < buckets.size(); ++k)
+      if (!(far >> k & 1)) visit(buckets[first + k]);
+  }
 }
 
 void Buckets::refitNear(const Vector3d& centre, double distance) {
-  for (Bucket& bucket : data_->buckets) {
-    if (bucket.fitted || !isNear(bucket, centre, distance)) continue;
+  visitNear(data_->buckets, data_->bounds, centre, distance, [](Bucket& bucket) {
+    if (bucket.fitted) return;
     rtcCommitGeometry(bucket.geometry);
     rtcCommitScene(bucket.scene);
     bucket.fitted = true;
-  }
+  });
 }
 
 // ---- Servo side ------------------------------------------------------------------------------------------
@@ -303,12 +337,14 @@ bool Buckets::sweep(const Vector3d& centre, const Vector3d& motion, double radiu
   SweepContext context{{}, centre, motion, radius, alpha, {}};
   rtcInitIntersectContext(&context.embree);
   if (firstBucket >= 0) sweepBucket(data_->buckets[firstBucket], context);
-  for (const Bucket& bucket : data_->buckets) {
-    const double reach = bucket.radius + bucket.inflation;
-    if (bucket.index != firstBucket && distanceToSegment2(bucket.centre, centre, context.best.t * motion,
-                                                          context.best.t * context.best.t * motion2) <= reach * reach)
+  const auto sweepInReach = [&](const Bucket& bucket) {
+    const Quad& sphere = data_->bounds[bucket.index];
+    const Vector3d middle = vectorOf(sphere);
+    const double t = context.best.t, reach = sphere.v[3];
+    if (bucket.index != firstBucket && distanceToSegment2(middle, centre, t * motion, t * t * motion2) <= reach * reach)
       sweepBucket(bucket, context);
-  }
+  };
+  visitNear(data_->buckets, data_->bounds, centre + 0.5 * motion, 0.5 * std::sqrt(motion2), sweepInReach);
   if (context.best.triangle < 0) return false;
   hit = context.best;
   return true;
@@ -343,19 +379,18 @@ const std::vector<int>& Buckets::near(const Vector3d& centre, double distance) c
   assert(isQueryable(centre) && std::isfinite(distance) && distance >= 0);
   std::vector<int>& found = data_->near;
   found.clear();
-  for (const Bucket& bucket : data_->buckets) {
-    if (!isNear(bucket, centre, distance)) continue;
+  visitNear(data_->buckets, data_->bounds, centre, distance, [&](const Bucket& bucket) {
     NearQuery query{&bucket, centre, distance, &found};
     if (!bucket.fitted) {
       for (const int triangle : bucket.triangles) addIfNear(query, triangle);
-      continue;
+      return;
     }
     RTCPointQuery point{float(centre.x()), float(centre.y()), float(centre.z()), 0,
                         float(distance * boundsFactor + boundsMargin)};
     RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
     rtcPointQuery(bucket.scene, &point, &context, addCandidate, &query);
-  }
+  });
   std::sort(found.begin(), found.end());
   return found;
 }
