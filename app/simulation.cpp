@@ -77,7 +77,7 @@ void Simulation::advanceFrame(const ServoRecord& servo) {
 
 void Simulation::runTicks() {
   record_.start = time();
-  record_.from = previous_;
+  std::swap(record_.from, record_.to);  // where the last record ended, this one begins
   record_.to = current_;
   record_.inputs[0] = record_.inputs[ticksPerFrame_];
   record_.tools[0] = record_.tools[ticksPerFrame_];
