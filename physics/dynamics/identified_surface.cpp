@@ -85,7 +85,6 @@ void placeOnFrames(WorldData& d, const HostRange& range) {
     put(offset, n.offset[g]);
     put(home.position + offset + gatherFour(n.displaced, 4 * g), n.position[g]);
     const Lanes3 velocity = home.velocity + cross(home.omega, offset) + rotate(home.rotation, place.offsetRate);
-    noteGain(d, g, velocity - n.velocity[g]);
     put(velocity, n.velocity[g]);
     put(rotate(home.rotation, n.groups[g].restArea), n.area[g]);
   }

@@ -16,6 +16,8 @@ void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried)
 // Its transpose: impulses on the anchors, added to the spheres' part of `motion`; overwrites the loads in Links::frames
 // and Links::slots.
 void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& motion);
+// The links' part of it, of what acts on their anchors; at the frames of the last evaluateLinks().
+void returnLinkLoads(const WorldData& d, const std::vector<LinkLoads>& loads, Motion& motion);
 // Adds J^T m J of the nodes' maps J, `mass` per node (kg), to the spheres' blocks.
 void addCarriedMass(const WorldData& d, const std::vector<double>& mass, std::vector<Block6>& diagonal,
                     std::vector<Block6>& beside);

@@ -37,10 +37,6 @@ void layOutSurfaceParts(WorldData&, const std::vector<BodyMechanics>& mechanics)
 void moveLoadedParts(WorldData&, const Loads& loads);  // at a frame's start: what tools act on, and what is beside it
 void chooseSurfaceParts(WorldData&, const Loads& loads);    // at its end: what has come to rest is carried again
 HostRange movingRange(const WorldData&, std::size_t part);  // what of a host's nodes moves by itself now; may be empty
-// After placeCarriedNodes(): the weight of carried nodes acts where they hang, on the links and spheres that they hang
-// on, less what their body falls by.
-void weighCarriedNodes(WorldData&);
-void noteGain(WorldData&, int group, const Lanes3& gain);  // m/s in this frame, of the four carried nodes of a group
 
 // sleep.cpp
 void listAwake(WorldData&);  // WorldData::awake anew
@@ -76,9 +72,10 @@ inline void runStage(WorldData& d, Stage stage) {
 // on no node, not finite, or ends before it begins.
 void layOutDeadLoads(WorldData&);
 
-// Nodes of a skin, and others that do not move by themselves, to where their hosts carry them; needs evaluateLinks at
-// the current state.
+// carried_nodes.cpp: nodes of a skin, and others that do not move by themselves, to where they hang from their hosts;
+// needs evaluateLinks at the current state. Where gravity is felt, their weight from now on acts there.
 void placeCarriedNodes(WorldData&);
+void feelGravity(WorldData&);  // before it, at a frame's end: less what bodies fall by
 
 // Angular velocity from orientation and angular momentum.
 void refreshAngularVelocities(WorldData&);

@@ -136,36 +136,6 @@ void finishNodeForces(WorldData& d, const Batch& batch) {
     range.onFrames ? returnToFrames(d, range, splat(pressureOf(d, range))) : returnToSphere(d, range);
 }
 
-void noteGain(WorldData& d, int group, const Lanes3& gain) {
-  if (4 * static_cast<std::size_t>(group) < d.surface.nodeWeight.size())
-    storeFour(gain, d.surface.nodeWeight, 4 * group);
-}
-
-void placeCarriedNodes(WorldData& d) {
-  const auto place = [&d](const Anchor& anchor, int g) {
-    put(positionOf(anchor) + gatherFour(d.nodes.displaced, 4 * g), d.nodes.position[g]);
-    const Lanes3 velocity = velocityAt(anchor, anchor.offset);
-    noteGain(d, g, velocity - d.nodes.velocity[g]);
-    put(velocity, d.nodes.velocity[g]);
-    put(anchor.offset, d.nodes.offset[g]);
-    put(anchor.area, d.nodes.area[g]);
-  };
-  const auto onLink = [&](const HostRange& range) {
-    const LinkHost host = linkHost(d, range.host);
-    for (int g = range.firstGroup; g < range.endGroup; ++g) place(anchorOnLink(host, d.nodes.groups[g]), g);
-  };
-  const auto onSphere = [&](const HostRange& range) {
-    if (range.onFrames) return placeOnFrames(d, range);
-    const SphereHost host = sphereHost(d, range.host);
-    for (int g = range.firstGroup; g < range.endGroup; ++g) place(anchorOnSphere(host, d.nodes.groups[g]), g);
-  };
-  for (const HostRange& range : d.nodes.skinOnLinks) onLink(range);
-  for (const HostRange& range : d.nodes.skinOnSpheres) onSphere(range);
-  const SurfaceParts& parts = d.surface;
-  for (std::size_t k = 0; k < parts.carried.size(); ++k)
-    k < parts.firstOnSphere ? onLink(parts.carried[k]) : onSphere(parts.carried[k]);
-}
-
 double surfaceEnergy(const WorldData& d) {
   double sum = 0;
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) {

@@ -29,11 +29,13 @@ void addTo(Quad& q, Lanes a) {
   store(q, load(q) + a);
 }
 
-void returnFromLinks(WorldData& d, Motion& motion) {
+}  // namespace
+
+void returnLinkLoads(const WorldData& d, const std::vector<LinkLoads>& loads, Motion& motion) {
   for (std::size_t k = 0; k < d.links.groups.size(); ++k) {
     const LinkFrame& f = d.links.frames[k];
     const LinkGroup& g = d.links.groups[k];
-    const EndLoads e = sphereLoads(g, f, gatherLoads(&d.links.loads[4 * k], g.hasBeams));
+    const EndLoads e = sphereLoads(g, f, gatherLoads(&loads[4 * k], g.hasBeams));
     Quad q[4][4];
     const Lanes3* parts[4] = {&e.force0, &e.torque0, &e.force1, &e.torque1};
     for (int p = 0; p < 4; ++p) {
@@ -53,8 +55,6 @@ void returnFromLinks(WorldData& d, Motion& motion) {
     }
   }
 }
-
-}  // namespace
 
 void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried) {
   for (std::size_t k = 0; k < d.links.groups.size(); ++k) setFrameRates(d.links.groups[k], motion, d.links.frames[k]);
@@ -93,7 +93,7 @@ void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& mot
     }
     setLoads(h, sum, d.links.loads[range.host]);
   }
-  returnFromLinks(d, motion);
+  returnLinkLoads(d, d.links.loads, motion);
   for (FrameLoad& load : d.identified.loads) load = {};
   for (const HostRange& range : d.nodes.onSpheres) {
     if (range.onFrames) {

@@ -3,9 +3,9 @@
 #include <utility>
 
 #include "physics/dynamics/edge_springs.h"
-#include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/node_motion.h"
 #include "physics/dynamics/stages.h"
+#include "physics/dynamics/still_nodes.h"
 
 // SurfaceMode::contact: a host's nodes move by themselves only where something acts on them or what acts has spread to
 // them. The others are carried: they hang still from their anchors, and their mass is their spheres'. Parts join and
@@ -29,48 +29,6 @@ const HostRange& rangeOf(const WorldData& d, std::size_t part) {
   return part < onLinks ? d.nodes.onLinks[part] : d.nodes.onSpheres[part - onLinks];
 }
 
-// Where a host's nodes hang still from their anchors: k x = m g - p a, and p = bulk sum a.x is the host's pressure.
-// Their mean weight alone would not do: a host's patch of surface is open, so that nodes which all sink alike press.
-// Fixed nodes, and pads, stay where they are. Identified attachments have more than k along the node's normal.
-class StillNodes {
- public:
-  StillNodes(const WorldData& d, const HostRange& range) : d_(&d), gravity_(splat(d.gravity)) {
-    Lanes sunk = splat(0), give = sunk;
-    for (int g = range.firstGroup; g < range.endGroup; ++g) {
-      const Lanes3 area = d.nodes.area[g];
-      sunk = sunk + dot(area, sag(g));
-      give = fma(dot(area, area), giveAcross(g), give);
-    }
-    const double volume = sumOfLanes(sunk);
-    pressure_ = range.bulk * volume / (1 + range.bulk * sumOfLanes(give));
-    swollen_ = range.bulk > 0 ? pressure_ / range.bulk : 0;
-  }
-  Lanes3 displaced(int g) const {  // m, of the nodes of group g
-    return fnma(splat(pressure_) * giveAcross(g), d_->nodes.area[g], sag(g));
-  }
-  Lanes3 sag(int g) const {  // m, without pressure
-    const Lanes3 even = d_->surface.give[g].perGravity * gravity_, area = d_->nodes.area[g];
-    if (d_->identified.ofNodeGroup[g] < 0) return even;
-    return fnma(excess(g) * dot(area, even) * giveAcross(g), area, even);
-  }
-  double swollen() const { return swollen_; }  // m3
-
- private:
-  Lanes excess(int g) const {  // N/m5, of identified nodes
-    return d_->identified.skin[d_->identified.ofNodeGroup[g]].normalExcess;
-  }
-  Lanes giveAcross(int g) const {  // m/N, along the normal
-    const Lanes give = d_->surface.give[g].perForce;
-    if (d_->identified.ofNodeGroup[g] < 0) return give;
-    const Lanes3 area = d_->nodes.area[g];
-    return give / fma(excess(g) * give, dot(area, area), splat(1));
-  }
-
-  const WorldData* d_;
-  Lanes3 gravity_;
-  double pressure_, swollen_;
-};
-
 void layOutGive(WorldData& d) {
   SurfaceParts& s = d.surface;
   s.give.resize(d.nodes.dynamicEnd / 4);
@@ -86,10 +44,10 @@ double longest(Lanes squared) {
 }
 
 double deepestSag(const WorldData& d, const HostRange& range) {
-  const StillNodes still(d, range);
+  const Lanes3 gravity = splat(d.gravity);
   Lanes squared = splat(0);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
-    const Lanes3 sag = still.sag(g);
+    const Lanes3 sag = sagOf(d, gravity, g);
     squared = larger(squared, dot(sag, sag));
   }
   return longest(squared);
@@ -117,6 +75,11 @@ void listNeighbours(const WorldData& d, const std::vector<int>& ofGroup, const H
   part.neighbours.erase(std::unique(part.neighbours.begin(), part.neighbours.end()), part.neighbours.end());
 }
 
+// N/m5: pressure per volume where the nodes from `firstGroup` on hang still under it.
+double bulkThatGives(const WorldData& d, const HostRange& range, int firstGroup) {
+  return range.bulk / (1 + range.bulk * swellingOf(d, firstGroup, range.endGroup));
+}
+
 void layOutPart(const WorldData& d, const BodyMechanics& mechanics, std::size_t k, SurfacePart& part) {
   const HostRange& range = rangeOf(d, k);
   part.always = d.bodies[range.body].surface != SurfaceMode::contact || d.settings.integrator == Integrator::implicit;
@@ -129,24 +92,45 @@ void layOutPart(const WorldData& d, const BodyMechanics& mechanics, std::size_t 
     if (d.nodes.mass[i] > 0 && d.nodes.inverseMass[i] == 0 && !held) part.firstChoice = i / 4 + 1;
   part.always = part.firstChoice == range.endGroup;
   part.moves = part.always;
-  double give = 0;  // m5/N
-  for (int g = part.firstChoice; g < range.endGroup; ++g)
-    give += sumOfLanes(dot(d.nodes.area[g], d.nodes.area[g]) * d.surface.give[g].perForce);
-  part.heldBulk = range.bulk / (1 + range.bulk * give);
+  part.heldBulk = bulkThatGives(d, range, part.firstChoice);
+}
+
+Matrix3d inertiaAt(const Vector3d& r) {  // m2, about the origin
+  return r.squaredNorm() * Matrix3d::Identity() - r * r.transpose();
+}
+
+// What hangs on a link moves with both ends: its mass goes to the two spheres by where it lies along their line, with
+// the inertia that it has about that point. So a body's centre stays but for what lies unevenly about the line, and no
+// sphere turns more easily than it does alone, which the step was chosen for. Whole at the sphere whose cell it lies
+// in, first moments along the line are lost as well.
+void shareOut(const SoftBodyModel& m, const ElasticLink& link, const Vector3d& node, double mass,
+              std::vector<std::pair<int, BareSphere>>& to) {
+  const Vector3d from = m.spheres[link.sphere0].restFrame, line = m.spheres[link.sphere1].restFrame - from;
+  const double along = std::clamp((node - from).dot(line) / line.squaredNorm(), 0.0, 1.0);
+  const Matrix3d about = inertiaAt(node - from - along * line);
+  to.push_back({link.sphere0, {(1 - along) * mass, (1 - along) * mass * about}});
+  to.push_back({link.sphere1, {along * mass, along * mass * about}});
 }
 
 void listCarriedNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
+  std::vector<std::pair<int, BareSphere>> shares;
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     if (d.bodies[b].surface != SurfaceMode::contact) continue;
     const SoftBodyModel& m = *d.bodies[b].model;
     for (std::size_t k = 0; k < mechanics[b].attachments.size(); ++k) {
-      const int group = d.ranges[b].node[k] / 4, part = d.surface.ofGroup[group],
-                sphere = mechanics[b].attachments[k].massSphere;
-      const Vector3d r = m.restNodes[k] - m.spheres[sphere].restFrame;
+      const int group = d.ranges[b].node[k] / 4, part = d.surface.ofGroup[group];
+      if (group < d.surface.parts[part].firstChoice) continue;
+      const Attachment& a = mechanics[b].attachments[k];
       const double mass = mechanics[b].nodeMass[k];
-      const Matrix3d inertia = mass * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose());
-      if (group >= d.surface.parts[part].firstChoice)
-        d.surface.nodes.push_back({part, d.ranges[b].firstSphere + sphere, {mass, inertia}});
+      shares.clear();
+      if (a.onLink) {
+        shareOut(m, m.links[a.host], m.restNodes[k], mass, shares);
+      } else {
+        const Vector3d r = m.restNodes[k] - m.spheres[a.massSphere].restFrame;
+        shares.push_back({a.massSphere, {mass, mass * inertiaAt(r)}});
+      }
+      for (const auto& [sphere, share] : shares)
+        d.surface.nodes.push_back({part, d.ranges[b].firstSphere + sphere, share});
     }
   }
   std::stable_sort(d.surface.nodes.begin(), d.surface.nodes.end(),
@@ -213,43 +197,48 @@ std::vector<char> loadedParts(const WorldData& d, const Loads& loads) {
   return loaded;
 }
 
-// m: how far the part's nodes that move are from where they hang at rest, into `unrest`, per node. Returns the most of
-// those that have the choice.
-double unrestOf(const WorldData& d, std::size_t part, std::vector<Quad>& unrest) {
+// Shifts of the part's nodes that move. Returns the largest of those that have the choice, m.
+double measureShifts(WorldData& d, std::size_t part) {
   const HostRange range = movingRange(d, part);
-  const StillNodes still(d, range);
+  const double bulk = bulkThatGives(d, range, range.firstGroup);
+  const double pressure = stillPressure(d, range.firstGroup, range.endGroup, bulk);
+  const Lanes3 gravity = splat(d.gravity);
   Lanes squared = splat(0);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
-    const Lanes3 off = gatherFour(d.nodes.displaced, 4 * g) - still.displaced(g);
+    const Lanes3 off = gatherFour(d.nodes.displaced, 4 * g) - hangingAt(d, gravity, splat(pressure), g);
     const Lanes isNode = isLess(splat(0), _mm256_loadu_pd(&d.nodes.mass[4 * g]));  // pads drift
-    storeFour(off, unrest, 4 * g);
+    storeFour(off, d.surface.shift, 4 * g);
     if (g >= d.surface.parts[part].firstChoice) squared = larger(squared, _mm256_and_pd(isNode, dot(off, off)));
   }
   return longest(squared);
 }
 
-// m: how far edges would shift the nodes of a part that is carried, at most, did they not hang still.
-double shiftOf(const WorldData& d, std::size_t part, const std::vector<Quad>& unrest) {
+// Shifts of the nodes of a part that is carried: to where edges and attachments hold them against their neighbours as
+// these are, one step of Jacobi's iteration per frame. The neighbours so feel what they would of nodes that move.
+// Returns the largest, m.
+double balanceShifts(WorldData& d, std::size_t part) {
+  SurfaceParts& s = d.surface;
   const Lanes zero = splat(0);
   Lanes squared = zero;
-  for (int g = d.surface.parts[part].firstChoice; g < rangeOf(d, part).endGroup; ++g) {
+  for (int g = s.parts[part].firstChoice; g < rangeOf(d, part).endGroup; ++g) {
     const NodeGroup& group = d.nodes.groups[g];
-    const Lanes3 pull = pullOfEdges(d.springs, d.nodes.groups.data(), unrest.data(), {zero, zero, zero}, g);
+    const Lanes3 alone = gatherFour(d.nodes.displaced, 4 * g) - gatherFour(s.shift, 4 * g);
+    const Lanes3 pull = pullOfEdges(d.springs, d.nodes.groups.data(), d.nodes.displaced.data(), alone, g);
     const Lanes moves = isLess(zero, _mm256_loadu_pd(&d.nodes.inverseMass[4 * g]));
-    const Lanes give = _mm256_and_pd(moves, splat(1) / (group.stiffness + group.edges));
-    squared = larger(squared, (give * give) * dot(pull, pull));
+    const Lanes3 shift = _mm256_and_pd(moves, splat(1) / (group.stiffness + group.edges)) * pull;
+    storeFour(shift, s.shift, 4 * g);
+    squared = larger(squared, dot(shift, shift));
   }
+  s.parts[part].isShifted = true;
   return longest(squared);
 }
 
-// The nodes of a part that does not move are where they hang still.
-void hang(WorldData& d, std::size_t part) {
-  HostRange range = rangeOf(d, part);
-  const bool whole = range.firstGroup == d.surface.parts[part].firstChoice;
-  range.firstGroup = d.surface.parts[part].firstChoice;
-  const StillNodes still(d, range);
-  if (whole) d.nodes.swollen[range.part] = still.swollen();
-  for (int g = range.firstGroup; g < range.endGroup; ++g) storeFour(still.displaced(g), d.nodes.displaced, 4 * g);
+void clearShifts(WorldData& d, std::size_t part) {
+  SurfacePart& p = d.surface.parts[part];
+  if (!p.isShifted) return;
+  p.isShifted = false;
+  const auto nodes = d.surface.shift.begin();
+  std::fill(nodes + 4 * p.firstChoice, nodes + 4 * rangeOf(d, part).endGroup, Quad{});
 }
 
 // A link's frame is asked for its nodes' loads; where none moves there are none.
@@ -260,28 +249,8 @@ void releaseLink(WorldData& d, std::size_t part) {
 
 void carry(WorldData& d, std::size_t part) {
   d.surface.parts[part].moves = false;
+  d.surface.parts[part].isShifted = true;
   releaseLink(d, part);
-  hang(d, part);
-}
-
-// SurfaceParts::felt. The w of each sum is the mass that it goes over.
-void feelGravity(WorldData& d) {
-  SurfaceParts& s = d.surface;
-  s.felt.assign(d.bodies.size(), Quad{});
-  for (const HostRange& range : s.carried) {
-    Lanes sum = load(s.felt[range.body]);
-    for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
-      Lanes gained = load(s.nodeWeight[i]);
-      gained[3] = 1;
-      sum = fma(splat(d.nodes.mass[i]), gained, sum);
-    }
-    store(s.felt[range.body], sum);
-  }
-  for (Quad& felt : s.felt) {
-    const double perFrame = felt.v[3] > 0 ? 1 / (felt.v[3] * d.settings.frameDuration) : 0;
-    felt.v[3] = 0;
-    store(felt, fnma(splat(perFrame), load(felt), load(d.gravity)));
-  }
 }
 
 bool hasChoice(const SurfaceParts& s) {
@@ -293,7 +262,7 @@ bool hasChoice(const SurfaceParts& s) {
 void layOutSurfaceParts(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   SurfaceParts& s = d.surface;
   layOutGive(d);
-  s.unrest.resize(d.nodes.dynamicEnd);
+  s.shift.resize(d.nodes.dynamicEnd);
   s.parts.resize(d.nodes.onLinks.size() + d.nodes.onSpheres.size());
   s.ofGroup.resize(d.nodes.dynamicEnd / 4);
   for (std::size_t k = 0; k < s.parts.size(); ++k)
@@ -332,59 +301,26 @@ HostRange movingRange(const WorldData& d, std::size_t part) {
   return range;
 }
 
-// Less what the body falls by on the whole: one that falls freely would begin to turn.
-void weighCarriedNodes(WorldData& d) {
-  SurfaceParts& s = d.surface;
-  const Lanes gravity = load(d.gravity);
-  if (!hasChoice(s) || dotProduct(gravity, gravity) == 0) return;
-  if (s.nodeWeight.empty()) {  // gains are noted from now on
-    s.nodeWeight.resize(d.nodes.dynamicEnd);
-    return;
-  }
-  feelGravity(d);
-  s.weight.assign(2 * d.spheres.position.size(), Quad{});
-  for (std::size_t k = 0; k < s.ofGroup.size(); ++k) {
-    const Lanes of = load(s.felt[rangeOf(d, s.ofGroup[k]).body]);
-    const Lanes weight = isCarried(s, static_cast<int>(k)) ? of : splat(0);
-    for (std::size_t i = 4 * k; i < 4 * k + 4; ++i) store(s.nodeWeight[i], splat(d.nodes.mass[i]) * weight);
-  }
-  returnImpulses(d, s.nodeWeight, s.weight);
-  for (const CarriedNode& node : s.nodes) {
-    if (s.parts[node.part].moves) continue;
-    Quad& on = s.weight[2 * node.sphere];
-    store(on, fnma(splat(node.mass.mass), load(s.felt[rangeOf(d, node.part).body]), load(on)));
-  }
-  for (std::size_t k = 0; k < s.parts.size(); ++k)
-    if (!s.parts[k].moves) releaseLink(d, k);
-}
-
 void chooseSurfaceParts(WorldData& d, const Loads& loads) {
   if (!hasChoice(d.surface)) return;
   std::vector<SurfacePart>& parts = d.surface.parts;
   std::vector<char> wanted = loadedParts(d, loads), beside(parts.size(), 0);
   std::vector<double> unrest(parts.size(), 0);
-  std::vector<Quad>& ofNodes = d.surface.unrest;
-  const auto isMeasured = [&](std::size_t k) {
-    const bool moves = parts[k].moves || parts[k].firstChoice > rangeOf(d, k).firstGroup;
-    return moves && !parts[k].neighbours.empty();
-  };
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    if (!isMeasured(k)) continue;
-    unrest[k] = unrestOf(d, k, ofNodes);
+    const bool moves = parts[k].moves || parts[k].firstChoice > rangeOf(d, k).firstGroup;
+    if (!moves || parts[k].neighbours.empty()) continue;
+    unrest[k] = measureShifts(d, k);
     for (const int other : parts[k].neighbours) beside[other] = 1;
   }
-  for (std::size_t k = 0; k < parts.size(); ++k)
-    if (!parts[k].moves && beside[k] && shiftOf(d, k, ofNodes) > parts[k].unrest) wanted[k] = 1;
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    if (!isMeasured(k)) continue;
-    const HostRange range = movingRange(d, k);
-    std::fill(ofNodes.begin() + 4 * range.firstGroup, ofNodes.begin() + 4 * range.endGroup, Quad{});
+    if (parts[k].moves) continue;
+    if (!beside[k]) clearShifts(d, k);
+    if (beside[k] && balanceShifts(d, k) > parts[k].unrest) wanted[k] = 1;
   }
   bool changed = false;
   for (std::size_t k = 0; k < parts.size(); ++k) {
     SurfacePart& part = parts[k];
     if (part.always) continue;
-    if (!part.moves) hang(d, k);
     const bool quiet = !wanted[k] && unrest[k] < kQuiet * part.unrest;
     part.quietFrames = quiet ? part.quietFrames + 1 : 0;
     if (!part.moves && wanted[k]) {

@@ -253,8 +253,8 @@ FrameReport World::advance(const Loads& loads) {
   fallAsleep(d, loads);
   // The frames that readers hang nodes on are those of the state at the end.
   runStage(d, evaluateLinks);
+  feelGravity(d);
   placeCarriedNodes(d);
-  weighCarriedNodes(d);
   requireFinite(d, time());
   return report;
 }
@@ -298,11 +298,11 @@ Energies World::energies() const {
 
 double World::volumeRatio(int body) const {
   const BodyRange& r = data_->ranges.at(body);
-  const auto x = [node = r.node.data(), &positions = data_->nodes.position](int i) {
-    return vectorAt(positions, node[i]);
-  };
+  std::vector<Eigen::Vector3d> x;
+  x.reserve(r.node.size());
+  for (const int i : r.node) x.push_back(vectorAt(data_->nodes.position, i));
   double volume = 0;
-  for (const auto& t : data_->bodies[body].model->triangles) volume += x(t[0]).dot(x(t[1]).cross(x(t[2])));
+  for (const auto& t : data_->bodies[body].model->triangles) volume += x[t[0]].dot(x[t[1]].cross(x[t[2]]));
   return volume / (6 * r.restVolume);
 }
 

@@ -219,11 +219,12 @@ struct BodyRange {
 struct SurfacePart {            // of one host; part k is that of Nodes::onLinks[k], those on spheres follow
   bool moves = true;            // state: of the groups of nodes that have the choice
   int quietFrames = 0;          // in a row, in which nothing asked for it; state
+  bool isShifted = false;       // by edges, while it does not move: SurfaceParts::shift is not 0
   int firstChoice = 0;          // groups of nodes before it have none: another surface mode, or fixed nodes in them
   bool always = true;           // no group has
   std::vector<int> neighbours;  // parts that edges join to this one, itself included
   double unrest = 0;            // m: it moves where its neighbours' edges would shift a node of it by more
-  double heldBulk = 0;          // N/m5: HostRange::bulk while only groups without choice move, and the others give way
+  double heldBulk = 0;          // N/m5: HostRange::bulk where the groups that have the choice hang still and give way
 };
 
 // A sphere without any node's mass, kg and kg m2 in its frame; what a carried node adds.
@@ -242,12 +243,13 @@ struct NodeGive {              // of four nodes' attachments alone
 
 struct SurfaceParts {
   std::vector<SurfacePart> parts;
-  std::vector<int> ofGroup;      // per group of dynamic nodes
-  std::vector<NodeGive> give;    // per group of dynamic nodes
-  std::vector<Quad> unrest;      // m, per node; 0 outside chooseSurfaceParts()
-  std::vector<Quad> nodeWeight;  // per node that has the choice: N, and before m/s gained in the frame
-  std::vector<Quad> felt;    // m/s2, per body: gravity less the mean acceleration of its carried nodes in this frame
-  std::vector<Quad> weight;  // N and N m, two per sphere: what these add for not hanging at its frame
+  std::vector<int> ofGroup;          // per group of dynamic nodes
+  std::vector<NodeGive> give;        // per group of dynamic nodes
+  std::vector<Quad> shift;           // m, per node: from where it would hang still by itself
+  std::vector<Quad> velocityBefore;  // m/s, per sphere: at the end of the frame before
+  std::vector<Quad> felt;  // m/s2, per body: gravity less the mean acceleration of its carried mass in this frame
+  std::vector<LinkLoads> weightOnLinks;  // of carried nodes
+  std::vector<Quad> weight;              // N and N m, two per sphere: what these add for not hanging at its frame
   std::vector<BareSphere> spheres;
   std::vector<double> ownShare;    // per sphere: of its mass now, without what carried nodes add
   std::vector<CarriedNode> nodes;  // of parts that have the choice; by sphere
