@@ -139,13 +139,14 @@ INSTANTIATE_TEST_SUITE_P(
         StaticCase{"cylinder_tip", 7, 0.7, 0.4, 0.1}, StaticCase{"cylinder_tip_large", 7, 0.9, 0.6, 0.2},
         StaticCase{"cylinder_mid", 7, 1.2, 0.7, 0.1}, StaticCase{"cylinder_axial", 7, 2.9, 0.9, 0.6},
         StaticCase{"cylinder_torsion", 7, 1.4, 0.5, 0.1}, StaticCase{"cylinder_poke_small", 7, 26, 4.7, 0.2},
-        StaticCase{"cylinder_poke_large", 7, 28.5, 8.3, 0.5}, StaticCase{"gallbladder_tip", 7, 4.9, 2.5, 0.1},
-        StaticCase{"gallbladder_tip_large", 7, 4.8, 2.5, 0.1}, StaticCase{"gallbladder_mid", 7, 6, 3.1, 0.1},
-        StaticCase{"gallbladder_axial", 7, 8.8, 3.5, 0.8}, StaticCase{"gallbladder_torsion", 7, 12.1, 3.6, 0.1},
+        StaticCase{"cylinder_poke_large", 7, 28.5, 8.3, 0.5}, StaticCase{"gallbladder_tip", 7, 3.5, 1.7, 0.1},
+        StaticCase{"gallbladder_tip_large", 7, 2.9, 1.4, 0.1}, StaticCase{"gallbladder_mid", 7, 3.2, 1.5, 0.1},
+        StaticCase{"gallbladder_axial", 7, 8.8, 3.5, 0.8}, StaticCase{"gallbladder_torsion", 7, 11.5, 3.3, 0.1},
         StaticCase{"gallbladder_poke_small", 7, 51, 10, 0.2}, StaticCase{"gallbladder_poke_large", 7, 33, 18.7, 0.5},
         StaticCase{"liver_tip", 35, 13.9, 6.4, 0.1}, StaticCase{"cylinder_tip_large", 25, 3.6, 1.8, 0.1},
         StaticCase{"gallbladder_tip_large", 25, 6, 3, 0.2}, StaticCase{"liver_tip_in_plane", 35, 16.3, 9.6, 0.2},
-        StaticCase{"liver_mid", 35, 26.9, 10.8, 0.4}, StaticCase{"liver_axial", 35, 32.1, 17.6, 1.4}),
+        StaticCase{"liver_mid", 35, 26.9, 10.8, 0.4}, StaticCase{"liver_axial", 35, 32.1, 17.6, 1.4},
+        StaticCase{"gallbladder_doubled_tip_large", 7, 2.6, 1.3, 0.1}),
     [](const auto& tested) {
       const StaticCase& c = tested.param;
       return c.spheres == 25 ? c.name + std::string("_of_25") : std::string(c.name);

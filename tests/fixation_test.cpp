@@ -1,5 +1,6 @@
 #include "physics/dynamics/fixation.h"
 
+#include "physics/dynamics/body_mechanics.h"
 #include "physics/dynamics/region.h"
 #include "tests/dynamics_states.h"
 #include "tests/synthetic_model.h"
@@ -57,6 +58,45 @@ TEST(Fixation, HoldsSpheresByHalfOfTheirSurface) {
   ASSERT_FALSE(held.empty());
   EXPECT_EQ(held.back(), 4);
   EXPECT_GT(held.front(), 1);
+}
+
+// m: how long a uniform beam is that turns as a link does where the same moment acts at both its ends.
+static double freeLength(const FlexionStiffness& k, double youngTimesMoment) {
+  const double determinant = k.end0 * k.end1 - k.couple * k.couple;
+  return youngTimesMoment * (k.end0 + k.end1 + 2 * k.couple) / determinant;
+}
+
+// A rim of height cos(2 angle) clamps by 0.4 of it farther out in one plane, and nearer in the other: mean(cos(2a)
+// cos(a)^2) / mean(cos(a)^2) = 1/2, of which 4/5 count for the fan over the rim. Askew it bends nothing.
+TEST(Fixation, AJaggedRimClampsABeamFartherOutInOnePlane) {
+  constexpr double kRadius = 0.012, kWave = 0.002, kRimAt = 0.0075;
+  const auto flat = synthetic::chainModel(synthetic::straightTube(3, 0.06, kRadius, 12, 8));
+  const Vector3d high = Vector3d(0, 0.6, 0.8);
+  const auto mechanicsOf = [&](double wave, double slope) {
+    auto model = std::make_shared<SoftBodyModel>(*flat);
+    BodyDescription body;
+    body.model = model;
+    body.fixed.push_back({0});
+    for (int i = 0; i < 17; ++i) body.fixedNodes.push_back(i);  // a pole and two rings of eight
+    for (int i = 9; i < 17; ++i) {
+      const Vector3d out = Vector3d(0, model->restNodes[i].y(), model->restNodes[i].z()) / kRadius;
+      const double along = high.dot(out);
+      model->restNodes[i].x() += wave * (2 * along * along - 1) + slope * out.y();
+    }
+    return bodyMechanics(body);
+  };
+  const Tissue tissue;
+  const double ei = tissue.young * flat->links[0].sections[0].bendingMomentU;
+  const double length = 0.03 - kRimAt - tissue.poisson * tissue.poisson * kRadius / 2;
+  for (const double slope : {0.0, 0.001}) {
+    const LinkStiffness even = mechanicsOf(0, slope).links[0], wavy = mechanicsOf(kWave, slope).links[0];
+    EXPECT_NEAR(freeLength(even.flexionU, ei), length, 1e-9);
+    EXPECT_NEAR(freeLength(even.flexionV, ei), length, 1e-9);
+    const bool alongU = std::abs(wavy.restU.dot(high)) > 0.5;
+    EXPECT_NEAR(std::abs(wavy.restU.dot(high)), alongU ? 1 : 0, 1e-9);
+    EXPECT_NEAR(freeLength(alongU ? wavy.flexionV : wavy.flexionU, ei), length - 0.4 * kWave, 1e-9);
+    EXPECT_NEAR(freeLength(alongU ? wavy.flexionU : wavy.flexionV, ei), length + 0.4 * kWave, 1e-9);
+  }
 }
 
 TEST(Fixation, FixedNodesStayToTheBitAndTheBodyHangsOnThem) {

@@ -6,9 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
-#include <optional>
 #include <stdexcept>
 
 #include "physics/dynamics/identified_mechanics.h"
@@ -96,143 +94,6 @@ void checkDescription(const BodyDescription& body) {
             fmt::format("its model takes a node's mass from sphere {}, which does not exist", a.massSphere));
   }
   if (isIdentified(body)) checkIdentified(body);
-}
-
-// Nodes that are fixed and have a neighbour that is not.
-std::vector<bool> rimOfFixed(const BodyDescription& body) {
-  const SoftBodyModel& m = *body.model;
-  std::vector<bool> fixed(m.restNodes.size(), false), rim = fixed;
-  for (const int node : body.fixedNodes) fixed[node] = true;
-  for (const auto& [a, b] : m.edges)
-    if (fixed[a] != fixed[b]) rim[fixed[a] ? a : b] = true;
-  return rim;
-}
-
-// How far along the link, as a share from `end` on, the surface around a held sphere is fixed: the mean of the rim's
-// nodes that hang on link or sphere, 0 where that lies behind the link. Nothing where no rim hangs there: a sphere that
-// is held by its number holds no section.
-std::optional<double> fixedShare(const SoftBodyModel& m, const std::vector<bool>& rim, int link, int sphere,
-                                 const Vector3d& end, const Vector3d& line) {
-  constexpr double kMost = 0.5;
-  double sum = 0;
-  int count = 0;
-  for (std::size_t i = 0; i < rim.size(); ++i) {
-    const Attachment& a = m.attachments[i];
-    if (!rim[i] || a.host != (a.onLink ? link : sphere)) continue;
-    sum += (m.restNodes[i] - end).dot(line) / line.squaredNorm();
-    ++count;
-  }
-  if (count == 0) return {};
-  return std::clamp(sum / count, 0.0, kMost);
-}
-
-// A link to a held sphere begins where the surface around it is free: what lies within the held surface cannot bend.
-std::vector<LinkSpan> linkSpans(const BodyDescription& body, const BodyMechanics& mechanics) {
-  const SoftBodyModel& m = *body.model;
-  const std::vector<bool> rim = rimOfFixed(body);
-  const auto isHeld = [&](int sphere) { return !mechanics.moves[sphere] && !mechanics.turns[sphere]; };
-  std::vector<LinkSpan> out;
-  for (std::size_t k = 0; k < m.links.size(); ++k) {
-    const ElasticLink& l = m.links[k];
-    const Vector3d end0 = m.spheres[l.sphere0].restLinkEnd, end1 = m.spheres[l.sphere1].restLinkEnd;
-    require(end0 != end1,
-            fmt::format("its model's spheres {} and {} are linked and lie in one point", l.sphere0, l.sphere1));
-    LinkSpan span;
-    if (isHeld(l.sphere0) != isHeld(l.sphere1)) {
-      const bool first = isHeld(l.sphere0);
-      const std::optional<double> share = first ? fixedShare(m, rim, static_cast<int>(k), l.sphere0, end0, end1 - end0)
-                                                : fixedShare(m, rim, static_cast<int>(k), l.sphere1, end1, end0 - end1);
-      (first ? span.clamped0 : span.clamped1) = share.has_value();
-      if (first) span.from = share.value_or(0);
-      if (!first) span.to = 1 - share.value_or(0);
-    }
-    span.end0 = end0 + span.from * (end1 - end0);
-    span.end1 = end0 + span.to * (end1 - end0);
-    out.push_back(span);
-  }
-  return out;
-}
-
-// Mean along a span of a section's compliance, and of it times x and x^2, x = 0..1 along the span.
-struct Compliance {
-  double mean = 0, first = 0, second = 0;
-};
-
-// Of the sections' 1 / `member` from `from` to `to`, places on the whole link.
-Compliance complianceOf(const ElasticLink& l, double from, double to, const LinkSpan& span,
-                        double LinkSection::*member) {
-  Compliance out;
-  for (int k = 0; k < ElasticLink::kSections; ++k) {
-    const auto at = [&](int section) {
-      const double place = std::clamp(static_cast<double>(section) / ElasticLink::kSections, from, to);
-      return (place - span.from) / (span.to - span.from);
-    };
-    const double a = at(k), b = at(k + 1), c = 1 / (l.sections[k].*member);
-    out.mean += c * (b - a);
-    out.first += c * (b * b - a * a) / 2;
-    out.second += c * (b * b * b - a * a * a) / 3;
-  }
-  return out;
-}
-
-// The share of the link's torsion that lies before the place `along` its span: thin parts twist more.
-double twistShare(const ElasticLink& l, const LinkSpan& span, double along) {
-  const double place = span.from + along * (span.to - span.from);
-  const auto twist = [&](double to) {
-    return complianceOf(l, span.from, to, span, &LinkSection::torsionConstant).mean;
-  };
-  return twist(place) / twist(span.to);
-}
-
-// Where a section is clamped it cannot grow narrower or wider, which stiffens what is near as if the body began
-// nu^2 R / 2 farther on: the energy of the hindered contraction goes by nu^2. The factor makes a cylinder of finite
-// elements, which bends 3 % less than Timoshenko's beam at five diameters' length.
-void shortenClamped(const ElasticLink& l, const LinkSpan& span, double poisson, double& from, double& to) {
-  constexpr double kMost = 0.5;  // of the span
-  const double length = (span.end1 - span.end0).norm() / (span.to - span.from);
-  const auto depth = [&](double place) {
-    const int section = std::clamp(static_cast<int>(place * ElasticLink::kSections), 0, ElasticLink::kSections - 1);
-    const double radius = std::sqrt(l.sections[section].area / std::numbers::pi);
-    return std::min(poisson * poisson * radius / 2 / length, kMost * (span.to - span.from));
-  };
-  from = span.from + (span.clamped0 ? depth(span.from) : 0);
-  to = span.to - (span.clamped1 ? depth(span.to) : 0);
-}
-
-// Of a link whose compliance per length is c / factor. Springs: each end bends as the link would, weighted towards the
-// end; both act in series: 2EI/L each of a uniform link. Beam (Timoshenko): the inverse of how moments at the ends turn
-// them, L int c [[(1-x)^2, -x (1-x)], [., x^2]] dx + shear [[1, 1], [1, 1]]; without shear EI/L [[4, 2], [2, 4]] of a
-// uniform link.
-FlexionStiffness flexionStiffness(const Compliance& c, double shear, bool beam, double factor) {
-  if (!beam) return {factor / (c.mean - c.first), factor / c.first, 0};
-  const double f00 = c.mean - 2 * c.first + c.second + shear, f01 = c.second - c.first + shear, f11 = c.second + shear;
-  const double scale = factor / (f00 * f11 - f01 * f01);
-  return {scale * f11, scale * f00, -scale * f01};
-}
-
-std::vector<LinkStiffness> linkStiffness(const BodyDescription& body, const std::vector<LinkSpan>& spans) {
-  constexpr double kShearCoefficient = 0.9;  // round sections (Cowper 1966)
-  const double e = body.tissue.young, shear = e / (2 * (1 + body.tissue.poisson));
-  const bool beam = body.links == LinkModel::beam;
-  std::vector<LinkStiffness> out;
-  for (std::size_t i = 0; i < spans.size(); ++i) {
-    const ElasticLink& l = body.model->links[i];
-    const LinkSpan& span = spans[i];
-    double from = span.from, to = span.to;
-    if (beam) shortenClamped(l, span, body.tissue.poisson, from, to);
-    const auto compliance = [&](double LinkSection::*member) { return complianceOf(l, from, to, span, member); };
-    const double inverse = 1 / (span.end1 - span.end0).norm(), stretch = compliance(&LinkSection::area).mean;
-    const double sheared = stretch * inverse * inverse * e / (kShearCoefficient * shear);
-    const double bending = body.factors.flexion * e * inverse;
-    LinkStiffness k;
-    k.elongation = body.factors.elongation * e * inverse / stretch;
-    k.flexionU = flexionStiffness(compliance(&LinkSection::bendingMomentU), sheared, beam, bending);
-    k.flexionV = flexionStiffness(compliance(&LinkSection::bendingMomentV), sheared, beam, bending);
-    k.torsion = body.factors.torsion * shear * inverse /
-                complianceOf(l, span.from, span.to, span, &LinkSection::torsionConstant).mean;
-    out.push_back(k);
-  }
-  return out;
 }
 
 // Feet on links moved to the links' spans, and slid until the offset is perpendicular, as the frame is that carries it.
@@ -391,7 +252,7 @@ BodyMechanics bodyMechanics(const BodyDescription& body) {
     out.skin = heldSkin(*body.model);
     out.attachments = attachmentsToFrames(*body.model, out.skin);
   } else {
-    out.spans = linkSpans(body, out);
+    out.spans = linkSpans(body, out.moves, out.turns);
     out.links = linkStiffness(body, out.spans);
     out.attachments = attachmentsToSpans(*body.model, out.spans, out.nodeMoves);
   }

@@ -3,30 +3,11 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "physics/dynamics/link_mechanics.h"
 #include "physics/dynamics/world.h"
 
 // A body's masses, stiffnesses and dampings from its tissue and its model's geometry (physics/README.md). Model frame.
 namespace medulla {
-
-// Where a link ends (model frame), and which part of the model's link lies between: not all of it where the surface
-// around one end is held.
-struct LinkSpan {
-  Eigen::Vector3d end0, end1;  // m
-  double from = 0, to = 1;
-  bool clamped0 = false, clamped1 = false;  // the surface around the held sphere there is fixed; one of them at most
-};
-
-// N m/rad about one section axis: moment at an end per flexion there, and at the other.
-struct FlexionStiffness {
-  double end0 = 0, end1 = 0;
-  double couple = 0;  // 0 of springs
-};
-
-struct LinkStiffness {
-  double elongation = 0;  // N/m
-  FlexionStiffness flexionU, flexionV;
-  double torsion = 0;  // N m/rad
-};
 
 struct BodyMechanics {
   std::vector<double> sphereMass;              // kg, without what the nodes carry

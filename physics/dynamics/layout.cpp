@@ -57,7 +57,7 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
     g.hasBeams = g.hasBeams || beam;
     g.hasArms = g.hasArms || !arm0.isZero(0) || !arm1.isZero(0);
     const double length = line.norm();
-    const Vector3d t = line / length, u = (link.restU - t * t.dot(link.restU)).normalized();
+    const Vector3d t = line / length, u = stiffness.restU;
     g.elongation[lane] = stiffness.elongation;
     g.flexionU0[lane] = stiffness.flexionU.end0;
     g.flexionV0[lane] = stiffness.flexionV.end0;

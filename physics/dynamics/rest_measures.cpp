@@ -37,8 +37,8 @@ std::vector<MeasureRow> measureRows(const SoftBodyModel& m, const BodyMechanics&
     const Vector3d arm0 = b.spans[k].end0 - m.spheres[l.sphere0].restFrame,
                    arm1 = b.spans[k].end1 - m.spheres[l.sphere1].restFrame;
     const double length = d.norm();
-    const Vector3d t = d / length, u = (l.restU - t * t.dot(l.restU)).normalized(), v = t.cross(u);
     const LinkStiffness& s = b.links[k];
+    const Vector3d t = d / length, u = s.restU, v = t.cross(u);
     const auto add = [&](const Vector3d& line, const Vector3d& turn0, const Vector3d& turn1, double stiffness) {
       rows.push_back({l.sphere0, l.sphere1, line, turn0 - arm0.cross(line), turn1 + arm1.cross(line), stiffness});
     };
