@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "physics/dynamics/body_mechanics.h"
+#include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/rest_modes.h"
 #include "tests/identified_model.h"
 
@@ -68,6 +69,30 @@ TEST(IdentifiedLink, ForcesAreMinusTheGradientTurnedByAnyAngle) {
     }
     ASSERT_NEAR(turnAgainstNext(d, 1), degrees / 180 * std::numbers::pi, 0.15);
     expectForcesAreMinusGradient(d, 2e-6);
+  }
+}
+
+// Wound by more than 232 degrees a link would end a whole turn away from rest: the spheres behind it change their sign,
+// which moves nothing. Below that they keep it: half a turn is no seam.
+TEST(IdentifiedLink, TurnedTooFarLetsGoOfAWholeTurn) {
+  for (const double degrees : {200.0, 231.0, 300.0, 350.0}) {
+    World world(weightless(), {chain(SurfaceMode::skin, false)});
+    WorldData& d = world.data();
+    const Vector3d turn = degrees / 180 * std::numbers::pi * Vector3d::UnitX();
+    for (int i = 2; i < 5; ++i) {
+      turnBy(d, i, 0.5 * turn);
+      turnBy(d, i, 0.5 * turn);
+    }
+    runStage(d, evaluateLinks);
+    const double before = world.energies().elastic;
+    letGoOfWholeTurns(d);
+    const bool far = degrees > 232;
+    EXPECT_NEAR(turnAgainstNext(d, 1), (far ? 360 - degrees : degrees) / 180 * std::numbers::pi, 1e-6) << degrees;
+    EXPECT_NEAR(turnAgainstNext(d, 2), 0, 1e-6);
+    runStage(d, evaluateLinks);
+    if (far) {
+      EXPECT_LT(world.energies().elastic, before) << degrees;
+    }
   }
 }
 

@@ -77,16 +77,23 @@ void returnFrameForces(WorldData& d, const Batch& batch) {
   }
 }
 
-double identifiedLinkEnergy(const WorldData& d) {
+double identifiedLinkEnergy(const Identified& s, const IdentifiedBody& body) {
   double sum = 0;
-  for (const IdentifiedLinkGroup& link : d.identified.links) {
-    const FrameState* frames = d.identified.frames.data();
-    const LinkTurn m = measureLink(link, gatherFrames(frames, link.frame0), gatherFrames(frames, link.frame1));
+  for (int g = body.firstLinkGroup; g < body.endLinkGroup; ++g) {
+    const IdentifiedLinkGroup& link = s.links[g];
+    const LinkTurn m =
+        measureLink(link, gatherFrames(s.frames.data(), link.frame0), gatherFrames(s.frames.data(), link.frame1));
     const Lanes3 t = fma(m.hyper - m.along, link.along, m.t);
     Lanes3 onT, onW;
     stiffnessTimes(link, t, m.w, onT, onW);
     sum += 0.5 * sumOfLanes(dot(t, onT) + dot(m.w, onW));
   }
+  return sum;
+}
+
+double identifiedLinkEnergy(const WorldData& d) {
+  double sum = 0;
+  for (const IdentifiedBody& body : d.identified.bodies) sum += identifiedLinkEnergy(d.identified, body);
   return sum;
 }
 

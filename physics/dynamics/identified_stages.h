@@ -10,6 +10,12 @@ namespace medulla {
 void evaluateIdentifiedLinks(WorldData&, const Batch&);  // frames from spheres; links' forces on frames
 void returnFrameForces(WorldData&, const Batch&);        // from frames to spheres, added
 double identifiedLinkEnergy(const WorldData&);
+double identifiedLinkEnergy(const Identified&, const IdentifiedBody&);
+
+// identified_turns.cpp
+// Of the state that frames were last placed at, before a dynamics frame: where that leaves less energy in the links, or
+// whatever it leaves.
+void letGoOfWholeTurns(WorldData&, bool whateverItLeaves = false);
 
 // identified_surface.cpp: the nodes of a range that hangs on frames.
 void pullOnFrames(WorldData&, const HostRange&);

@@ -3,6 +3,7 @@
 
 #include "physics/dynamics/angles.h"
 #include "physics/dynamics/contact_stages.h"
+#include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/point_spring.h"
 #include "physics/dynamics/stages.h"
@@ -229,11 +230,14 @@ bool runStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   return left <= 10 * enough;  // rounding stops some iterations of very stiff bodies just short of it
 }
 
-// Steps of half of the one before at each level; all but the first are made when a step fails for the first time.
+// Steps of half of the one before at each level down to kDeepest, and one of its length in a single stage; all but the
+// first are made when a step fails for the first time.
+constexpr std::size_t kDeepest = 6, kSingleStage = 7;
 ImplicitData& implicitLevel(WorldData& d, std::size_t level) {
   while (d.implicit.size() <= level) {
+    const bool twoStages = d.settings.order == 2 && d.implicit.size() < kSingleStage;
     d.implicit.push_back(std::make_shared<ImplicitData>());
-    layOutImplicit(d, d.settings.order == 2 ? kGamma * d.substep : d.substep, *d.implicit.back());
+    layOutImplicit(d, twoStages ? kGamma * d.substep : d.substep, *d.implicit.back());
   }
   return *d.implicit[level];
 }
@@ -352,16 +356,21 @@ bool attempt(WorldData& d, ImplicitData& s, std::size_t level, const Loads& load
 
 // The last resort of a body so deformed that its forces are not the slope of its energy (links shorter than a
 // twentieth, or folded to 180 degrees): it moves without speed, as long as it has no more energy than it has ever had,
-// or stays.
+// or stays. Likewise frames that were a whole turn apart are so no longer.
 void creep(WorldData& d, const ImplicitData& s) {
   if (!(elasticEnergy(d) <= d.mostEnergy)) restore(d, s.before);
   slowDown(d, 0);
+  const auto orientation = d.spheres.orientation;
+  runStage(d, evaluateForces);
+  letGoOfWholeTurns(d, true);
+  runStage(d, evaluateForces);
+  if (!(elasticEnergy(d) <= d.mostEnergy)) d.spheres.orientation = orientation;
 }
 
-// One step of d.substep; where it fails, two of half of it.
+// One step of d.substep; where it fails, two of half of it; where these are the shortest, one of backward Euler's,
+// which damps what order 2 would follow.
 void advanceBy(WorldData& d, std::size_t level, const Loads& loads, const StepTime& time,
                std::vector<Vector3d>& toolImpulse) {
-  constexpr std::size_t kDeepest = 6;
   ImplicitData& s = implicitLevel(d, level);
   beginHere(d, s.before);
   runStage(d, evaluateForces);
@@ -372,8 +381,9 @@ void advanceBy(WorldData& d, std::size_t level, const Loads& loads, const StepTi
       toolImpulse[pointSpring(d, loads, k, time.remaining).tool] += s.toolImpulses[k];
     return;
   }
-  if (level == kDeepest) return creep(d, s);
+  if (level == kSingleStage || (level == kDeepest && d.settings.order == 1)) return creep(d, s);
   restore(d, s.before);
+  if (level == kDeepest) return advanceBy(d, kSingleStage, loads, time, toolImpulse);
   const double half = 0.5 * d.substep;
   d.substep = half;
   advanceBy(d, level + 1, loads, {time.end - half, time.remaining + half}, toolImpulse);

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "physics/dynamics/contact_stages.h"
+#include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/layout.h"
 #include "physics/dynamics/node_motion.h"
@@ -243,6 +244,7 @@ FrameReport World::advance(const Loads& loads) {
   for (const HeldNode& held : loads.heldNodes) tools = std::max(tools, held.tool + 1);
   report.toolImpulse.assign(tools, Eigen::Vector3d::Zero());
   d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Eigen::Vector3d::Zero());
+  letGoOfWholeTurns(d);
   wakeLoaded(d, loads);
   moveLoadedParts(d, loads);
   frameLoadedSkins(d, loads);
