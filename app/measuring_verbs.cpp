@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <memory>
+#include <thread>
 
 #include "app/commands/commands.h"
 #include "app/files/number_text.h"
+#include "app/torture.h"
 #include "app/verbs.h"
 
 // The verbs that hold pictures, logs, methods, steps and models against each other.
@@ -113,9 +115,19 @@ Verb addStability(CLI::App& app) {
   const auto addList = [&](const char* name, std::vector<std::string>& values, const char* help, const char* type) {
     c->add_option(name, values, help)->type_name(type)->delimiter(',')->allow_extra_args(false)->capture_default_str();
   };
+  for (const TortureMethod& method : tortureMethods()) a.options.methods.push_back(method.name);
+  c->add_option("--methods", a.options.methods, "integrators, a panel each")
+      ->check(CLI::IsMember(a.options.methods))
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->capture_default_str();
   addList("--steps", a.steps, "steps of the map, ms", "MS,MS,...");
   addList("--young", a.young, "stiffnesses of the map, Pa", "PA,PA,...");
   addList("--trial-steps", a.trialSteps, "steps of the trials, ms", "MS,MS,...");
+  a.options.threads = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 64U));
+  c->add_option("--threads", a.options.threads, "trials that run side by side; the results are the same")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   return {c, [arguments] { return runStability(stabilityOptions(*arguments)); }};
 }
 

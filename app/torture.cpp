@@ -300,6 +300,34 @@ const std::vector<Trial>& trials() {
   return all;
 }
 
+const Trial& trialOf(const std::string& name) {
+  const auto found = std::find_if(trials().begin(), trials().end(), [&](const Trial& t) { return t.name == name; });
+  if (found == trials().end()) throw std::runtime_error(fmt::format("no trial is called '{}'", name));
+  return *found;
+}
+
+// The body that a trial is about, alone.
+BodyDescription bodyOf(const Trial& trial, BodyDescription body) {
+  body.worldFromModel.setIdentity();
+  body.driven.clear();
+  body.deadLoads.clear();
+  if (body.fixed.empty() && (body.links != LinkModel::identified || body.fixedNodes.empty()))
+    throw std::runtime_error(fmt::format("body '{}' is not held anywhere: expected a body with <fix>", body.name));
+  if (trial.change) trial.change(body);
+  return body;
+}
+
+double handTimeOf(const Trial& trial) {
+  return trial.path ? 1 : 0;
+}
+
+// s: until a hundredth of a hundredfold of the body's size is left of its slowest mode, and the hand's second.
+double timeOf(const Trial& trial, const BodyDescription& body, double step) {
+  constexpr double kDecay = 12, kLeastSteps = 100;
+  const double lowest = lowestFrequency(body, bodyMechanics(body));
+  return handTimeOf(trial) + std::max(kDecay / (std::max(0.05, body.tissue.damping) * lowest), kLeastSteps * step);
+}
+
 double farthestFromRest(const WorldData& d, const BodyDescription& body) {
   double squared = 0;
   for (std::size_t i = 0; i < body.model->restNodes.size(); ++i)
@@ -336,17 +364,15 @@ std::vector<std::string> tortureTrials() {
   return out;
 }
 
-TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method, const std::string& trial,
-                       double step) {
-  const auto found = std::find_if(trials().begin(), trials().end(), [&](const Trial& t) { return t.name == trial; });
-  if (found == trials().end()) throw std::runtime_error(fmt::format("no trial is called '{}'", trial));
-  BodyDescription body = whole;
-  body.worldFromModel.setIdentity();
-  body.driven.clear();
-  body.deadLoads.clear();
-  if (body.fixed.empty() && (body.links != LinkModel::identified || body.fixedNodes.empty()))
-    throw std::runtime_error(fmt::format("body '{}' is not held anywhere: expected a body with <fix>", body.name));
-  if (found->change) found->change(body);
+double tortureSteps(const BodyDescription& whole, const std::string& trial, double step) {
+  const Trial& found = trialOf(trial);
+  return std::ceil(timeOf(found, bodyOf(found, whole), step) / step);
+}
+
+TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method, const std::string& trial, double step,
+                       const std::function<void()>& afterStep) {
+  const Trial& found = trialOf(trial);
+  const BodyDescription body = bodyOf(found, whole);
   WorldSettings settings;
   settings.gravity.setZero();
   settings.frameDuration = step;
@@ -355,13 +381,10 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
   settings.order = method.order;
   World world(settings, {body});
   const Eigen::AlignedBox3d box = boxOf(*body.model);
-  if (found->start) found->start(world.data(), box);
+  if (found.start) found.start(world.data(), box);
 
-  // Until a hundredth of a hundredfold of the body's size is left of its slowest mode, and the hand's second.
-  const double lowest = lowestFrequency(body, bodyMechanics(body)), handTime = found->path ? 1 : 0;
-  constexpr double kDecay = 12, kLeastSteps = 100;
   TortureOutcome out;
-  const double time = handTime + std::max(kDecay / (std::max(0.05, body.tissue.damping) * lowest), kLeastSteps * step);
+  const double time = timeOf(found, body, step), handTime = handTimeOf(found);
   const double diagonal = box.diagonal().norm();
   const int end = freeEnd(body);
   const auto energy = [&] {
@@ -378,11 +401,12 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
         HeldNode hand;
         hand.node = end;
         hand.stiffness = 200;
-        hand.anchor = body.model->restNodes[end] + found->path(t) * Vector3d::UnitY();
-        hand.anchorVelocity = (found->path(t) - found->path(t - step)) / step * Vector3d::UnitY();
+        hand.anchor = body.model->restNodes[end] + found.path(t) * Vector3d::UnitY();
+        hand.anchorVelocity = (found.path(t) - found.path(t - step)) / step * Vector3d::UnitY();
         loads.heldNodes.push_back(hand);
       }
       world.advance(loads);
+      if (afterStep) afterStep();
       const double now = energy();
       out.largestEnergy = std::max(out.largestEnergy, now);
       if (t <= handTime) out.startEnergy = out.largestEnergy;

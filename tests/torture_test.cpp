@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "app/files/stability_file.h"
+#include "app/files/trial_journal.h"
 #include "tests/identified_model.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
@@ -92,6 +92,61 @@ TEST(StabilityCommand, WritesMapAndTrials) {
   EXPECT_EQ(std::count(map.begin(), map.end(), '\n'), 1 + 3 * 4);
   EXPECT_EQ(std::count(trials.begin(), trials.end(), '\n'), 1 + 3 * static_cast<long>(tortureTrials().size()));
   EXPECT_NE(map.find("explicit,,10000,0.05,0,"), std::string::npos) << map;
+}
+
+// Rows are on the disk as they are known; the command that was interrupted goes on from there, to the same tables.
+TEST(StabilityCommand, AnInterruptedRunIsTakenUpAgain) {
+  const TemporaryFolder folder;
+  const auto words = [&](const std::string& out) -> std::vector<std::string> {
+    return {"stability",
+            std::string(MEDULLA_SOURCE_DIR) + "/scenes/gallbladder.xml",
+            "-o",
+            folder / out,
+            "--methods",
+            "implicit",
+            "--steps",
+            "50,10",
+            "--young",
+            "1e4",
+            "--trial-steps",
+            "50",
+            "--threads",
+            "2"};
+  };
+  const std::string journal = folder / "out/trials.part";
+  ProgramOptions interrupted;
+  interrupted.interruptWhen = [&] {
+    const std::string text = readFile(journal);
+    return std::count(text.begin(), text.end(), '\n') >= 3;
+  };
+  const ProgramResult first = runProgram(words("out"), interrupted);
+  ASSERT_EQ(first.exitCode, 130) << first.err;
+  EXPECT_NE(first.err.find("the same command goes on from there"), std::string::npos) << first.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/map.csv"));
+  // A process that is killed may leave part of a row.
+  const std::string kept = readFile(journal);
+  folder.write("out/trials.part", kept + "implicit,poi");
+  const ProgramResult second = runProgram(words("out")), whole = runProgram(words("whole"));
+  ASSERT_EQ(second.exitCode, 0) << second.err;
+  EXPECT_EQ(second.out, whole.out);
+  EXPECT_FALSE(std::filesystem::exists(journal));
+  for (const char* name : {"map.csv", "trials.csv", "stability.gnuplot"})
+    EXPECT_EQ(readFile(folder / "out/" + name), readFile(folder / "whole/" + name)) << name;
+}
+
+// What is kept is of one scene: another's rows are not taken for its own.
+TEST(TrialJournal, KeepsRowsOfTheSameRunAlone) {
+  const TemporaryFolder folder;
+  StabilityPoint p{"implicit", "point", 0.05, 9e3, true, 1.25, 1};
+  {
+    TrialJournal journal(folder / "trials.part", 1);
+    journal.add(p);
+  }
+  p.recoveredAt.reset();
+  EXPECT_TRUE(TrialJournal(folder / "trials.part", 1).find(p));
+  EXPECT_EQ(p.recoveredAt, 1.25);
+  EXPECT_FALSE(TrialJournal(folder / "trials.part", 2).find(p));
+  EXPECT_FALSE(std::filesystem::exists(folder / "trials.part"));  // nothing is left to keep
 }
 
 TEST(StabilityCommand, BadStepsAndFreeBodiesAreOneLine) {

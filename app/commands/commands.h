@@ -87,8 +87,10 @@ int runChart(const ChartOptions& options);
 struct StabilityOptions {
   RunOptions run;                         // of its scene, the first body
   std::string folder;                     // for map.csv, trials.csv, stability.gnuplot and stability.svg
+  std::vector<std::string> methods;       // of tortureMethods(), at least one
   std::vector<double> steps, trialSteps;  // s, of the map and of the trials
   std::vector<double> young;              // Pa, of the map
+  int threads = 1;                        // trials side by side; these change no outcome
 };
 int runStability(const StabilityOptions& options);
 

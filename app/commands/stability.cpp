@@ -2,12 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <filesystem>
+#include <mutex>
+#include <optional>
+#include <thread>
 
 #include "app/commands/commands.h"
 #include "app/files/gnuplot.h"
 #include "app/files/output_file.h"
 #include "app/files/stability_file.h"
+#include "app/files/trial_journal.h"
+#include "app/interrupt.h"
 #include "app/progress.h"
 #include "app/torture.h"
 
@@ -33,22 +39,103 @@ BodyDescription bodyOf(const LoadedScene& loaded) {
   return out;
 }
 
-StabilityPoint tryOne(const BodyDescription& body, const TortureMethod& method, const std::string& trial, double step) {
-  const TortureOutcome outcome = torture(body, method, trial, step);
-  StabilityPoint out;
-  out.method = method.name;
-  out.trial = trial;
-  out.step = step;
-  out.young = body.tissue.young;
-  out.survived = outcome.survived;
-  out.recoveredAt = outcome.recoveredAt;
-  out.energyRatio = outcome.largestEnergy / outcome.startEnergy;
+// A trial and, once it is known, how it ended.
+struct PlannedTrial {
+  BodyDescription body;
+  TortureMethod method;
+  std::string trial;
+  double steps = 0;  // at most
+  StabilityPoint point;
+};
+
+std::vector<TortureMethod> methodsOf(const StabilityOptions& options) {
+  std::vector<TortureMethod> out;
+  for (const TortureMethod& method : tortureMethods())
+    if (std::find(options.methods.begin(), options.methods.end(), method.name) != options.methods.end())
+      out.push_back(method);
   return out;
 }
 
-std::vector<Result> resultsOf(const std::vector<StabilityPoint>& map, const std::vector<StabilityPoint>& trials) {
+// Adds a trial by every method at every step; `name` is what tables call it.
+void planTrials(const BodyDescription& body, const std::string& trial, const std::string& name,
+                const std::vector<TortureMethod>& methods, const std::vector<double>& steps,
+                std::vector<PlannedTrial>& plan) {
+  for (const TortureMethod& method : methods) {
+    for (const double step : steps) {
+      PlannedTrial p{body, method, trial, tortureSteps(body, trial, step), {}};
+      p.point.method = method.name;
+      p.point.trial = name;
+      p.point.step = step;
+      p.point.young = body.tissue.young;
+      plan.push_back(std::move(p));
+    }
+  }
+}
+
+// Trials that nobody has run yet, side by side: whoever is free takes the next.
+class TrialRunner {
+ public:
+  TrialRunner(std::vector<PlannedTrial>& plan, TrialJournal& journal) : plan_(plan), journal_(journal) {
+    double steps = 0;
+    for (const PlannedTrial& p : plan) steps += p.steps;
+    progress_.emplace("stability", steps, "steps");
+  }
+
+  // Throws what a trial throws, once all others have ended or been interrupted.
+  void run(int threads) {
+    {
+      std::vector<std::jthread> others;
+      for (int k = 1; k < threads; ++k) others.emplace_back([this] { work(); });
+      work();
+    }
+    if (failure_) std::rethrow_exception(failure_);
+  }
+
+ private:
+  void work() {
+    try {
+      while (PlannedTrial* p = next()) finish(*p);
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      if (!failure_) failure_ = std::current_exception();
+    }
+  }
+
+  PlannedTrial* next() {
+    const std::lock_guard lock(mutex_);
+    for (; taken_ < plan_.size() && !failure_; done_ += plan_[taken_++].steps)
+      if (!journal_.find(plan_[taken_].point)) return &plan_[taken_++];
+    return nullptr;
+  }
+
+  void finish(PlannedTrial& p) {
+    double steps = 0;
+    const TortureOutcome outcome = torture(p.body, p.method, p.trial, p.point.step, [&] {
+      const std::lock_guard lock(mutex_);
+      steps += 1;
+      progress_->update(done_ += 1);
+    });
+    p.point.survived = outcome.survived;
+    p.point.recoveredAt = outcome.recoveredAt;
+    p.point.energyRatio = outcome.largestEnergy / outcome.startEnergy;
+    const std::lock_guard lock(mutex_);
+    journal_.add(p.point);
+    done_ += p.steps - steps;
+  }
+
+  std::vector<PlannedTrial>& plan_;
+  TrialJournal& journal_;
+  std::mutex mutex_;  // of all below, and of the journal
+  std::optional<Progress> progress_;
+  std::size_t taken_ = 0;
+  double done_ = 0;  // steps, of ended trials as many as they might have taken
+  std::exception_ptr failure_;
+};
+
+std::vector<Result> resultsOf(const std::vector<TortureMethod>& methods, const std::vector<StabilityPoint>& map,
+                              const std::vector<StabilityPoint>& trials) {
   std::vector<Result> out;
-  for (const TortureMethod& method : tortureMethods()) {
+  for (const TortureMethod& method : methods) {
     const auto count = [&](const std::vector<StabilityPoint>& points, const char* what, const auto& counts) {
       const auto ofMethod = [&](const StabilityPoint& p) { return p.method == method.name; };
       const auto all = std::count_if(points.begin(), points.end(), ofMethod);
@@ -66,56 +153,65 @@ std::vector<Result> resultsOf(const std::vector<StabilityPoint>& map, const std:
   return out;
 }
 
+// The trials' outcomes, of those of the map and of the others.
+struct StabilityTables {
+  std::vector<StabilityPoint> map, trials;
+  std::vector<StableStep> limit;
+};
+
+StabilityTables runTrials(const StabilityOptions& options, const BodyDescription& body,
+                          const std::vector<TortureMethod>& methods, TrialJournal& journal) {
+  StabilityTables out;
+  std::vector<PlannedTrial> plan;
+  for (const double young : options.young) {
+    BodyDescription other = body;
+    other.tissue.young = young;
+    planTrials(other, kMapTrial, "", methods, options.steps, plan);
+    out.limit.push_back({young, explicitLimit(other)});
+  }
+  for (const std::string& trial : tortureTrials()) planTrials(body, trial, trial, methods, options.trialSteps, plan);
+  try {
+    TrialRunner(plan, journal).run(options.threads);
+  } catch (const Interrupted&) {
+    if (journal.size() > 0)
+      fmt::print(stderr, "stability: {} of {} trials are kept in {}; the same command goes on from there\n",
+                 journal.size(), plan.size(), journal.path());
+    throw;
+  }
+  for (const PlannedTrial& p : plan) (p.point.trial.empty() ? out.map : out.trials).push_back(p.point);
+  return out;
+}
+
+void writeTables(const fs::path& folder, const std::string& title, const StabilityTables& tables) {
+  const std::string script = (folder / "stability.gnuplot").string();
+  writeStability((folder / "map.csv").string(), tables.map);
+  writeStability((folder / "trials.csv").string(), tables.trials);
+  const std::string text = stabilityScript(title, tables.map, tables.trials, tables.limit);
+  writeText(script, text);
+  if (const std::optional<std::string> svg = runGnuplot(text)) {
+    writeText((folder / "stability.svg").string(), *svg);
+  } else {
+    fmt::print(stderr, "no stability.svg: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {}\n",
+               script);
+  }
+}
+
 }  // namespace
 
 int runStability(const StabilityOptions& options) {
   const LoadedScene loaded = loadRun(options.run);
   const BodyDescription body = bodyOf(loaded);
+  const std::vector<TortureMethod> methods = methodsOf(options);
   const fs::path folder = options.folder;
-  const std::string script = (folder / "stability.gnuplot").string();
   std::error_code error;
   const bool made = fs::create_directories(folder, error);
   if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", options.folder, error.message()));
   try {
-    const auto& methods = tortureMethods();
-    const std::vector<std::string> trials = tortureTrials();
-    const std::size_t count =
-        methods.size() * (options.young.size() * options.steps.size() + trials.size() * options.trialSteps.size());
-    Progress progress("stability", static_cast<double>(count), "trials");
-    double done = 0;
-    std::vector<StabilityPoint> map, tortured;
-    std::vector<StableStep> limit;
-    for (const double young : options.young) {
-      BodyDescription other = body;
-      other.tissue.young = young;
-      limit.push_back({young, explicitLimit(other)});
-      for (const TortureMethod& method : methods) {
-        for (const double step : options.steps) {
-          map.push_back(tryOne(other, method, kMapTrial, step));
-          map.back().trial.clear();
-          progress.update(++done);
-        }
-      }
-    }
-    for (const TortureMethod& method : methods) {
-      for (const std::string& trial : trials) {
-        for (const double step : options.trialSteps) {
-          tortured.push_back(tryOne(body, method, trial, step));
-          progress.update(++done);
-        }
-      }
-    }
-    writeStability((folder / "map.csv").string(), map);
-    writeStability((folder / "trials.csv").string(), tortured);
-    const std::string text = stabilityScript(loaded.scene.name, map, tortured, limit);
-    writeText(script, text);
-    if (const std::optional<std::string> svg = runGnuplot(text)) {
-      writeText((folder / "stability.svg").string(), *svg);
-    } else {
-      fmt::print(stderr, "no stability.svg: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {}\n",
-                 script);
-    }
-    printResults(resultsOf(map, tortured));
+    TrialJournal journal((folder / "trials.part").string(), runHash(loaded, false));
+    const StabilityTables tables = runTrials(options, body, methods, journal);
+    writeTables(folder, loaded.scene.name, tables);
+    printResults(resultsOf(methods, tables.map, tables.trials));
+    journal.remove();
   } catch (...) {
     if (made) fs::remove(folder, error);  // if it is empty again
     throw;

@@ -70,12 +70,15 @@ std::string spaced(std::string name) {
 
 }  // namespace
 
+std::string stabilityRow(const StabilityPoint& p) {
+  return fmt::format("{},{},{:.6g},{:.6g},{:d},{},{:.4g}\n", p.method, p.trial, p.young, p.step, p.survived,
+                     p.recoveredAt ? fmt::format("{:.4g}", *p.recoveredAt) : "", p.energyRatio);
+}
+
 void writeStability(const std::string& path, const std::vector<StabilityPoint>& points) {
   OutputFile file(path);
   file.write("method,trial,young[Pa],step[s],survived,recovered_at[s],largest_energy[of start]\n");
-  for (const StabilityPoint& p : points)
-    file.write(fmt::format("{},{},{:.6g},{:.6g},{:d},{},{:.4g}\n", p.method, p.trial, p.young, p.step, p.survived,
-                           p.recoveredAt ? fmt::format("{:.4g}", *p.recoveredAt) : "", p.energyRatio));
+  for (const StabilityPoint& p : points) file.write(stabilityRow(p));
   file.commit();
 }
 

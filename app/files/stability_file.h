@@ -22,11 +22,12 @@ struct StableStep {
 };
 
 // CSV, a row per point.
+std::string stabilityRow(const StabilityPoint& point);
 void writeStability(const std::string& path, const std::vector<StabilityPoint>& points);
 
 // The picture as a script for gnuplot that writes SVG to standard output: above the map, a panel per method, step
 // across and stiffness upwards with the explicit limit drawn over it; below the trials, a panel per method, a row per
-// trial.
+// trial. There is at least one point of each.
 std::string stabilityScript(const std::string& title, const std::vector<StabilityPoint>& map,
                             const std::vector<StabilityPoint>& torture, const std::vector<StableStep>& limit);
 

@@ -1,0 +1,92 @@
+#include "app/files/trial_journal.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+
+#include "app/files/csv_rows.h"
+#include "app/files/input_error.h"
+#include "app/files/output_file.h"
+#include "app/files/text_file.h"
+
+namespace medulla {
+
+namespace {
+
+// What tells a trial from the others, as the tables write it.
+std::string trialKey(const StabilityPoint& p) {
+  return fmt::format("{},{},{:.6g},{:.6g}", p.method, p.trial, p.young, p.step);
+}
+
+StabilityPoint pointOf(const CsvRows& row) {
+  if (row.cells().size() != 7) row.fail("expected the seven cells of a trial");
+  StabilityPoint p;
+  p.method = row.cells()[0];
+  p.trial = row.cells()[1];
+  p.young = row.number(2, "young");
+  p.step = row.number(3, "step");
+  p.survived = row.index(4, "survived", 2) == 1;
+  if (!row.cells()[5].empty()) p.recoveredAt = row.number(5, "recovered_at");
+  p.energyRatio = row.cells()[6] == "inf" ? std::numeric_limits<double>::infinity() : row.number(6, "largest_energy");
+  return p;
+}
+
+}  // namespace
+
+TrialJournal::TrialJournal(std::string path, std::uint64_t run) : path_(std::move(path)) {
+  const std::string head = fmt::format("# medulla stability {:016x}\n", run);
+  if (std::filesystem::exists(path_)) read(head);
+  // Written anew: without a row's beginning, and without trials of another run.
+  std::string text = head;
+  for (const auto& [key, point] : known_) text += stabilityRow(point);
+  writeText(path_, text);
+  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (descriptor_ < 0) throw inputError(path_, 0, std::string("cannot be written: ") + std::strerror(errno));
+}
+
+TrialJournal::~TrialJournal() {
+  if (known_.empty()) remove();
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void TrialJournal::read(const std::string& head) {
+  std::string text = readTextFile(path_);
+  text.erase(text.rfind('\n') + 1);  // all of it where there is none
+  if (!text.starts_with(head)) return;
+  CsvRows rows(text, path_);
+  while (rows.next()) {
+    const StabilityPoint point = pointOf(rows);
+    known_[trialKey(point)] = point;
+  }
+}
+
+bool TrialJournal::find(StabilityPoint& point) const {
+  const auto found = known_.find(trialKey(point));
+  if (found != known_.end()) point = found->second;
+  return found != known_.end();
+}
+
+void TrialJournal::add(const StabilityPoint& point) {
+  append(stabilityRow(point));
+  known_[trialKey(point)] = point;
+}
+
+void TrialJournal::append(const std::string& text) {
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t count = ::write(descriptor_, text.data() + done, text.size() - done);
+    if (count < 0 && errno != EINTR)
+      throw inputError(path_, 0, std::string("cannot be written: ") + std::strerror(errno));
+    if (count > 0) done += static_cast<std::size_t>(count);
+  }
+}
+
+void TrialJournal::remove() {
+  ::unlink(path_.c_str());
+}
+
+}  // namespace medulla

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "app/files/stability_file.h"
+
+namespace medulla {
+
+// Trials as they end, a row each, for runs of hours: what an ended run of the same trials left is not run again. The
+// file has a name that looks unfinished; whoever has all trials writes the tables and calls remove(). A row is in the
+// file when add() returns; one that a killed run left half written is dropped.
+class TrialJournal {
+ public:
+  // `run` is all that the trials' outcomes follow from; rows of another run are dropped. Throws std::runtime_error
+  // where the file cannot be read or written.
+  TrialJournal(std::string path, std::uint64_t run);
+  ~TrialJournal();  // without trials there is no file
+  TrialJournal(const TrialJournal&) = delete;
+  TrialJournal& operator=(const TrialJournal&) = delete;
+
+  // Fills in how `point`'s trial ended. False where it is not known.
+  bool find(StabilityPoint& point) const;
+  void add(const StabilityPoint& point);
+  void remove();
+  std::size_t size() const { return known_.size(); }
+  const std::string& path() const { return path_; }
+
+ private:
+  void read(const std::string& head);
+  void append(const std::string& text);
+
+  std::string path_;
+  int descriptor_ = -1;
+  std::map<std::string, StabilityPoint> known_;
+};
+
+}  // namespace medulla
