@@ -179,6 +179,25 @@ TEST_F(ChartCommand, GnuplotDrawsIt) {
   EXPECT_TRUE(svg.ends_with("</svg>\n\n") || svg.ends_with("</svg>\n")) << svg.substr(svg.size() - 20);
 }
 
+TEST_F(ChartCommand, WhereEveryRunFailsPicturesShowThat) {
+  if (std::system("gnuplot --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "gnuplot is not installed";
+  const std::string assets = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/", model = folder / "three.xml";
+  ASSERT_EQ(
+      runProgram({"build", assets + "gallbladder.obj", "-o", model, "--spheres", "3", "--render-levels", "0"}).exitCode,
+      0);
+  std::string rows = "# unit 1e-3 m\n";
+  for (std::size_t v = 0; v < readMesh(assets + "gallbladder.obj").vertices.size(); ++v) rows += "0 0 1\n";
+  folder.write("fem.txt", rows);
+  const ProgramResult r =
+      chart({"--steps", "20", "--methods", "full,springs", "--models", model, "--models",
+             assets + "gallbladder.model.xml", "--set", "body.pear.reference=" + (folder / "fem.txt")});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_TRUE(r.out.starts_with("runs 4\nfailed 4\n")) << r.out;
+  EXPECT_NE(readFile(folder / "out/chart.svg").find("failed, or 100 % wrong"), std::string::npos);
+  EXPECT_NE(readFile(folder / "out/spheres.svg").find("failed"), std::string::npos);
+  EXPECT_EQ(rowsOf(folder / "out/spheres.csv")[1][3], "");
+}
+
 TEST_F(ChartCommand, BadInputIsRefusedInOneLineAndLeavesNoFolder) {
   const auto refused = [&](const ProgramResult& r, int exitCode, const std::string& words) {
     EXPECT_EQ(r.exitCode, exitCode);

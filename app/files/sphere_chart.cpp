@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string>
+#include <vector>
 
 #include "app/files/output_file.h"
 
@@ -24,7 +26,6 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
   std::string out =
       "set terminal svg size 960,560 dynamic noenhanced font 'Helvetica,14' background 'white'\n"
       "set logscale xyy2\n"
-      "set border 11 lc '#555555'\n"
       "set tics nomirror out\n"
       "set grid xtics ytics lc '#dddddd' lt 1 lw 1\n"
       "set format '%g'\n"
@@ -32,12 +33,13 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
       "set key outside top center horizontal samplen 2\n"
       "set xlabel 'filling spheres'\n"
       "set ylabel '% of the diagonal, % of the largest displacement'\n";
-  out += fmt::format("set y2label '{}'\n", cost == ChartCost::ofTheCase ? "CPU seconds of the whole load case"
-                                                                        : "CPU seconds per simulated second");
   out += fmt::format("set title '{}'\n", title);
+  constexpr double kRim = 100;  // %: where runs that failed are shown, as in the chart of single runs
   std::string ticks, data;
   double cheapest = 0, dearest = 0;
+  bool anyFailed = false;
   for (const SphereChartRow& r : rows) {
+    anyFailed = anyFailed || r.step == 0;
     if (r.step > 0) {
       cheapest = cheapest > 0 ? std::min(cheapest, r.cpu) : r.cpu;
       dearest = std::max(dearest, r.cpu);
@@ -45,22 +47,29 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
     ticks += fmt::format("{}{}", ticks.empty() ? "" : ", ", r.spheres);
     // gnuplot leaves out what is no number, and zeros have no logarithm.
     const auto shown = [&](double value, bool any) { return any && value > 0 ? fmt::format("{:.6g}", value) : "NaN"; };
-    data += fmt::format("{} {} {} {} {}\n", r.spheres, shown(r.gapMax, true), shown(r.errorMax, r.step > 0),
-                        shown(r.errorRms, r.step > 0), shown(r.cpu, r.step > 0));
+    data += fmt::format("{} {} {} {} {} {}\n", r.spheres, shown(r.gapMax, true), shown(r.errorMax, r.step > 0),
+                        shown(r.errorRms, r.step > 0), shown(r.cpu, r.step > 0), shown(kRim, r.step == 0));
   }
   out += fmt::format("set xtics ({})\nset xrange [{:.6g}:{:.6g}]\n", ticks, 0.8 * rows.front().spheres,
                      1.25 * rows.back().spheres);
+  out += fmt::format("set border {} lc '#555555'\n", cheapest > 0 ? 11 : 3);
   if (cheapest > 0)
-    out += fmt::format("set y2tics ({})\nset y2range [{:.6g}:{:.6g}]\n", logTicks(cheapest / 5, 2 * dearest),
-                       cheapest / 5, 2 * dearest);
+    out += fmt::format(
+        "set y2label '{}'\nset y2tics ({})\nset y2range [{:.6g}:{:.6g}]\n",
+        cost == ChartCost::ofTheCase ? "CPU seconds of the whole load case" : "CPU seconds per simulated second",
+        logTicks(cheapest / 5, 2 * dearest), cheapest / 5, 2 * dearest);
   out += "$rows << EOD\n" + data + "EOD\n";
-  // Okabe and Ito (2008): told apart by all kinds of eyes.
-  out +=
-      "plot $rows using 1:2 with linespoints lw 2 pt 5 ps 0.7 lc '#0072b2' title 'largest gap', \\\n"
-      "  $rows using 1:3 with linespoints lw 2 pt 7 ps 0.7 lc '#d55e00' title 'largest error', \\\n"
-      "  $rows using 1:4 with linespoints lw 2 pt 9 ps 0.7 lc '#e69f00' title 'RMS error', \\\n"
-      "  $rows using 1:5 axes x1y2 with linespoints lw 2 pt 11 ps 0.7 lc '#009e73' title 'cost (right)'\n";
-  return out;
+  // Okabe and Ito (2008): told apart by all kinds of eyes. gnuplot refuses an axis on which nothing lies.
+  std::vector<std::string> plots = {
+      "$rows using 1:2 with linespoints lw 2 pt 5 ps 0.7 lc '#0072b2' title 'largest gap'"};
+  if (cheapest > 0) {
+    plots.emplace_back("$rows using 1:3 with linespoints lw 2 pt 7 ps 0.7 lc '#d55e00' title 'largest error'");
+    plots.emplace_back("$rows using 1:4 with linespoints lw 2 pt 9 ps 0.7 lc '#e69f00' title 'RMS error'");
+    plots.emplace_back(
+        "$rows using 1:5 axes x1y2 with linespoints lw 2 pt 11 ps 0.7 lc '#009e73' title 'cost (right)'");
+  }
+  if (anyFailed) plots.emplace_back("$rows using 1:6 with points pt 2 ps 1 lw 2 lc '#555555' title 'failed'");
+  return fmt::format("{}plot {}\n", out, fmt::join(plots, ", \\\n  "));
 }
 
 }  // namespace medulla

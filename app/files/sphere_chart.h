@@ -19,7 +19,8 @@ struct SphereChartRow {
 // CSV, a row per number of spheres. Errors are those of OutputFile.
 void writeSphereChart(const std::string& path, const std::vector<SphereChartRow>& rows, ChartCost cost);
 
-// The picture as a script for gnuplot: spheres across, gap and error upwards on the left, cost on the right.
+// The picture as a script for gnuplot: spheres across, gap and error upwards on the left, cost on the right; numbers of
+// spheres with which every run failed at 100 %.
 std::string sphereChartScript(const std::string& title, const std::vector<SphereChartRow>& rows, ChartCost cost);
 
 }  // namespace medulla
