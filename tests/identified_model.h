@@ -48,6 +48,11 @@ inline void shakeNetwork(IdentifiedNetwork& n, double share) {
     Matrix6d mixed = Matrix6d::Identity();
     for (int i = 0; i < 36; ++i) mixed(i / 6, i % 6) += share * random.uniform();
     l.stiffness = root * mixed * mixed.transpose() * root;
+    const Vector6d diagonal = root.diagonal();
+    for (Vector6d* strain : {&l.strain0, &l.strain1}) {
+      if (strain == &l.strain1 && l.frame1 >= static_cast<int>(n.frames.size())) continue;
+      for (int i = 0; i < 6; ++i) (*strain)[i] = 5 * share * random.uniform() * diagonal[i];
+    }
   }
   for (std::vector<SkinFrame>& of : n.skin)
     for (SkinFrame& f : of)

@@ -228,6 +228,9 @@ SoftBodyModel identifiedModel() {
   network->links = {link, link};
   network->links[1].frame1 = 2;
   network->links[1].restPoint1 = m.restNodes[3];
+  network->links[0].strain0 << 0.7, 1. / 3, 0, 0, 0, -1e-300;
+  network->links[0].strain1.setConstant(1. / 9);
+  network->links[1].strain0.setConstant(-0.6);
   for (std::size_t n = 0; n < m.restNodes.size(); ++n) {
     SkinFrame own{1, 0.75, m.spheres[1].restFrame}, held{2, 0.25, m.restNodes[n]};
     own.map.setConstant(1. / 7);
@@ -260,6 +263,8 @@ TEST_F(ModelFile, WhatWasIdentifiedIsReadToTheBit) {
     EXPECT_TRUE(sameBits(a.links[k].restPoint1, b.links[k].restPoint1));
     EXPECT_TRUE(sameBits(a.links[k].axes, b.links[k].axes));
     EXPECT_TRUE(sameBits(a.links[k].stiffness, b.links[k].stiffness));
+    EXPECT_TRUE(sameBits(a.links[k].strain0, b.links[k].strain0));
+    EXPECT_TRUE(sameBits(a.links[k].strain1, b.links[k].strain1));
   }
   ASSERT_EQ(b.skin.size(), 4u);
   for (std::size_t n = 0; n < 4; ++n) {
@@ -273,6 +278,18 @@ TEST_F(ModelFile, WhatWasIdentifiedIsReadToTheBit) {
   EXPECT_EQ(a.layer.normal, b.layer.normal);
   EXPECT_EQ(a.bulk.maximum, b.bulk.maximum);
   EXPECT_FALSE(b.usesFormulas);
+}
+
+TEST_F(ModelFile, NetworksWithoutStrainsHaveNoneInTheirFile) {
+  const SoftBodyModel model = identifiedModel();
+  auto plain = std::make_shared<IdentifiedNetwork>(*model.identified);
+  for (IdentifiedLink& link : plain->links) link.strain0 = link.strain1 = Vector6d::Zero();
+  SoftBodyModel without = model;
+  without.identified = plain;
+  const std::string text = textOf(without);
+  EXPECT_EQ(text.find("strains"), std::string::npos);
+  EXPECT_TRUE(read(text).identified->links[0].strain0.isZero(0));
+  EXPECT_EQ(textOf(read(text)), text);
 }
 
 TEST_F(ModelFile, MistakesInWhatWasIdentified) {
@@ -289,6 +306,13 @@ TEST_F(ModelFile, MistakesInWhatWasIdentified) {
       {"0 1 0.1 0.2 0.5 0", "0 1 0.1 0.2 0.6 0", "<identified_links>: a second end that is not its frame's"},
       {"0 1 0.1 0.2 0.5 0", "0 1 0.1 0.2 0.5 0.1", "<identified_links>: axes that are not unit"},
       {"0.3333333333333333 0.01", "-0.3333333333333333 0.01", "<identified_links>: a stiffness that is not positive"},
+      {"<identified_strains rows=\"2\"", "<identified_strains rows=\"1\"", "<identified_strains>: more numbers than"},
+      {"<identified_strains rows=\"2\"", "<identified_strains rows=\"3\"",
+       "<identified_strains>: expected one row per"},
+      {"0.7 0.3333333333333333", "nan 0.3333333333333333", "<identified_strains>: "},
+      {"0.7 0.3333333333333333", "0.3333333333333333", "<identified_strains>: fewer numbers"},
+      {"</identified_strains>", "</identified_strains><identified_strains rows=\"0\"></identified_strains>",
+       "<identified_strains>"},
       {"2 1 0.75", "2 1 0.8", "<identified_skin>: weights whose sum is not 1"},
       {"2 1 0.75", "2 5 0.75", "<identified_skin>: an index out of range"},
       {"2 1 0.75", "9 1 0.75", "<identified_skin>: an index out of range"},

@@ -84,6 +84,21 @@ void readLinks(const std::string& path, const XmlElement& element, IdentifiedNet
   });
 }
 
+void readStrains(const std::string& path, const XmlElement& element, IdentifiedNetwork& network) {
+  const bool given = std::any_of(element.children.begin(), element.children.end(),
+                                 [](const XmlElement& child) { return child.name == "identified_strains"; });
+  if (!given) return;
+  Rows rows(path, element, "identified_strains");
+  std::size_t next = 0;
+  rows.forEach([&] {
+    rows.require(next < network.links.size(), "expected one row per link");
+    IdentifiedLink& l = network.links[next++];
+    rows.get(l.strain0);
+    if (l.frame1 < static_cast<int>(network.frames.size())) rows.get(l.strain1);
+  });
+  rows.require(next == network.links.size(), "expected one row per link");
+}
+
 void readSkin(const std::string& path, const XmlElement& element, std::size_t nodes, IdentifiedNetwork& network) {
   Rows rows(path, element, "identified_skin");
   const std::size_t spheres = network.frames.size();
@@ -122,10 +137,15 @@ XmlRules identifiedRules() {
       {"identified",
        {"poisson", "length_scale", "voxel", "formulas", "layer", "error_bulk", "error_poke", "error_finite_elements"},
        {},
-       {{"identified_frames", 1, 1}, {"identified_patch"}, {"identified_links", 1, 1}, {"identified_skin", 1, 1}}},
+       {{"identified_frames", 1, 1},
+        {"identified_patch"},
+        {"identified_links", 1, 1},
+        {"identified_strains", 0, 1},
+        {"identified_skin", 1, 1}}},
       {"identified_frames", {"rows"}, {}, {}, true},
       {"identified_patch", {"rows", "region"}, {}, {}, true},
       {"identified_links", {"rows"}, {}, {}, true},
+      {"identified_strains", {"rows"}, {}, {}, true},
       {"identified_skin", {"rows"}, {}, {}, true}};
 }
 
@@ -161,6 +181,13 @@ void putIdentified(std::string& out, const IdentifiedNetwork& network) {
       for (int a = b; a < 6; ++a) put(out, l.stiffness(a, b));
     }
   });
+  if (hasStrains(network)) {
+    putRows(out, "identified_strains", network.links.size(), [&](std::size_t k) {
+      const IdentifiedLink& l = network.links[k];
+      put(out, l.strain0);
+      if (l.frame1 < static_cast<int>(network.frames.size())) put(out, l.strain1);
+    });
+  }
   putSkin(out, network);
   out += "  </identified>\n";
 }
@@ -180,6 +207,7 @@ std::shared_ptr<const IdentifiedNetwork> readIdentified(const std::string& path,
   readFrames(path, element, model.spheres.size(), *network);
   readPatches(path, element, model.restNodes.size(), *network);
   readLinks(path, element, *network);
+  readStrains(path, element, *network);
   readSkin(path, element, model.restNodes.size(), *network);
   return network;
 }

@@ -249,6 +249,7 @@ BodyMechanics bodyMechanics(const BodyDescription& body) {
   for (const DrivenSphere& driven : body.driven) out.moves[driven.sphere] = false;
   if (isIdentified(body)) {
     out.identifiedLinks = identifiedStiffness(body);
+    out.identifiedStrains = identifiedStrains(body);
     out.skin = heldSkin(*body.model);
     out.attachments = attachmentsToFrames(*body.model, out.skin);
   } else {

@@ -9,6 +9,10 @@
 // A body's masses, stiffnesses and dampings from its tissue and its model's geometry (physics/README.md). Model frame.
 namespace medulla {
 
+struct LinkStrains {  // what an identified link's measures add to the strains of the cells of its two frames
+  Vector6d at0, at1;
+};
+
 struct BodyMechanics {
   std::vector<double> sphereMass;              // kg, without what the nodes carry
   std::vector<Eigen::Matrix3d> sphereInertia;  // kg m2 about the frame, likewise
@@ -23,11 +27,12 @@ struct BodyMechanics {
   double largestPressure = 0;                // Pa
   std::vector<double> edgeStiffness;         // N/m per edge; of the full surface
   // Of identified links instead of spans and links: identified_mechanics.h.
-  std::vector<Matrix6d> identifiedLinks;     // N/m
-  std::vector<std::vector<SkinFrame>> skin;  // per node
-  std::vector<double> normalExcess;          // N/m per node: what its attachment is stiffer along its normal
-  std::vector<double> nodeMass;              // kg; 0 on skin
-  std::vector<bool> nodeMoves;               // per node: not fixed
+  std::vector<Matrix6d> identifiedLinks;       // N/m
+  std::vector<LinkStrains> identifiedStrains;  // per link; none where the network's cells have none
+  std::vector<std::vector<SkinFrame>> skin;    // per node
+  std::vector<double> normalExcess;            // N/m per node: what its attachment is stiffer along its normal
+  std::vector<double> nodeMass;                // kg; 0 on skin
+  std::vector<bool> nodeMoves;                 // per node: not fixed
   int firstLike = 0;  // the first body with this description but for pose and loads; set by World
   // Set by dampBody. s, damping over stiffness, Rayleigh's beta of links and surface; 1/s, damping over mass, his
   // alpha.

@@ -48,7 +48,8 @@ std::vector<int> spheresBehindPatches(const IdentifiedNetwork& network) {
   const int frames = static_cast<int>(network.frames.size());
   for (const IdentifiedLink& link : network.links) {
     if (link.frame1 < frames) continue;
-    const double translation = link.stiffness.topLeftCorner<3, 3>().trace() / 3;
+    const double translation =
+        (link.stiffness.topLeftCorner<3, 3>().trace() + link.strain0.head<3>().squaredNorm()) / 3;
     const double whole = penalty * network.frames[link.frame0].volume;
     if (std::abs(translation - whole) < tolerance * whole) out.push_back(link.frame0);
   }

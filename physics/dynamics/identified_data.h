@@ -32,7 +32,40 @@ struct IdentifiedLinkGroup {
   Lanes inverseRestLength, restLength;  // 1/m, m
   Lanes lengthScale;                    // m
   Lanes stiffness[21];                  // N/m: upper triangle, row after row
+  Lanes strain0[6], strain1[6];         // (N/m)^1/2: what the measures add to the strains of the two frames' cells
   Lanes relaxation;                     // s, Rayleigh's beta
+};
+
+struct ArcSeries {
+  Lanes value, slope;
+};
+
+// How the frames of four links stand to each other: identified_measures.h.
+struct LinkTurn {
+  Rotation middle;
+  Lanes3 v;            // vector part of the relative quaternion (c, v), c = cos(theta / 2)
+  Lanes f;             // w = 2 f v, f = h / sin h, h = theta / 2
+  Lanes stretch;       // w' = f D + stretch v (v.D): D the difference of angular velocities
+  Lanes inverseWider;  // 1 / (1 + c)
+  Lanes3 w;            // rad
+  Lanes3 place;        // m: from frame 0 to frame 1
+  Lanes3 arc;          // m: S(w) d
+  ArcSeries series;
+  Lanes bent;   // w.d
+  Lanes3 t;     // m: place - arc
+  Lanes along;  // t on the link's axis
+  Lanes slope;  // of the neo-Hookean measure of that, by it
+  Lanes hyper;  // m: that measure
+};
+
+struct LinkMeasures6 {  // m and rad; elongation by its neo-Hookean measure
+  Lanes3 t, w;
+};
+
+// Four links of cells with strains, from the sum of these to the loads.
+struct StrainedLinkState {
+  LinkTurn turn;
+  LinkMeasures6 damped;
 };
 
 // ---- Nodes: those of one sphere are seen from its frame, their home, and so are the other frames that any of them
@@ -86,6 +119,7 @@ struct SkinTermLoad {  // of one frame, per node in each lane: on way, turn and 
 struct IdentifiedBody {              // nothing of others
   int firstFrame = 0, endFrame = 0;  // the spheres' first, in their order
   int firstLinkGroup = 0, endLinkGroup = 0;
+  bool hasStrains = false;
 };
 
 struct Identified {
@@ -95,6 +129,8 @@ struct Identified {
   std::vector<CarriedFrame> carried;  // per frame
   std::vector<IdentifiedLinkGroup> links;
   int linkCount = 0;
+  std::vector<StrainedLinkState> strained;  // as links, of the current substep; empty where no body has strains
+  std::vector<double> strains;              // per frame, likewise: (N m)^1/2, of its cell
   std::vector<SkinHost> hosts;
   std::vector<SkinTerms> terms;
   std::vector<SkinTermState> termStates;  // of the current substep

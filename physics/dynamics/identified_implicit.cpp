@@ -1,5 +1,7 @@
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "physics/dynamics/identified_measures.h"
 #include "physics/dynamics/identified_stages.h"
@@ -79,10 +81,129 @@ void setBlocks(const IdentifiedLinkGroup& link, const Column (&g)[9], Lanes scal
   to.turn1 = product(g + 6, kg + 6, scale);
 }
 
+// A sphere's place in the star of a cell, which grows by those that it lacks; -1 of what is held.
+int placeIn(std::vector<int>& star, int sphere) {
+  if (sphere < 0) return -1;
+  const auto found = std::find(star.begin(), star.end(), sphere);
+  if (found != star.end()) return static_cast<int>(found - star.begin());
+  star.push_back(sphere);
+  return static_cast<int>(star.size()) - 1;
+}
+
+// The stars' spheres, each by its own; sets starPlace, counted from each star's first.
+std::vector<std::vector<int>> collectStars(const WorldData& d, ImplicitData& s) {
+  std::vector<std::vector<int>> stars(d.spheres.count);
+  const int first = s.linkPairs - d.identified.linkCount;
+  for (int k = 0; k < d.identified.linkCount; ++k) {
+    const auto [sphere0, sphere1] = s.pairs[first + k];
+    std::array<int, 4>& places = s.starPlace[k];
+    places[0] = placeIn(stars[sphere0], sphere0);
+    places[1] = placeIn(stars[sphere0], sphere1);
+    if (sphere1 < 0) continue;
+    places[2] = placeIn(stars[sphere1], sphere0);
+    places[3] = placeIn(stars[sphere1], sphere1);
+  }
+  return stars;
+}
+
+// Numbers of pairs of spheres; those that there are not are appended.
+class PairNumbers {
+ public:
+  explicit PairNumbers(std::vector<std::array<int, 2>>& pairs) : pairs_(&pairs) {
+    for (std::size_t k = 0; k < pairs.size(); ++k)
+      if (pairs[k][1] >= 0) numbers_[pairs[k]] = static_cast<int>(k);
+  }
+  int of(int a, int b) {  // -1 - k: pair k is (b, a)
+    const auto turned = numbers_.find({b, a});
+    if (turned != numbers_.end()) return -1 - turned->second;
+    const auto [found, isNew] = numbers_.try_emplace({a, b}, static_cast<int>(pairs_->size()));
+    if (isNew) pairs_->push_back(found->first);
+    return found->second;
+  }
+
+ private:
+  std::vector<std::array<int, 2>>* pairs_;
+  std::map<std::array<int, 2>, int> numbers_;
+};
+
+// What a link's measures add to the strain of one cell, by the motions of its two spheres.
+void addStrainRates(const Lanes (&strain)[6], const Column (&g)[9], int lane, int own, int other, ImplicitData& s) {
+  Vector6 of0 = Vector6::Zero(), of1 = of0;
+  for (int e = 0; e < 6; ++e) {
+    for (int k = 0; k < 3; ++k) {
+      const double line = strain[e][lane] * g[k].c[e][lane];
+      of0[k] -= line;
+      of1[k] += line;
+      of0[3 + k] += strain[e][lane] * g[3 + k].c[e][lane];
+      of1[3 + k] += strain[e][lane] * g[6 + k].c[e][lane];
+    }
+  }
+  s.starRate[own] += of0;
+  if (other >= 0) s.starRate[other] += of1;
+}
+
+void addStrainRates(const IdentifiedLinkGroup& link, const Column (&g)[9], int lane, const std::array<int, 4>& places,
+                    ImplicitData& s) {
+  if (places[0] >= 0) addStrainRates(link.strain0, g, lane, places[0], places[1], s);
+  if (places[2] >= 0) addStrainRates(link.strain1, g, lane, places[2], places[3], s);
+}
+
+void addStarBlocks(ImplicitData& s) {
+  for (const StrainStar& star : s.stars) {
+    const double scale = s.duration * (s.duration + star.relaxation);
+    const int* pair = s.starPair.data() + star.firstPair;
+    for (int a = star.first; a < star.end; ++a) {
+      const Vector6 scaled = scale * s.starRate[a];
+      s.diagonal[s.starSphere[a]].noalias() += scaled * s.starRate[a].transpose();
+      for (int b = a + 1; b < star.end; ++b, ++pair) {
+        if (*pair >= 0) {
+          s.beside[*pair].noalias() += scaled * s.starRate[b].transpose();
+        } else {
+          s.beside[-1 - *pair].noalias() += s.starRate[b] * scaled.transpose();
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
+
+void layOutStars(const WorldData& d, ImplicitData& s) {
+  const Identified& identified = d.identified;
+  s.linkPairs = static_cast<int>(s.pairs.size());
+  s.starPlace.assign(identified.linkCount, {-1, -1, -1, -1});
+  if (identified.strains.empty()) return;
+  const std::vector<std::vector<int>> stars = collectStars(d, s);
+  PairNumbers numbers(s.pairs);
+  for (std::size_t i = 0; i < stars.size(); ++i) {
+    const int first = static_cast<int>(s.starSphere.size());
+    s.stars.push_back({first, first + static_cast<int>(stars[i].size()), static_cast<int>(s.starPair.size()), 0});
+    s.starSphere.insert(s.starSphere.end(), stars[i].begin(), stars[i].end());
+    for (std::size_t a = 0; a < stars[i].size(); ++a)
+      for (std::size_t b = a + 1; b < stars[i].size(); ++b) s.starPair.push_back(numbers.of(stars[i][a], stars[i][b]));
+  }
+  s.starRate.resize(s.starSphere.size());
+  const int first = s.linkPairs - identified.linkCount;
+  int next = 0;
+  for (const IdentifiedLinkGroup& link : identified.links) {
+    for (int lane = 0; lane < 4; ++lane) {
+      if (link.frame0[lane] == link.frame1[lane]) continue;
+      const std::array<int, 2> ends = s.pairs[first + next];
+      std::array<int, 4>& places = s.starPlace[next++];
+      for (int p = 0; p < 4; ++p) {
+        if (places[p] < 0) continue;
+        StrainStar& star = s.stars[ends[p / 2]];
+        places[p] += star.first;
+        star.relaxation = link.relaxation[lane];
+      }
+    }
+  }
+}
 
 void addIdentifiedStiffness(const WorldData& d, ImplicitData& s) {
   const Identified& identified = d.identified;
+  std::fill(s.starRate.begin(), s.starRate.end(), Vector6::Zero());
+  std::fill(s.beside.begin() + s.linkPairs, s.beside.end(), Block6::Zero());
   int next = d.links.count;
   for (const IdentifiedLinkGroup& link : identified.links) {
     const FrameState* frames = identified.frames.data();
@@ -93,10 +214,14 @@ void addIdentifiedStiffness(const WorldData& d, ImplicitData& s) {
     LinkBlocks blocks;
     setBlocks(link, g, h * (h + link.relaxation), blocks);
     int pair[4];
-    for (int lane = 0; lane < 4; ++lane)  // some fill the group up
-      pair[lane] = link.frame0[lane] == link.frame1[lane] ? -1 : next++;
+    for (int lane = 0; lane < 4; ++lane) {
+      const bool fillsUp = link.frame0[lane] == link.frame1[lane];
+      if (!fillsUp) addStrainRates(link, g, lane, s.starPlace[next - d.links.count], s);
+      pair[lane] = fillsUp ? -1 : next++;
+    }
     addLinkBlocks(blocks, pair, s);
   }
+  addStarBlocks(s);
 }
 
 void listIdentifiedPairs(const WorldData& d, std::vector<std::array<int, 2>>& pairs) {

@@ -85,6 +85,10 @@ void addLinks(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
     g.relaxation[l] = mechanics.linkRelaxation;
     for (int i = 0; i < 6; ++i)
       for (int j = i; j < 6; ++j) g.stiffness[entryOf(i, j)][l] = mechanics.identifiedLinks[k](i, j);
+    for (int i = 0; i < 6 && !mechanics.identifiedStrains.empty(); ++i) {
+      g.strain0[i][l] = mechanics.identifiedStrains[k].at0[i];
+      g.strain1[i][l] = mechanics.identifiedStrains[k].at1[i];
+    }
     ++d.identified.linkCount;
   }
 }
@@ -208,7 +212,12 @@ void layOutIdentified(WorldData& d, const std::vector<BodyMechanics>& mechanics)
     const int firstLinkGroup = static_cast<int>(s.links.size());
     addLinks(d, body, mechanics[b], frames);
     addSkins(d, body, mechanics[b], frames);
-    s.bodies[b] = {frames.first(), frames.end(), firstLinkGroup, static_cast<int>(s.links.size())};
+    s.bodies[b] = {frames.first(), frames.end(), firstLinkGroup, static_cast<int>(s.links.size()),
+                   !mechanics[b].identifiedStrains.empty()};
+  }
+  if (std::any_of(s.bodies.begin(), s.bodies.end(), [](const IdentifiedBody& body) { return body.hasStrains; })) {
+    s.strained.resize(s.links.size());
+    s.strains.resize(s.frames.size());
   }
   s.loads.resize(s.frames.size());
   s.termStates.resize(s.terms.size());

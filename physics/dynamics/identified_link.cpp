@@ -24,8 +24,14 @@ void placeFrames(WorldData& d, const IdentifiedBody& body) {
   }
 }
 
-void evaluateGroup(const IdentifiedLinkGroup& link, const FrameState* frames, FrameLoad* loads) {
-  const LinkTurn m = measureLink(link, gatherFrames(frames, link.frame0), gatherFrames(frames, link.frame1));
+MEDULLA_INLINE LinkTurn turnOf(const IdentifiedLinkGroup& link, const FrameState* frames) {
+  return measureLink(link, gatherFrames(frames, link.frame0), gatherFrames(frames, link.frame1));
+}
+
+// With what damping adds: relaxation times their rates. The axis of elongation is measured by its neo-Hookean measure,
+// at its rate.
+MEDULLA_INLINE LinkMeasures6 dampedMeasures(const IdentifiedLinkGroup& link, const LinkTurn& m,
+                                            const FrameState* frames) {
   const auto seen = [&](Quad FrameState::*q, const std::uint32_t* i) {
     return rotateBack(m.middle, gatherQuads(frames, i, q));
   };
@@ -34,19 +40,66 @@ void evaluateGroup(const IdentifiedLinkGroup& link, const FrameState* frames, Fr
   const Lanes3 velocity = rotateBack(m.middle, gatherQuads(frames, link.frame1, &FrameState::velocity) -
                                                    gatherQuads(frames, link.frame0, &FrameState::velocity));
   const LinkRates rate = ratesOf(link, m, velocity, spin1 - spin0, splat(0.5) * (spin0 + spin1));
-  // The axis of elongation is measured by its neo-Hookean measure, at its rate.
   const Lanes beta = link.relaxation;
   const Lanes extra = fma(beta * (m.slope - splat(1)), dot(rate.t, link.along), m.hyper - m.along);
+  return {fma(beta, rate.t, fma(extra, link.along, m.t)), fma(beta, rate.w, m.w)};
+}
+
+struct MeasureForces {  // N, N m
   Lanes3 onT, onW;
-  stiffnessTimes(link, fma(beta, rate.t, fma(extra, link.along, m.t)), fma(beta, rate.w, m.w), onT, onW);
-  onT = fma((m.slope - splat(1)) * dot(onT, link.along), link.along, onT);
-  const FrameLoads on = loadsOf(link, m, onT, onW);
+};
+
+MEDULLA_INLINE MeasureForces forcesOn(const IdentifiedLinkGroup& link, const LinkMeasures6& m) {
+  MeasureForces out;
+  stiffnessTimes(link, m.t, m.w, out.onT, out.onW);
+  return out;
+}
+
+// Each cell's strain pulls at the measures that it is summed from.
+MEDULLA_INLINE void addStrainForces(const IdentifiedLinkGroup& link, const double* strains, MeasureForces& to) {
+  const auto gathered = [&](const std::uint32_t* i) {
+    return Lanes{strains[i[0]], strains[i[1]], strains[i[2]], strains[i[3]]};
+  };
+  const auto add = [&](Lanes strain, const Lanes(&of)[6]) {
+    to.onT = fma(strain, Lanes3{of[0], of[1], of[2]}, to.onT);
+    to.onW = fma(link.lengthScale * strain, Lanes3{of[3], of[4], of[5]}, to.onW);
+  };
+  add(gathered(link.frame0), link.strain0);
+  add(gathered(link.frame1), link.strain1);
+}
+
+MEDULLA_INLINE void giveToFrames(const IdentifiedLinkGroup& link, const LinkTurn& m, const MeasureForces& forces,
+                                 FrameLoad* loads) {
+  const Lanes3 onT = fma((m.slope - splat(1)) * dot(forces.onT, link.along), link.along, forces.onT);
+  const FrameLoads on = loadsOf(link, m, onT, forces.onW);
   const Lanes3 force = rotate(m.middle, on.force1);
   const Lanes minus = splat(-1);
   addFour(force, loads, link.frame0, &FrameLoad::force);
   addFour(minus * rotate(m.middle, on.torque0), loads, link.frame0, &FrameLoad::torque);
   addFour(minus * force, loads, link.frame1, &FrameLoad::force);
   addFour(minus * rotate(m.middle, on.torque1), loads, link.frame1, &FrameLoad::torque);
+}
+
+void evaluateGroup(const IdentifiedLinkGroup& link, const FrameState* frames, FrameLoad* loads) {
+  const LinkTurn m = turnOf(link, frames);
+  giveToFrames(link, m, forcesOn(link, dampedMeasures(link, m, frames)), loads);
+}
+
+// All links are measured before any pulls.
+void evaluateStrained(Identified& s, const IdentifiedBody& body) {
+  std::fill(s.strains.begin() + body.firstFrame, s.strains.begin() + body.endFrame, 0);
+  for (int g = body.firstLinkGroup; g < body.endLinkGroup; ++g) {
+    StrainedLinkState& at = s.strained[g];
+    at.turn = turnOf(s.links[g], s.frames.data());
+    at.damped = dampedMeasures(s.links[g], at.turn, s.frames.data());
+    addStrains(s.links[g], at.damped, s.strains.data());
+  }
+  for (int g = body.firstLinkGroup; g < body.endLinkGroup; ++g) {
+    const StrainedLinkState& at = s.strained[g];
+    MeasureForces forces = forcesOn(s.links[g], at.damped);
+    addStrainForces(s.links[g], s.strains.data(), forces);
+    giveToFrames(s.links[g], at.turn, forces, s.loads.data());
+  }
 }
 
 }  // namespace
@@ -57,6 +110,10 @@ void evaluateIdentifiedLinks(WorldData& d, const Batch& batch) {
     const IdentifiedBody& body = s.bodies[b];
     placeFrames(d, body);
     for (int i = body.firstFrame; i < body.endFrame; ++i) s.loads[i] = {};
+    if (body.hasStrains) {
+      evaluateStrained(s, body);
+      continue;
+    }
     for (int g = body.firstLinkGroup; g < body.endLinkGroup; ++g)
       evaluateGroup(s.links[g], s.frames.data(), s.loads.data());
   }
@@ -79,15 +136,16 @@ void returnFrameForces(WorldData& d, const Batch& batch) {
 
 double identifiedLinkEnergy(const Identified& s, const IdentifiedBody& body) {
   double sum = 0;
+  std::vector<double> strains(s.frames.size(), 0);
   for (int g = body.firstLinkGroup; g < body.endLinkGroup; ++g) {
     const IdentifiedLinkGroup& link = s.links[g];
-    const LinkTurn m =
-        measureLink(link, gatherFrames(s.frames.data(), link.frame0), gatherFrames(s.frames.data(), link.frame1));
-    const Lanes3 t = fma(m.hyper - m.along, link.along, m.t);
-    Lanes3 onT, onW;
-    stiffnessTimes(link, t, m.w, onT, onW);
-    sum += 0.5 * sumOfLanes(dot(t, onT) + dot(m.w, onW));
+    const LinkTurn m = turnOf(link, s.frames.data());
+    const LinkMeasures6 measures{fma(m.hyper - m.along, link.along, m.t), m.w};
+    const MeasureForces forces = forcesOn(link, measures);
+    sum += 0.5 * sumOfLanes(dot(measures.t, forces.onT) + dot(measures.w, forces.onW));
+    addStrains(link, measures, strains.data());
   }
+  for (const double strain : strains) sum += 0.5 * strain * strain;
   return sum;
 }
 

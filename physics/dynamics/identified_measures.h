@@ -10,9 +10,6 @@ namespace medulla {
 
 // (1 - sin h / h) / h^2 as a function of h^2, and its derivative: power series, good to 1e-15 up to the 116 degrees of
 // kFoldAngle.
-struct ArcSeries {
-  Lanes value, slope;
-};
 MEDULLA_INLINE ArcSeries arcSeries(Lanes x) {
   return {polynomial(x, 1.0 / 6, -1.0 / 120, 1.0 / 5040, -1.0 / 362880, 1.0 / 39916800, -1.0 / 6227020800.0,
                      1.0 / 1307674368000.0, -1.0 / 355687428096000.0, 1.0 / 121645100408832000.0,
@@ -21,23 +18,6 @@ MEDULLA_INLINE ArcSeries arcSeries(Lanes x) {
                      6.0 / 1307674368000.0, -7.0 / 355687428096000.0, 8.0 / 121645100408832000.0,
                      -9.0 / 51090942171709440000.0, 10.0 / 25852016738884976640000.0)};
 }
-
-struct LinkTurn {
-  Rotation middle;
-  Lanes3 v;            // vector part of the relative quaternion (c, v), c = cos(theta / 2)
-  Lanes f;             // w = 2 f v, f = h / sin h, h = theta / 2
-  Lanes stretch;       // w' = f D + stretch v (v.D): D the difference of angular velocities
-  Lanes inverseWider;  // 1 / (1 + c)
-  Lanes3 w;            // rad
-  Lanes3 place;        // m: from frame 0 to frame 1
-  Lanes3 arc;          // m: S(w) d
-  ArcSeries series;
-  Lanes bent;   // w.d
-  Lanes3 t;     // m: place - arc
-  Lanes along;  // t on the link's axis
-  Lanes slope;  // of the neo-Hookean measure of that, by it
-  Lanes hyper;  // m: that measure
-};
 
 // The measure whose square is the energy of a neo-Hookean bar, (x - 1) sqrt((x + 2) / 3x) at the stretch x, and its
 // slope; straight below kStraightBelow.
@@ -136,6 +116,19 @@ MEDULLA_INLINE void stiffnessTimes(const IdentifiedLinkGroup& link, const Lanes3
   }
   put({out[0], out[1], out[2]}, onA);
   put(link.lengthScale * Lanes3{out[3], out[4], out[5]}, onB);
+}
+
+// strain . m, of the six numbers of a cell's strain.
+MEDULLA_INLINE Lanes strainOf(const Lanes (&strain)[6], const IdentifiedLinkGroup& link, const LinkMeasures6& m) {
+  const Lanes turning = dot({strain[3], strain[4], strain[5]}, m.w);
+  return fma(link.lengthScale, turning, dot({strain[0], strain[1], strain[2]}, m.t));
+}
+MEDULLA_INLINE void addStrains(const IdentifiedLinkGroup& link, const LinkMeasures6& m, double* strains) {
+  const Lanes of0 = strainOf(link.strain0, link, m), of1 = strainOf(link.strain1, link, m);
+  for (int l = 0; l < 4; ++l) {
+    strains[link.frame0[l]] += of0[l];
+    strains[link.frame1[l]] += of1[l];
+  }
 }
 
 }  // namespace medulla

@@ -83,18 +83,32 @@ void checkIdentified(const BodyDescription& body) {
           "its model's surface layer has no stiffness: expected more than 0");
 }
 
+// What makes measures along the model's axes those along the link's, times the roots of their factors.
+static Matrix6d steeredAxes(const LinkFactors& f, const IdentifiedLink& link) {
+  Vector6d steer;
+  steer << f.elongation, f.flexion, f.flexion, f.torsion, f.flexion, f.flexion;
+  Matrix6d axes = Matrix6d::Zero();
+  axes.topLeftCorner<3, 3>() = axes.bottomRightCorner<3, 3>() = link.axes;
+  return steer.cwiseSqrt().asDiagonal() * axes;
+}
+
 std::vector<Matrix6d> identifiedStiffness(const BodyDescription& body) {
   std::vector<Matrix6d> out;
-  const LinkFactors& f = body.factors;
-  Eigen::Matrix<double, 6, 1> steer;
-  steer << f.elongation, f.flexion, f.flexion, f.torsion, f.flexion, f.flexion;
-  const Eigen::Matrix<double, 6, 1> root = steer.cwiseSqrt();
   for (const IdentifiedLink& l : body.model->identified->links) {
-    Matrix6d axes = Matrix6d::Zero();
-    axes.topLeftCorner<3, 3>() = axes.bottomRightCorner<3, 3>() = l.axes;
-    const Matrix6d steered = root.asDiagonal() * axes;
+    const Matrix6d steered = steeredAxes(body.factors, l);
     const Matrix6d k = body.tissue.young * steered.transpose() * l.stiffness * steered;
     out.push_back(0.5 * (k + k.transpose()));
+  }
+  return out;
+}
+
+std::vector<LinkStrains> identifiedStrains(const BodyDescription& body) {
+  std::vector<LinkStrains> out;
+  if (!hasStrains(*body.model->identified)) return out;
+  const double root = std::sqrt(body.tissue.young);
+  for (const IdentifiedLink& l : body.model->identified->links) {
+    const Matrix6d steered = root * steeredAxes(body.factors, l).transpose();
+    out.push_back({steered * l.strain0, steered * l.strain1});
   }
   return out;
 }

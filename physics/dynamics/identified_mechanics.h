@@ -16,6 +16,8 @@ void checkIdentified(const BodyDescription& body);
 // N/m, of the measures (t, lengthScale w), both seen along the model's axes; symmetric. Link factors steer elongation
 // (t along), torsion (w along) and flexion (all others).
 std::vector<Matrix6d> identifiedStiffness(const BodyDescription& body);
+// (N/m)^1/2, of the same measures, steered alike; empty where no cell has a strain.
+std::vector<LinkStrains> identifiedStrains(const BodyDescription& body);
 
 // Nodes of patches hang on the patch alone: they do not move at all.
 std::vector<std::vector<SkinFrame>> heldSkin(const SoftBodyModel& model);

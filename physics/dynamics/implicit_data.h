@@ -38,6 +38,13 @@ struct PointLoad {
   std::array<Eigen::Vector3d, 3> axes;
 };
 
+// The spheres by whose motions the strain of one identified cell changes: its own and its neighbours'.
+struct StrainStar {
+  int first = 0, end = 0;  // in ImplicitData::starSphere, starRate
+  int firstPair = 0;       // in starPair: of each with each after it
+  double relaxation = 0;   // s
+};
+
 struct ImplicitData {
   double duration = 0;  // s, of a stage
   // Constants.
@@ -46,10 +53,16 @@ struct ImplicitData {
   std::vector<double> pull, carriedMass;  // kg, per node: the attachments' share; what a host feels of node and spring
   std::vector<double> nodeMobility;       // 1/kg, per node: of itself, its attachment and its edges; 0: held
   std::vector<std::array<int, 2>> pairs;  // spheres of each link, identified ones last; -1: held
+  int linkPairs = 0;                      // so many; then those that share a star alone
+  std::vector<StrainStar> stars;
+  std::vector<int> starSphere;
+  std::vector<std::array<int, 4>> starPlace;  // per identified link: in starRate, of both ends in star 0 and in star 1
+  std::vector<int> starPair;                  // in `pairs`; -1 - k: the other way round
   // Of the present iteration.
   std::vector<Block6> diagonal, beside;      // spheres and links alone, per sphere and per pair
   std::vector<Block6> lumped, lumpedBeside;  // and with surface and loads lumped into them
   BlockCholesky spheres;                     // of the latter
+  std::vector<Vector6> starRate;             // (N/m)^1/2, as starSphere
   std::vector<LoadRow> rows;
   std::vector<int> rowQuad;
   std::vector<Quad> rowCoefficient;

@@ -56,6 +56,7 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
     s.pairs.push_back({static_cast<int>(g.sphere0[k % 4]), static_cast<int>(g.sphere1[k % 4])});
   }
   listIdentifiedPairs(d, s.pairs);
+  layOutStars(d, s);
   std::vector<std::array<int, 2>> links;
   std::copy_if(s.pairs.begin(), s.pairs.end(), std::back_inserter(links),
                [](const auto& pair) { return pair[1] >= 0; });

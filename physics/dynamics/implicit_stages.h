@@ -37,6 +37,7 @@ void addLinkBlocks(const LinkBlocks& m, const int (&pair)[4], ImplicitData& s);
 // identified_implicit.cpp: the same of links and nodes between frames.
 void addIdentifiedStiffness(const WorldData& d, ImplicitData& s);
 void listIdentifiedPairs(const WorldData& d, std::vector<std::array<int, 2>>& pairs);
+void layOutStars(const WorldData& d, ImplicitData& s);  // after all links' pairs
 void setFrameRates(WorldData& d, const Motion& motion);
 void carryOnFrames(WorldData& d, const HostRange& range, std::vector<Quad>& carried);
 void returnImpulsesToFrames(WorldData& d, const HostRange& range, const std::vector<Quad>& impulses);

@@ -1,6 +1,7 @@
 #include "physics/dynamics/rest_measures.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "physics/dynamics/identified_mechanics.h"
 #include "physics/model/symmetric_eigen.h"
@@ -23,6 +24,36 @@ static std::vector<MeasureRow> identifiedRows(const SoftBodyModel& m, const Body
       rows.push_back({l.frame0, l.frame1 < spheres ? l.frame1 : -1, (e * measures.line).transpose(),
                       (e * measures.turn0).transpose(), (e * measures.turn1).transpose(), eigen.values[i]});
     }
+  }
+  return rows;
+}
+
+static void addRate(int sphere, const Vector6d& rate, StrainRow& row) {
+  const auto found = std::find(row.spheres.begin(), row.spheres.end(), sphere);
+  if (found != row.spheres.end()) {
+    row.rates[found - row.spheres.begin()] += rate;
+    return;
+  }
+  row.spheres.push_back(sphere);
+  row.rates.push_back(rate);
+}
+
+std::vector<StrainRow> strainRows(const SoftBodyModel& m, const BodyMechanics& b) {
+  if (b.identifiedStrains.empty()) return {};
+  const int spheres = static_cast<int>(m.spheres.size());
+  std::vector<StrainRow> rows(spheres);
+  for (std::size_t k = 0; k < b.identifiedStrains.size(); ++k) {
+    const IdentifiedLink& l = m.identified->links[k];
+    const RestMeasures measures = restMeasures(m, l);
+    Matrix6d of0, of1;
+    of0 << -measures.line, measures.turn0;
+    of1 << measures.line, measures.turn1;
+    const auto add = [&](int cell, const Vector6d& strain) {
+      addRate(l.frame0, of0.transpose() * strain, rows[cell]);
+      if (l.frame1 < spheres) addRate(l.frame1, of1.transpose() * strain, rows[cell]);
+    };
+    add(l.frame0, b.identifiedStrains[k].at0);
+    if (l.frame1 < spheres) add(l.frame1, b.identifiedStrains[k].at1);
   }
   return rows;
 }

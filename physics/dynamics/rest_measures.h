@@ -14,7 +14,16 @@ struct MeasureRow {
   double stiffness;
 };
 
-// Of all links of the body at rest: the stiffness is the sum of the rows' squares.
+// Of all links of the body at rest: their stiffness is the sum of the rows' squares.
 std::vector<MeasureRow> measureRows(const SoftBodyModel& model, const BodyMechanics& mechanics);
+
+// The rates at rest of one identified cell's strain, (N/m)^1/2: its own sphere and all that it is linked to.
+struct StrainRow {
+  std::vector<int> spheres;     // each once
+  std::vector<Vector6d> rates;  // per sphere, of (velocity, angular velocity)
+};
+
+// Of all cells that have one; their stiffness is the sum of the rows' squares. Empty of bodies without.
+std::vector<StrainRow> strainRows(const SoftBodyModel& model, const BodyMechanics& mechanics);
 
 }  // namespace medulla

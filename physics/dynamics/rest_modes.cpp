@@ -26,6 +26,7 @@ class RestModel {
       : model_(*body.model),
         mechanics_(mechanics),
         rows_(measureRows(*body.model, mechanics)),
+        strains_(strainRows(*body.model, mechanics)),
         isBeam_(body.links == LinkModel::beam),
         thinning_(isBeam_ ? body.tissue.poisson : 0),
         spheres_(static_cast<int>(mechanics.sphereMass.size())),
@@ -56,6 +57,7 @@ class RestModel {
       y.segment<3>(i0 + 3) += f * r.turn0;
       y.segment<3>(i1 + 3) += f * r.turn1;
     }
+    addStrains(x, links, y);
     if (nodes_ == 0) return y;
     std::vector<Vector3d> displaced(nodes_), force(nodes_);
     std::vector<double> onLinks(model_.links.size(), 0), onSpheres(model_.spheres.size(), 0);  // volumes
@@ -160,6 +162,14 @@ class RestModel {
 
  private:
   int node(int i) const { return 6 * spheres_ + 3 * i; }
+
+  void addStrains(const VectorXd& x, double scale, VectorXd& y) const {
+    for (const StrainRow& r : strains_) {
+      double rate = 0;
+      for (std::size_t k = 0; k < r.spheres.size(); ++k) rate += r.rates[k].dot(x.segment<6>(6 * r.spheres[k]));
+      for (std::size_t k = 0; k < r.spheres.size(); ++k) y.segment<6>(6 * r.spheres[k]) += scale * rate * r.rates[k];
+    }
+  }
 
   std::vector<int> hostsOf(int i) const {
     std::vector<int> out;
@@ -272,6 +282,7 @@ class RestModel {
   const SoftBodyModel& model_;
   const BodyMechanics& mechanics_;
   std::vector<MeasureRow> rows_;
+  std::vector<StrainRow> strains_;
   std::vector<Matrix3d> inverseInertia_;
   std::vector<std::vector<HostRate>> hosts_;  // per node of an identified body; empty of others
   bool isBeam_;
@@ -324,6 +335,26 @@ MatrixXd freeRigidMotions(const SoftBodyModel& m, const std::vector<int>& freedo
   return out;
 }
 
+// `visit(i, j, value)` gets what the links' stiffness between the spheres' freedoms is the sum of.
+template <class Visit>
+void forEachStiffness(const std::vector<MeasureRow>& rows, const std::vector<StrainRow>& strains, const Visit& visit) {
+  for (const MeasureRow& r : rows) {
+    const int size = r.sphere1 < 0 ? 6 : 12;
+    std::array<int, 12> index;
+    Eigen::Matrix<double, 12, 1> row;
+    row << -r.line, r.turn0, r.line, r.turn1;
+    for (int k = 0; k < 12; ++k) index[k] = k < 6 ? 6 * r.sphere0 + k : 6 * r.sphere1 + k - 6;
+    for (int i = 0; i < size; ++i)
+      for (int j = 0; j < size; ++j) visit(index[i], index[j], r.stiffness * row[i] * row[j]);
+  }
+  for (const StrainRow& r : strains) {
+    for (std::size_t a = 0; a < r.spheres.size(); ++a)
+      for (std::size_t b = 0; b < r.spheres.size(); ++b)
+        for (int i = 0; i < 36; ++i)
+          visit(6 * r.spheres[a] + i / 6, 6 * r.spheres[b] + i % 6, r.rates[a][i / 6] * r.rates[b][i % 6]);
+  }
+}
+
 }  // namespace
 
 double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics) {
@@ -343,15 +374,7 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
   const auto put = [&](std::vector<Triplet>& to, int i, int j, double value) {
     if (freedom[i] >= 0 && freedom[j] >= 0) to.emplace_back(freedom[i], freedom[j], value);
   };
-  for (const MeasureRow& r : rows) {
-    const int size = r.sphere1 < 0 ? 6 : 12;
-    std::array<int, 12> index;
-    Eigen::Matrix<double, 12, 1> row;
-    row << -r.line, r.turn0, r.line, r.turn1;
-    for (int k = 0; k < 12; ++k) index[k] = k < 6 ? 6 * r.sphere0 + k : 6 * r.sphere1 + k - 6;
-    for (int i = 0; i < size; ++i)
-      for (int j = 0; j < size; ++j) put(stiffness, index[i], index[j], r.stiffness * row[i] * row[j]);
-  }
+  forEachStiffness(rows, strainRows(m, mechanics), [&](int i, int j, double value) { put(stiffness, i, j, value); });
   for (int i = 0; i < spheres; ++i) {
     for (int k = 0; k < 3; ++k) {
       put(mass, 6 * i + k, 6 * i + k, cells.mass[i]);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -13,6 +14,7 @@
 namespace medulla {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 // Of one filling sphere, in the spheres' order: the frame that moves as its cell does in the mean.
 struct IdentifiedFrame {
@@ -33,12 +35,19 @@ struct FixedPatch {
 // where x and R are the two frames' positions and rotations since rest, and S(w) shortens and turns the rest line as
 // an arc of that bending does: S d = (sin h / h) d + (1 - sin h / h) / |w|^2 w (w.d), h = |w| / 2.
 // A patch's frame stands at the link's restPoint1 (its point nearest to the sphere) and has R = 1.
+//
+// Each cell stores (its strain)^2 / 2 besides, times Young's modulus: the sum of strain0 . m over the links that have
+// it as frame0 and of strain1 . m over those that have it as frame1. Links with a stiffness each, none negative, know
+// Poisson's ratios up to a quarter only; what nearly keeps its volume, and bulges at all other neighbours where one
+// presses, takes a stiffness that couples them.
 struct IdentifiedLink {
   int frame0 = 0, frame1 = 0;                            // frame0 is a sphere
   Eigen::Vector3d restPoint0 = Eigen::Vector3d::Zero();  // m, frame0's restPosition
   Eigen::Vector3d restPoint1 = Eigen::Vector3d::Zero();  // m
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();    // rows: along, u, v; right-handed, unit
   Matrix6d stiffness = Matrix6d::Zero();                 // m: N/m per Pa; positive semidefinite
+  Vector6d strain0 = Vector6d::Zero();                   // m^1/2: root of N/m per Pa
+  Vector6d strain1 = Vector6d::Zero();                   // likewise; 0 of a patch
 };
 
 // One of the frames a node hangs on. Node: x = X + sum over its frames of `map` (displacement of the frame,
@@ -75,5 +84,10 @@ struct IdentifiedNetwork {
   IdentifiedError bulk, poke, ofFiniteElements;  // the last: against a grid of another size
   bool usesFormulas = false;  // the beams' formulas did better on the builder's own loads: links and skin are empty
 };
+
+inline bool hasStrains(const IdentifiedNetwork& network) {
+  return std::any_of(network.links.begin(), network.links.end(),
+                     [](const IdentifiedLink& l) { return !l.strain0.isZero(0) || !l.strain1.isZero(0); });
+}
 
 }  // namespace medulla

@@ -53,6 +53,8 @@ void requireFinite(const IdentifiedNetwork& n) {
     check(link.restPoint1);
     check(link.axes);
     check(link.stiffness);
+    check(link.strain0);
+    check(link.strain1);
   }
   for (const std::vector<SkinFrame>& node : n.skin) {
     for (const SkinFrame& f : node) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -112,6 +113,31 @@ void addLink(const Eigen::Matrix<double, 12, 12>& k, int frame0, int frame1, int
   sum.block<6, 6>(6 * frame1, 6 * frame0) += k.bottomLeftCorner<6, 6>();
 }
 
+// By the motions of all frames: a row of measures of a link, and what a row of all frames does to its measures.
+void addRow(const Vector6d& ofMeasures, const IdentifiedLink& link, const Matrix6x12d& g, int frames,
+            Eigen::Ref<VectorXd> row) {
+  const Eigen::Matrix<double, 12, 1> part = g.transpose() * ofMeasures;
+  row.segment<6>(6 * link.frame0) += part.head<6>();
+  if (link.frame1 < frames) row.segment<6>(6 * link.frame1) += part.tail<6>();
+}
+Vector6d onMeasures(const Eigen::Ref<const VectorXd>& row, const IdentifiedLink& link, const Matrix6x12d& g,
+                    int frames) {
+  Eigen::Matrix<double, 12, 1> part = Eigen::Matrix<double, 12, 1>::Zero();
+  part.head<6>() = row.segment<6>(6 * link.frame0);
+  if (link.frame1 < frames) part.tail<6>() = row.segment<6>(6 * link.frame1);
+  return g * part;
+}
+
+// The cells' strains by the motions of all frames, a column each.
+MatrixXd cellStrains(const std::vector<IdentifiedLink>& links, const std::vector<Matrix6x12d>& measures, int frames) {
+  MatrixXd out = MatrixXd::Zero(6 * frames, frames);
+  for (std::size_t l = 0; l < links.size(); ++l) {
+    addRow(links[l].strain0, links[l], measures[l], frames, out.col(links[l].frame0));
+    if (links[l].frame1 < frames) addRow(links[l].strain1, links[l], measures[l], frames, out.col(links[l].frame1));
+  }
+  return out;
+}
+
 Matrix6d measured(const MatrixXd& m, const IdentifiedLink& link, const Matrix6x12d& g, int frames) {
   Eigen::Matrix<double, 12, 12> part = Eigen::Matrix<double, 12, 12>::Zero();
   const int i = link.frame0, j = link.frame1;
@@ -125,7 +151,7 @@ Matrix6d measured(const MatrixXd& m, const IdentifiedLink& link, const Matrix6x1
 }
 
 // Unknowns: of each link the lower triangle (or the diagonal) of L in k = T L L^T T, where T undoes the scale of the
-// compliance that finite elements give its measures.
+// compliance that finite elements give its measures; and with the whole triangle two vectors s in strain = T s.
 class LinkFit {
  public:
   LinkFit(const MatrixXd& compliance, const MatrixXd& grounding, double lengthScale, LinkForm form,
@@ -137,6 +163,7 @@ class LinkFit {
     for (int b = 0; b < 6; ++b) {
       for (int a = b; a < (form == LinkForm::full ? 6 : b + 1); ++a) places_.push_back({a, b});
     }
+    perLink_ = static_cast<Index>(places_.size()) + (form == LinkForm::full ? 12 : 0);
     for (const IdentifiedLink& link : links) {
       measures_.push_back(linkMeasures(link, lengthScale));
       const Matrix6d h = measured(compliance, link, measures_.back(), frames_);
@@ -153,34 +180,42 @@ class LinkFit {
     perResponse_ = (weight_.asDiagonal() * compliance.cwiseAbs2()).colwise().sum().cwiseInverse().transpose();
   }
 
+  // The strains begin as a sum of elongations: at 0 they would stay there.
   VectorXd start() const {
-    VectorXd x = VectorXd::Zero(static_cast<Index>(links_.size() * places_.size()));
+    constexpr double kStrain = 0.2;
+    VectorXd x = VectorXd::Zero(static_cast<Index>(links_.size()) * perLink_);
     for (std::size_t l = 0; l < links_.size(); ++l) {
+      auto own = x.segment(static_cast<Index>(l) * perLink_, perLink_);
       for (std::size_t k = 0; k < places_.size(); ++k) {
         if (places_[k][0] == places_[k][1])
-          x[static_cast<Index>(l * places_.size() + k)] =
-              std::sqrt(static_cast<double>(frames_) / static_cast<double>(links_.size()));
+          own[static_cast<Index>(k)] = std::sqrt(static_cast<double>(frames_) / static_cast<double>(links_.size()));
       }
+      if (hasStrains()) own.tail<12>() = kStrain * scales_[l].inverse().col(0).normalized().replicate<2, 1>();
     }
     return x;
   }
 
-  void setStiffness(const VectorXd& x) const {
+  void setLinks(const VectorXd& x) const {
     for (std::size_t l = 0; l < links_.size(); ++l) {
       const Matrix6d root = scales_[l] * unpacked(x, l);
       links_[l].stiffness = root * root.transpose();
+      if (!hasStrains()) continue;
+      const Index first = static_cast<Index>(l) * perLink_ + 21;
+      links_[l].strain0 = scales_[l] * x.segment<6>(first);
+      if (links_[l].frame1 < frames_) links_[l].strain1 = scales_[l] * x.segment<6>(first + 6);
     }
   }
 
   // KL divergence per freedom times `kl`, plus `response` times half the mean square relative error of the responses.
   double value(const VectorXd& x, VectorXd& gradient, double kl, double response) const {
     const Index n = compliance_.rows();
+    setLinks(x);
+    const MatrixXd strains = cellStrains(links_, measures_, frames_);
     MatrixXd stiffness = grounding_.size() > 0 ? grounding_ : MatrixXd::Zero(n, n);
-    for (std::size_t l = 0; l < links_.size(); ++l) {
-      const Matrix6d root = scales_[l] * unpacked(x, l);
-      const Eigen::Matrix<double, 12, 6> g = measures_[l].transpose() * root;
-      addLink(g * g.transpose(), links_[l].frame0, links_[l].frame1, frames_, stiffness);
-    }
+    for (std::size_t l = 0; l < links_.size(); ++l)
+      addLink(measures_[l].transpose() * links_[l].stiffness * measures_[l], links_[l].frame0, links_[l].frame1,
+              frames_, stiffness);
+    if (hasStrains()) stiffness.noalias() += strains * strains.transpose();
     const Eigen::LLT<MatrixXd> cholesky(stiffness);
     if (cholesky.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
     const double logDeterminant = 2 * cholesky.matrixLLT().diagonal().array().log().sum();
@@ -196,27 +231,39 @@ class LinkFit {
       const MatrixXd product = inverse * e;
       slope.noalias() -= response * product * inverse;
     }
-    for (std::size_t l = 0; l < links_.size(); ++l) {
-      const Matrix6d g =
-          2 * scales_[l] * measured(slope, links_[l], measures_[l], frames_) * scales_[l] * unpacked(x, l);
-      for (std::size_t k = 0; k < places_.size(); ++k)
-        gradient[static_cast<Index>(l * places_.size() + k)] = g(places_[k][0], places_[k][1]);
-    }
+    setGradient(x, slope, strains, gradient);
     return f;
   }
 
  private:
+  bool hasStrains() const { return perLink_ > static_cast<Index>(places_.size()); }
   Matrix6d unpacked(const VectorXd& x, std::size_t link) const {
     Matrix6d out = Matrix6d::Zero();
     for (std::size_t k = 0; k < places_.size(); ++k)
-      out(places_[k][0], places_[k][1]) = x[static_cast<Index>(link * places_.size() + k)];
+      out(places_[k][0], places_[k][1]) = x[static_cast<Index>(link) * perLink_ + static_cast<Index>(k)];
     return out;
+  }
+  // From the value's slope by the stiffness.
+  void setGradient(const VectorXd& x, const MatrixXd& slope, const MatrixXd& strains, VectorXd& gradient) const {
+    const MatrixXd byStrains = 2 * slope * strains;
+    for (std::size_t l = 0; l < links_.size(); ++l) {
+      const IdentifiedLink& link = links_[l];
+      auto own = gradient.segment(static_cast<Index>(l) * perLink_, perLink_);
+      const Matrix6d g = 2 * scales_[l] * measured(slope, link, measures_[l], frames_) * scales_[l] * unpacked(x, l);
+      for (std::size_t k = 0; k < places_.size(); ++k) own[static_cast<Index>(k)] = g(places_[k][0], places_[k][1]);
+      if (!hasStrains()) continue;
+      own.segment<6>(21) = scales_[l] * onMeasures(byStrains.col(link.frame0), link, measures_[l], frames_);
+      own.tail<6>().setZero();
+      if (link.frame1 < frames_)
+        own.tail<6>() = scales_[l] * onMeasures(byStrains.col(link.frame1), link, measures_[l], frames_);
+    }
   }
 
   const MatrixXd &compliance_, &grounding_;
   std::vector<IdentifiedLink>& links_;
   int frames_;
   std::vector<std::array<int, 2>> places_;
+  Index perLink_;
   std::vector<Matrix6x12d> measures_;
   std::vector<Matrix6d> scales_;
   VectorXd weight_, perResponse_;
@@ -225,12 +272,14 @@ class LinkFit {
 }  // namespace
 
 MatrixXd networkStiffness(const std::vector<IdentifiedLink>& links, double lengthScale, int frames) {
+  std::vector<Matrix6x12d> measures;
   MatrixXd sum = MatrixXd::Zero(6 * frames, 6 * frames);
   for (const IdentifiedLink& link : links) {
-    const Matrix6x12d g = linkMeasures(link, lengthScale);
+    const Matrix6x12d& g = measures.emplace_back(linkMeasures(link, lengthScale));
     addLink(g.transpose() * link.stiffness * g, link.frame0, link.frame1, frames, sum);
   }
-  return sum;
+  const MatrixXd strains = cellStrains(links, measures, frames);
+  return sum + strains * strains.transpose();
 }
 
 void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double lengthScale, LinkForm form,
@@ -253,7 +302,7 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double leng
   };
   descend(counting(1, 0), {warmUp}, x);
   descend(counting(klWeight, responseWeight), {iterations}, x);
-  fit.setStiffness(x);
+  fit.setLinks(x);
 }
 
 }  // namespace medulla

@@ -8,7 +8,8 @@
 
 namespace medulla {
 
-enum class LinkForm { diagonal, full };  // six scalars along the link's axes, or any positive semidefinite matrix
+// Six scalars along the link's axes; or any positive semidefinite matrix, and a strain of each cell.
+enum class LinkForm { diagonal, full };
 
 // Links between cells that share a face worth the name, and from cells to the patches that hold them, without
 // stiffness. `patchTriangles`: held triangles of each patch.
@@ -20,13 +21,14 @@ std::vector<IdentifiedLink> layOutLinks(const TriangleMesh& mesh, const CellFram
 // move.
 Eigen::Matrix<double, 6, 12> linkMeasures(const IdentifiedLink& link, double lengthScale);
 
-// Stiffness matrix of the network, 6 frames square.
+// Stiffness matrix of the network, the cells' strains included, 6 frames square.
 Eigen::MatrixXd networkStiffness(const std::vector<IdentifiedLink>& links, double lengthScale, int frames);
 
-// Sets the links' stiffness so that the network answers loads on its frames as finite elements do: `compliance` (6
-// frames square). Minimises the relative error of the responses to single loads, kept together by the Kullback-Leibler
-// divergence of the two normal distributions that have these stiffnesses. `grounding`, if not empty, is added to the
-// network's stiffness: what the compliance has on rigid motions of a free body. `progress` gets 0..1.
+// Sets the links' stiffness, and their parts in the cells' strains, so that the network answers loads on its frames as
+// finite elements do: `compliance` (6 frames square). Minimises the relative error of the responses to single loads,
+// kept together by the Kullback-Leibler divergence of the two normal distributions that have these stiffnesses.
+// `grounding`, if not empty, is added to the network's stiffness: what the compliance has on rigid motions of a free
+// body. `progress` gets 0..1.
 void fitLinks(const Eigen::MatrixXd& compliance, const Eigen::MatrixXd& grounding, double lengthScale, LinkForm form,
               std::vector<IdentifiedLink>& links, const std::function<void(double)>& progress);
 
