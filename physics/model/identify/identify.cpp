@@ -210,30 +210,35 @@ class Trials {
 // Bodies are loaded on their surface, where loads spread over cells would leave a body's end unstretched and untwisted;
 // responses to tractions alone leave maps too free, which send loads to the frames by the same numbers. So tractions
 // get the largest weight among loads on the frames that costs the answer to either half of `forces` no more than these
-// scatter: concentrated and random, they say little of ends, by a percent or two where few spheres are. The bound keeps
-// pokes: of many spheres, neighbours' maps grow against one another before random loads tell.
+// scatter: concentrated and random, they say little of ends, by two or three percent of the larger half's error where
+// few spheres are. Each skin is
+// judged with the layer that goes with it: maps that take over a part of the dents are the nearer without one.
 void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Responses& responses, const Trials& trials,
                 const RowMatrix& forces, const MatrixXd& under, IdentifiedNetwork& out) {
-  constexpr double kScatter = 1.02;
-  const double most = 5600 / std::pow(static_cast<double>(cells.frames.size()), 1.5);
+  constexpr double kScatter = 0.025;
   const Index half = forces.cols() / 2;
+  const VectorXd largest = largestOf(under);
   double first = 0, second = 0;
-  std::vector<std::vector<SkinFrame>> best;
+  std::vector<std::vector<SkinFrame>> skin;
+  IdentifiedLayer layer;
   for (const double weight : {0., 3., 10., 100., 300.}) {
-    if (weight > most) break;
     out.skin = fitSkin(mesh, cells, out.patches, responses.frames + weight * responses.framesUnderTractions,
                        responses.nodes + weight * responses.nodesUnderTractions);
-    const MatrixXd found = trials.ofFrames(forces);
+    out.layer = fitLayer(mesh, trials.surface, forces, under - trials.ofFrames(forces), largest, out.lengthScale);
+    const MatrixXd found = trials.ofNetwork(forces);
     const double bulk = errorOf(found.leftCols(half), under.leftCols(half)).rms,
                  poke = errorOf(found.rightCols(half), under.rightCols(half)).rms;
     if (weight == 0) {
       first = bulk;
       second = poke;
+    } else if (!(std::max(bulk - first, poke - second) < kScatter * std::max(first, second))) {
+      break;
     }
-    if (weight > 0 && !(std::max(bulk / first, poke / second) < kScatter)) continue;
-    best = out.skin;
+    skin = out.skin;
+    layer = out.layer;
   }
-  out.skin = best;
+  out.skin = skin;
+  out.layer = layer;
 }
 
 // Fits skin and layer to loads of their own, and measures the network on others, which nothing was fitted to; then
@@ -248,8 +253,6 @@ void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, con
   teaching << trials.loads(LoadKind::bulk, count, 1), trials.loads(LoadKind::poke, count, 1);
   const MatrixXd under = trials.exact(solid, teaching);
   chooseSkin(mesh, cells, responses, trials, teaching, under, out);
-  out.layer =
-      fitLayer(mesh, trials.surface, teaching, under - trials.ofFrames(teaching), largestOf(under), out.lengthScale);
   progress(0.4);
   const VoxelSolid other = makeVoxelSolid(mesh, 4. / 3 * solid.grid.size, settings);
   progress(0.8);
