@@ -304,7 +304,7 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double leng
   // Where cells lie in a row there is next to nothing to couple, and what strains gain of single loads they lose of
   // others: a gallbladder of seven, with ten links, bends half a percent farther off with them.
   constexpr double kPerCell = 1.5;  // links
-  const bool inARow = static_cast<double>(links.size()) < kPerCell * static_cast<double>(compliance.rows() / 6);
+  const bool inARow = static_cast<double>(links.size()) < kPerCell * static_cast<double>(compliance.rows()) / 6;
   int calls = 0;
   const auto value = [&](const LinkFit& fit, double kl, double response) {
     return [&, kl, response](const VectorXd& at, VectorXd& gradient) {
