@@ -98,7 +98,7 @@ struct SkinHost {
 // What one frame's way and turn do to four nodes' places, and its share of how far their own frames are turned.
 // Single precision: a rigid motion asks nothing of these, and they are most of what a substep reads.
 struct alignas(16) SkinShare {
-  float map[18][4];  // 1 and m: on way and turn, six numbers for x, y and z each; loaded by 16 bytes, as weights
+  float map[18][4];  // 1 and m: three columns on the way, three on the turn; loaded by 16 bytes, as weights
   float weight[4];
   float along[4];            // 1: of a way along the term's axis, what it does along that axis
   std::int32_t state, load;  // offsets in doubles of the frame's first number in SkinTermState, and in SkinTermLoad

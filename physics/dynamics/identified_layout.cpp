@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <map>
+#include <set>
 
 #include "physics/dynamics/identified_measures.h"
 #include "physics/dynamics/identified_mechanics.h"
@@ -138,8 +139,8 @@ void setMap(SkinShare& share, int lane, const SkinRow& row, double weight, const
   share.along[lane] = static_cast<float>(axis.dot(row.onWay * axis));
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      share.map[6 * i + j][lane] = static_cast<float>(row.onWay(i, j));
-      share.map[6 * i + 3 + j][lane] = static_cast<float>(row.onTurn(i, j));
+      share.map[3 * j + i][lane] = static_cast<float>(row.onWay(i, j));
+      share.map[9 + 3 * j + i][lane] = static_cast<float>(row.onTurn(i, j));
     }
   }
 }
@@ -199,7 +200,42 @@ void addSkins(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
   }
 }
 
+// What the nodes of a group ask for; time that a frame takes is that of some two edges.
+class GroupCost {
+ public:
+  GroupCost(const BodyMechanics& mechanics, const std::vector<int>& edges) : mechanics_(&mechanics), edges_(&edges) {}
+  int with(int node) const {
+    int frames = 0;
+    for (const SkinFrame& f : mechanics_->skin[node]) frames += frames_.count(f.frame) == 0 ? 1 : 0;
+    return 2 * frames + std::max((*edges_)[node] - mostEdges_, 0);
+  }
+  void add(int node) {
+    for (const SkinFrame& f : mechanics_->skin[node]) frames_.insert(f.frame);
+    mostEdges_ = std::max(mostEdges_, (*edges_)[node]);
+  }
+
+ private:
+  const BodyMechanics* mechanics_;
+  const std::vector<int>* edges_;
+  std::set<int> frames_;
+  int mostEdges_ = 0;
+};
+
 }  // namespace
+
+// Each group begins with the dearest node that is left and takes those that add least.
+void groupByFrames(const BodyMechanics& mechanics, const std::vector<int>& edges, std::span<int> nodes) {
+  for (std::size_t first = 0; first < nodes.size(); first += 4) {
+    GroupCost group(mechanics, edges);
+    for (std::size_t k = first; k < std::min(first + 4, nodes.size()); ++k) {
+      const auto isBetter = [&](int i, int j) {
+        return k == first ? group.with(i) > group.with(j) : group.with(i) < group.with(j);
+      };
+      std::iter_swap(nodes.begin() + k, std::min_element(nodes.begin() + k, nodes.end(), isBetter));
+      group.add(nodes[k]);
+    }
+  }
+}
 
 void layOutIdentified(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   Identified& s = d.identified;

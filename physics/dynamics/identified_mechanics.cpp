@@ -1,4 +1,5 @@
 #include "physics/dynamics/identified_mechanics.h"
+#include "physics/model/cross_matrix.h"
 
 #include <fmt/format.h>
 
@@ -15,10 +16,6 @@ using Eigen::Vector3d;
 
 void require(bool condition, const std::string& message) {
   if (!condition) throw std::runtime_error(message);
-}
-
-Matrix3d crossMatrix(const Vector3d& a) {
-  return (Matrix3d() << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0).finished();
 }
 
 // From a sphere's frame to that of its cell; 0 of what is held.

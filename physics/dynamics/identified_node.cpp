@@ -2,6 +2,7 @@
 
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/skin_map.h"
+#include "physics/model/cross_matrix.h"
 
 // Single nodes on frames: those that carry loads.
 namespace medulla {
@@ -21,10 +22,6 @@ SeenHost see(const Identified& s, const SkinHost& host) {
   SeenHost out{homeFrame(s, host), std::vector<SkinTermState>(host.endTerms - host.firstTerms)};
   seeFrames(s, host, out.home, out.states.data());
   return out;
-}
-
-Matrix3d crossMatrix(const Vector3d& a) {
-  return (Matrix3d() << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0).finished();
 }
 
 void add(HostPoint& p, const CarriedFrame& frame, const Matrix3d& force, const Matrix3d& torque) {
@@ -65,8 +62,8 @@ HostPoint hostPointOnFrames(const WorldData& d, int node) {
     Matrix3d onWay, onTurn;
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
-        onWay(j, i) = share.map[6 * i + j][lane];
-        onTurn(j, i) = share.map[6 * i + 3 + j][lane];
+        onWay(j, i) = share.map[3 * j + i][lane];
+        onTurn(j, i) = share.map[9 + 3 * j + i][lane];
       }
     }
     if (onWay.isZero(0) && onTurn.isZero(0) && share.weight[lane] == 0) continue;  // another node's

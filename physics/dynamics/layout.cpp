@@ -110,6 +110,11 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
   std::stable_sort(sorted.begin(), sorted.end(), [&](int i, int j) { return placeOf(i) < placeOf(j); });
   for (std::size_t k = 0; k < sorted.size();) {
     const auto [host, held] = hostOf(sorted[k]);
+    if (onFrames) {
+      const auto end =
+          std::find_if(sorted.begin() + k, sorted.end(), [&](int i) { return hostOf(i) != hostOf(sorted[k]); });
+      groupByFrames(mechanics, edges, {sorted.begin() + k, end});
+    }
     HostRange range{firstHost + host,
                     static_cast<int>(order.node.size()) / 4,
                     0,

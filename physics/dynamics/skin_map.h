@@ -96,47 +96,53 @@ MEDULLA_INLINE Lanes3 secondOrder(const Lanes3& s, const Lanes3& lever) {
   return fma(half * dot(s, lever), s, (splat(-0.5) * dot(s, s)) * lever);
 }
 
+// Sums of columns, each times its number, and of the same times the numbers' rates.
+struct ColumnSums {
+  Lanes3 value, rate;
+};
+template <bool withRates>
+MEDULLA_INLINE void addColumns(const float (*columns)[4], const double* numbers, const double* rates, ColumnSums& to) {
+  for (int j = 0; j < 3; ++j, columns += 3) {
+    const Lanes3 column{shareEntry(columns[0]), shareEntry(columns[1]), shareEntry(columns[2])};
+    put(fma(_mm256_broadcast_sd(numbers + 4 * j), column, to.value), to.value);
+    if (withRates) put(fma(_mm256_broadcast_sd(rates + 4 * j), column, to.rate), to.rate);
+  }
+}
+template <bool withRates>
+MEDULLA_INLINE void addScaled(const float (&factor)[4], const double* numbers, const double* rates, ColumnSums& to) {
+  const Lanes f = shareEntry(factor);
+  put(fma(f, broadcastThree(numbers), to.value), to.value);
+  if (withRates) put(fma(f, broadcastThree(rates), to.rate), to.rate);
+}
+
+// Twelve sums at a time are what the registers hold, and as many do not wait for each other: ways first, then turns.
 template <bool withRates>
 MEDULLA_INLINE SkinPlace placeSkin(const Identified& s, const SkinGroup& g, const SkinTermState* states) {
   const Lanes zero = splat(0);
+  const Lanes3 none{zero, zero, zero};
   const double* numbers = reinterpret_cast<const double*>(states);
-  Lanes3 y = g.restOffset, turn{zero, zero, zero}, yRate = turn, turnRate = turn;
+  ColumnSums ways{g.restOffset, none}, spares{none, none}, turns{none, none}, own{none, none};
   for (int k = g.firstShare; k < g.endShare; ++k) {
     const SkinShare& share = s.shares[k];
     const double* at = numbers + share.state;
-    const Lanes3 way = broadcastThree(at), turned = broadcastThree(at + 12), spare = broadcastThree(at + 48);
-    Lanes3 wayRate, turnedRate;
-    if (withRates) {
-      put(broadcastThree(at + 24), wayRate);
-      put(broadcastThree(at + 36), turnedRate);
-    }
-    const Lanes along = shareEntry(share.along);
-    put(fma(along, spare, y), y);
-    if (withRates) put(fma(along, broadcastThree(at + 60), yRate), yRate);
-    const Lanes weight = shareEntry(share.weight);
-    Lanes* rows[3] = {&y.x, &y.y, &y.z};
-    Lanes* rates[3] = {&yRate.x, &yRate.y, &yRate.z};
-    for (int i = 0; i < 3; ++i) {
-      const float(*row)[4] = &share.map[6 * i];
-      const Lanes3 onWay{shareEntry(row[0]), shareEntry(row[1]), shareEntry(row[2])},
-          onTurn{shareEntry(row[3]), shareEntry(row[4]), shareEntry(row[5])};
-      const auto add = [&](const Lanes3& a, const Lanes3& b, Lanes& sum) {
-        sum = fma(onWay.x, a.x, fma(onWay.y, a.y, fma(onWay.z, a.z, sum)));
-        sum = fma(onTurn.x, b.x, fma(onTurn.y, b.y, fma(onTurn.z, b.z, sum)));
-      };
-      add(way, turned, *rows[i]);
-      if (withRates) add(wayRate, turnedRate, *rates[i]);
-    }
-    put(fma(weight, turned, turn), turn);
-    if (withRates) put(fma(weight, turnedRate, turnRate), turnRate);
+    addColumns<withRates>(share.map, at, at + 24, ways);
+    addColumns<withRates>(share.map + 9, at + 12, at + 36, turns);
   }
+  for (int k = g.firstShare; k < g.endShare; ++k) {
+    const SkinShare& share = s.shares[k];
+    const double* at = numbers + share.state;
+    addScaled<withRates>(share.along, at + 48, at + 60, spares);
+    addScaled<withRates>(share.weight, at + 12, at + 36, own);
+  }
+  const Lanes3 &turn = own.value, &turnRate = own.rate;
   SkinPlace out;
-  put(y + secondOrder(turn, g.lever), out.offset);
+  put(ways.value + spares.value + turns.value + secondOrder(turn, g.lever), out.offset);
   put(turn, out.turn);
   if (withRates) {
     const Lanes half = splat(0.5);
+    const Lanes3 rate = ways.rate + spares.rate + turns.rate;
     put(fma(half * dot(turn, g.lever), turnRate,
-            fma(half * dot(turnRate, g.lever), turn, fnma(dot(turn, turnRate), g.lever, yRate))),
+            fma(half * dot(turnRate, g.lever), turn, fnma(dot(turn, turnRate), g.lever, rate))),
         out.offsetRate);
   }
   return out;
@@ -149,18 +155,17 @@ MEDULLA_INLINE void giveToTerms(const Identified& s, const SkinGroup& g, const L
   const Lanes3 onOwn = fma(half * dot(turn, g.lever), force,
                            fma(half * dot(turn, force), g.lever, (splat(-1) * dot(g.lever, force)) * turn));
   const Lanes f[3] = {force.x, force.y, force.z}, own[3] = {onOwn.x, onOwn.y, onOwn.z};
+  const auto timesColumn = [&](const float(*column)[4], Lanes sum) {
+    return fma(shareEntry(column[2]), force.z,
+               fma(shareEntry(column[1]), force.y, fma(shareEntry(column[0]), force.x, sum)));
+  };
   for (int k = g.firstShare; k < g.endShare; ++k) {
     const SkinShare& share = s.shares[k];
     SkinTermLoad& to = loads[share.load];
     const Lanes weight = shareEntry(share.weight), along = shareEntry(share.along);
     for (int j = 0; j < 3; ++j) {
-      Lanes way = to.onWay[j], turning = fma(weight, own[j], to.onTurn[j]);
-      for (int i = 0; i < 3; ++i) {
-        way = fma(shareEntry(share.map[6 * i + j]), f[i], way);
-        turning = fma(shareEntry(share.map[6 * i + 3 + j]), f[i], turning);
-      }
-      to.onWay[j] = way;
-      to.onTurn[j] = turning;
+      to.onWay[j] = timesColumn(share.map + 3 * j, to.onWay[j]);
+      to.onTurn[j] = timesColumn(share.map + 9 + 3 * j, fma(weight, own[j], to.onTurn[j]));
       to.onSpare[j] = fma(along, f[j], to.onSpare[j]);
     }
   }
