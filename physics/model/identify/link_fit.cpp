@@ -312,15 +312,17 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double leng
       return fit.value(at, gradient, kl, response);
     };
   };
+  const auto minimise = [&](const LinkFit& fit, VectorXd& at) {
+    descend(value(fit, 1, 0), {warmUp}, at);
+    return descend(value(fit, klWeight, responseWeight), {iterations}, at);
+  };
   const LinkFit plain(compliance, grounding, lengthScale, form, false, links);
   VectorXd x = plain.start();
-  descend(value(plain, 1, 0), {warmUp}, x);
-  const double reached = descend(value(plain, klWeight, responseWeight), {iterations}, x);
+  const double reached = minimise(plain, x);
   if (form == LinkForm::full && !inARow) {
     const LinkFit strained(compliance, grounding, lengthScale, form, true, links);
     VectorXd both = strained.startAt(plain.start());
-    descend(value(strained, 1, 0), {warmUp}, both);
-    if (descend(value(strained, klWeight, responseWeight), {iterations}, both) < reached) {
+    if (minimise(strained, both) < reached) {
       strained.setLinks(both);
       return;
     }
