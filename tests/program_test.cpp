@@ -223,13 +223,25 @@ TEST(Program, IdentifiesTheSameNetworkEachTime) {
     expectRefusal(build("c.xml", more), exitCode, says);
     EXPECT_FALSE(std::filesystem::exists(folder / "c.xml"));
   };
-  refused({"--identify", "--fix", "box=1,1,1,2,2,2"}, 1, {"cylinder.obj", "box=1,1,1,2,2,2", "no node"});
-  refused({"--identify", "--fix", "box=0,0,0,1,1"}, 1, {"--fix box=0,0,0,1,1", "x0,y0,z0,x1,y1,z1"});
-  refused({"--identify", "--fix", "cone=0,0,0,1"}, 1, {"--fix cone=", "vertices=FILE.csv"});
-  refused({"--identify", "--fix", "vertices=none.csv"}, 1, {"none.csv"});
   refused({"--identify", "--poisson", "0.5"}, 1, {"0.5", "less than 0.5"});
   refused({"--identify", "--poisson", "-0.1"}, 1, {"-0.1", "0 or more"});
   refused({"--fix", "plane=1,0,0,0.001"}, 2, {"--identify"});
+}
+
+TEST(Program, TellsMistakesInWhatIsHeldBeforeItPlacesSpheres) {
+  const TemporaryFolder folder;
+  const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
+  folder.write("beyond.csv", "vertex\n0\n100000\n");
+  const auto refused = [&](const std::string& fix, const std::vector<std::string>& says) {  // no spheres reach the gap
+    const std::vector<std::string> words{"build", mesh, "-o", folder / "a.xml", "--gap", "0.01"};
+    expectRefusal(runProgram(command(words, {"--identify", "--fix", fix})), 1, says);
+  };
+  refused("box=1,1,1,2,2,2", {"cylinder.obj", "box=1,1,1,2,2,2", "no node"});
+  refused("box=0,0,0,1,1", {"--fix box=0,0,0,1,1", "x0,y0,z0,x1,y1,z1"});
+  refused("cone=0,0,0,1", {"--fix cone=", "vertices=FILE.csv"});
+  refused("vertices=none.csv", {"none.csv", "cannot be opened"});
+  refused("vertices=" + (folder / "beyond.csv"), {"beyond.csv:3", "100000"});
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.xml"));
 }
 
 TEST(Program, IdentifiesWhereFormulasHaveNoAnswer) {

@@ -28,6 +28,7 @@ struct BuildJob {
   std::uint64_t inputHash = 0;
   RepairedMesh mesh;
   TriangleMesh fine;
+  std::vector<HeldRegion> held;
   BuildSettings settings;
   SoftBodyModel model;
   BuildReport report;
@@ -111,6 +112,16 @@ void readMeshes(double scale, std::vector<BuildJob>& jobs) {
   }
 }
 
+// Of the repaired mesh, whose vertices a model's nodes are: a mistake in what is to be held shows before any work.
+void readHeldRegions(const BuildOptions& options, BuildJob& job) {
+  SoftBodyModel surface;
+  surface.restNodes = job.mesh.mesh.vertices;
+  surface.nodeOfInputVertex = job.mesh.vertexOfInput;
+  naming(job.meshPath, [&] {
+    for (const std::string& text : options.fix) job.held.push_back(parseHeldRegion(text, surface));
+  });
+}
+
 // The spheres asked for are those of all bodies together.
 void divideSpheres(std::vector<BuildJob>& jobs) {
   std::vector<BodyShape> shapes;
@@ -182,9 +193,7 @@ void identifyModel(const BuildOptions& options, BuildJob& job) {
     progress.update(100 * share);
   };
   job.model.identified = naming(job.meshPath, [&] {
-    std::vector<HeldRegion> held;
-    for (const std::string& text : options.fix) held.push_back(parseHeldRegion(text, job.model));
-    const Identification found = identifyNetwork(job.model, held, options.identification, tick);
+    const Identification found = identifyNetwork(job.model, job.held, options.identification, tick);
     auto network = std::make_shared<IdentifiedNetwork>(found.network);
     chooseFormulasIfBetter(job, *network, found);
     return network;
@@ -223,6 +232,7 @@ int runBuild(const BuildOptions& options) {
   try {
     requireDistinct(options, jobs);
     readMeshes(scale, jobs);
+    readHeldRegions(options, jobs[0]);  // --fix asks for --identify, and that for a single mesh
     const bool shared = jobs.size() > 1 && options.settings.method == BuildMethod::cover && options.settings.gap == 0;
     if (shared) divideSpheres(jobs);
     buildAll(jobs);
