@@ -198,17 +198,21 @@ TEST(DynamicAccuracy, TheCylindersModesAreThoseOfFiniteElements) {
 }
 
 // The same of links that finite elements identify: of the cylinder eight, of the gallbladder five.
-TEST(DynamicAccuracy, IdentifiedModesAreThoseOfFiniteElements) {
-  for (const StaticCase& c :
-       {StaticCase{"cylinder_tip", 7, 0, 0, 0, CYLINDER_ROOT}, StaticCase{"gallbladder_tip", 7, 0, 0, 0, PEAR_ROOT}}) {
-    const Result tip = readResult(c.name), modes = readResult(tip.text("body") + "_modes");
-    const BodyDescription body = bodyOf(c, tip);
-    const std::vector<double> expected = modes.numbers("frequencies"),
-                              found = naturalFrequencies(body, bodyMechanics(body), static_cast<int>(expected.size()));
-    ASSERT_EQ(found.size(), expected.size());
-    for (std::size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k] / expected[k], 1, 0.03) << c.name << k;
-  }
+class ModalAccuracy : public testing::TestWithParam<StaticCase> {};
+
+TEST_P(ModalAccuracy, FrequenciesAreThoseOfFiniteElements) {
+  const Result tip = readResult(GetParam().name), modes = readResult(tip.text("body") + "_modes");
+  const BodyDescription body = bodyOf(GetParam(), tip);
+  const std::vector<double> expected = modes.numbers("frequencies"),
+                            found = naturalFrequencies(body, bodyMechanics(body), static_cast<int>(expected.size()));
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k] / expected[k], 1, 0.03) << k;
 }
+
+INSTANTIATE_TEST_SUITE_P(Identified, ModalAccuracy,
+                         testing::Values(StaticCase{"cylinder_tip", 7, 0, 0, 0, CYLINDER_ROOT},
+                                         StaticCase{"gallbladder_tip", 7, 0, 0, 0, PEAR_ROOT}),
+                         [](const auto& tested) { return std::string(tested.param.name); });
 
 // The loaded vertices' mean displacement along the load swings about where it ends: its extremes give the first mode's
 // frequency and damping ratio.
