@@ -296,8 +296,8 @@ TEST(ModelBuild, FewestSpheresForAGap) {
   settings.spheres = report.spheres - 2;
   build(mesh, settings, report);
   EXPECT_GT(report.gapMax, 4.5);
-  settings.gap = 0.01;  // no ball reaches into corners
-  EXPECT_THROW(build(cylinderMesh(0.1, 0.01, 12, 10), settings, report), std::runtime_error);
+  // No ball reaches into corners.
+  EXPECT_THROW(fewestBalls(measureShape(cylinderMesh(0.1, 0.01, 12, 10), 0), 0.01, 100), std::runtime_error);
 }
 
 TEST(ModelBuild, SkeletonMethodKeepsThePapersResult) {
