@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "physics/dynamics/body_mechanics.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/node_motion.h"
+#include "tests/dynamics_states.h"
 #include "tests/identified_model.h"
 
 // Where links carry what hangs on them, bent far: rates are the places' differences, loads their transpose. Each of

@@ -1,3 +1,7 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
 #include "physics/model/build.h"
 #include "physics/model/mass_properties.h"
 #include "tests/dynamics_states.h"

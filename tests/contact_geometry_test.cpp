@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "physics/dynamics/broad_phase.h"
 #include "physics/dynamics/contact_stages.h"

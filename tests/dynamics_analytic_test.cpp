@@ -1,3 +1,7 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "physics/dynamics/rest_modes.h"

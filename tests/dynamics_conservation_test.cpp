@@ -1,3 +1,7 @@
+#include <gtest/gtest.h>
+
+#include <numbers>
+
 #include "tests/dynamics_states.h"
 #include "tests/synthetic_model.h"
 

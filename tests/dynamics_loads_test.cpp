@@ -1,3 +1,5 @@
+#include <gtest/gtest.h>
+
 #include "tests/dynamics_states.h"
 #include "tests/synthetic_model.h"
 

@@ -1,5 +1,10 @@
 #include "physics/dynamics/fixation.h"
 
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
 #include "physics/dynamics/body_mechanics.h"
 #include "physics/dynamics/region.h"
 #include "tests/dynamics_states.h"

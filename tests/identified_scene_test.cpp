@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 
 #include "app/files/model_file.h"
 #include "app/simulation.h"

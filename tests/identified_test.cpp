@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -7,6 +8,7 @@
 #include "physics/dynamics/body_mechanics.h"
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/rest_modes.h"
+#include "tests/dynamics_states.h"
 #include "tests/identified_model.h"
 
 // Links, skin and patches of an identified network, whatever its numbers.

@@ -1,5 +1,12 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "physics/dynamics/implicit_stages.h"
 #include "tests/contact_bodies.h"
+#include "tests/dynamics_states.h"
 #include "tests/identified_model.h"
 
 // The implicit step: its matrix, its order, what it keeps and what it may only lose, loads and contact inside.
