@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 
 #include "physics/dynamics/simd.h"
 
@@ -25,12 +24,18 @@ MEDULLA_INLINE void storeSix(double* to, const Six& a) {
   _mm256_storeu_pd(to, a.rows0);
   _mm_storeu_pd(to + 4, a.rows4);
 }
+MEDULLA_INLINE Six splatSix(double a) {
+  return {splat(a), _mm_set1_pd(a)};
+}
 MEDULLA_INLINE Six operator-(const Six& a, const Six& b) {
   return {a.rows0 - b.rows0, a.rows4 - b.rows4};
 }
 // f a + b
-MEDULLA_INLINE Six fma(double f, const Six& a, const Six& b) {
-  return {fma(splat(f), a.rows0, b.rows0), _mm_fmadd_pd(_mm_set1_pd(f), a.rows4, b.rows4)};
+MEDULLA_INLINE Six fma(Lanes f, const Six& a, const Six& b) {
+  return {fma(f, a.rows0, b.rows0), _mm_fmadd_pd(_mm256_castpd256_pd128(f), a.rows4, b.rows4)};
+}
+MEDULLA_INLINE Six operator*(Lanes f, const Six& a) {
+  return {f * a.rows0, _mm256_castpd256_pd128(f) * a.rows4};
 }
 
 namespace block6 {
@@ -42,10 +47,8 @@ MEDULLA_INLINE Lanes rowsAcross(Lanes rows0, Lanes rows2) {
 
 // Of six numbers, each twice: (0 0 1 1), (2 2 3 3), (4 4 5 5).
 MEDULLA_INLINE void eachTwice(const double* x, Lanes (&pairs)[3]) {
-  const Lanes x0 = _mm256_loadu_pd(x);
-  pairs[0] = _mm256_permute4x64_pd(x0, 0x50);
-  pairs[1] = _mm256_permute4x64_pd(x0, 0xFA);
-  pairs[2] = _mm256_permute4x64_pd(_mm256_loadu_pd(x + 2), 0xFA);
+  for (int p = 0; p < 3; ++p)
+    pairs[p] = _mm256_permute_pd(_mm256_broadcast_pd(reinterpret_cast<const __m128d*>(x + 2 * p)), 0xC);
 }
 
 }  // namespace block6
@@ -102,34 +105,70 @@ MEDULLA_INLINE void multiplyByUpper(const Block6& u, Block6& b) {
   Six columns[6];
   for (int j = 0; j < 6; ++j) columns[j] = loadSix(b.data() + 6 * j);
   for (int j = 0; j < 6; ++j) {
-    Six sum{splat(0), _mm_setzero_pd()};
-    for (int k = 0; k <= j; ++k) sum = fma(u(k, j), columns[k], sum);
+    Six sum = splatSix(0);
+    for (int k = 0; k <= j; ++k) sum = fma(splat(u(k, j)), columns[k], sum);
     storeSix(b.data() + 6 * j, sum);
   }
 }
 
+namespace block6 {
+
+// Element k, in all lanes.
+template <int k>
+MEDULLA_INLINE Lanes element(const Six& a) {
+  if constexpr (k < 4)
+    return splatLane<k>(a.rows0);
+  else
+    return _mm256_broadcastsd_pd(_mm_permute_pd(a.rows4, k == 5 ? 3 : 0));
+}
+// `a` with the elements of `b` where the bits of `which` are set.
+template <int which>
+MEDULLA_INLINE Six with(const Six& a, const Six& b) {
+  return {_mm256_blend_pd(a.rows0, b.rows0, which & 15), _mm_blend_pd(a.rows4, b.rows4, which >> 4)};
+}
+
+// Takes multiples of `row` off the rows from i on; element k of these begins anew.
+template <int k, int i>
+MEDULLA_INLINE void reduceRows(const Six& minusMultiples, const Six& row, Six (&rows)[6]) {
+  if constexpr (i < 6) {
+    rows[i] = fma(element<i>(minusMultiples), row, with<1 << k>(rows[i], splatSix(0)));
+    reduceRows<k, i + 1>(minusMultiples, row, rows);
+  }
+}
+template <int k>
+MEDULLA_INLINE void eliminate(Six (&rows)[6], Six& pivots) {
+  if constexpr (k < 6) {
+    const Lanes pivot = element<k>(rows[k]);
+    pivots = with<1 << k>(pivots, {pivot, _mm256_castpd256_pd128(pivot)});
+    const Six row = with<1 << k>(rows[k], splatSix(1));
+    reduceRows<k, k + 1>((splat(-1) / pivot) * rows[k], row, rows);
+    rows[k] = with<(0x3E << k) & 0x3F>(row, splatSix(0));
+    eliminate<k + 1>(rows, pivots);
+  }
+}
+template <int k>
+MEDULLA_INLINE void storeScaled(const Six& scale, const Six (&rows)[6], double* to) {
+  if constexpr (k < 6) {
+    storeSix(to + 6 * k, element<k>(scale) * rows[k]);
+    storeScaled<k + 1>(scale, rows, to);
+  }
+}
+
+}  // namespace block6
+
 // a := L^-T of a = L L^T, upper. False where a pivot is not positive. Only the lower triangle is read.
+//
+// Gauss's elimination of a = U^T D U, with U^-T in the place of what it empties: row i of six numbers holds, from the
+// diagonal on, row i of what is left of `a`, and before it row i of U^-T, which takes the same multiples of the rows
+// above. A single division stands between one pivot and the next; the roots of all of them, L = U^T sqrt(D), come last.
 inline bool invertFactor(Block6& a) {
-  double inverse[6];
-  for (int j = 0; j < 6; ++j) {
-    double* column = a.data() + 6 * j;
-    if (!(column[j] > 0)) return false;
-    inverse[j] = 1 / std::sqrt(column[j]);
-    const Six scaled = fma(inverse[j], loadSix(column), {splat(0), _mm_setzero_pd()});
-    storeSix(column, scaled);
-    for (int k = j + 1; k < 6; ++k)
-      storeSix(column + 6 * (k - j), fma(-column[k], scaled, loadSix(column + 6 * (k - j))));
-  }
-  // Row i of L^-1 is (unit i - sum over k < i of L(i, k) row k) / L(i, i); it becomes column i.
-  const Block6 l = a;
-  for (int i = 0; i < 6; ++i) {
-    Vector6 unit = Vector6::Zero();
-    unit[i] = inverse[i];
-    Six row = loadSix(unit.data());
-    for (int k = 0; k < i; ++k) row = fma(-inverse[i] * l(i, k), loadSix(a.data() + 6 * k), row);
-    storeSix(a.data() + 6 * i, row);
-  }
-  return true;
+  Six rows[6], pivots = splatSix(0);
+  for (int i = 0; i < 6; ++i) rows[i] = loadSix(a.data() + 6 * i);
+  block6::eliminate<0>(rows, pivots);
+  block6::storeScaled<0>({splat(1) / squareRoot(pivots.rows0), _mm_set1_pd(1) / _mm_sqrt_pd(pivots.rows4)}, rows,
+                         a.data());
+  return _mm256_movemask_pd(isLess(splat(0), pivots.rows0)) == 15 &&
+         _mm_movemask_pd(_mm_cmplt_pd(_mm_setzero_pd(), pivots.rows4)) == 3;
 }
 
 }  // namespace medulla

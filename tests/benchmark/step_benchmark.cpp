@@ -82,13 +82,15 @@ static void implicitStep(benchmark::State& state, Scene scene, SurfaceMode surfa
   settings.substeps = 1;
   World world(settings, std::move(bodies));
   for (int i = 0; i < 3; ++i) world.advance({});
-  const long before = world.data().implicit[0]->solves;
+  const long before = world.data().implicit[0]->solves, iterationsBefore = world.data().implicit[0]->iterations;
   for ([[maybe_unused]] auto _ : state) world.advance({});
   const auto solves = static_cast<double>(world.data().implicit[0]->solves - before);
+  const auto iterations = static_cast<double>(world.data().implicit[0]->iterations - iterationsBefore);
   state.counters["spheres"] = world.data().spheres.count;
   state.counters["links"] = world.data().links.count;
   state.counters["nodes"] = world.data().nodes.dynamicEnd;
   state.counters["solves_per_step"] = solves / static_cast<double>(state.iterations());
+  state.counters["iterations_per_solve"] = iterations / solves;
   state.counters["solve"] = benchmark::Counter(solves, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 BENCHMARK_CAPTURE(implicitStep, spheres, synthetic::abdomenScene, SurfaceMode::skin)->Iterations(60);
