@@ -33,7 +33,7 @@ TEST(BlockCholesky, SolvesWhatADenseFactorSolves) {
     BlockCholesky factor;
     factor.analyse(rows, blocks);
     for (int twice = 0; twice < 2; ++twice) {  // the second time with other numbers
-      factor.setZero();
+      factor.clear();
       dense.setZero();
       for (std::size_t k = 0; k < blocks.size(); ++k) {
         const Block6 b = randomMatrix(random, 6, 6);
@@ -61,7 +61,7 @@ TEST(BlockCholesky, SolvesWhatADenseFactorSolves) {
 TEST(BlockCholesky, SaysWhereAMatrixIsNotDefinite) {
   BlockCholesky factor;
   factor.analyse(2, {{0, 1}});
-  factor.setZero();
+  factor.clear();
   factor.diagonal(0) = factor.diagonal(1) = Block6::Identity();
   factor.addBlock(0, 2 * Block6::Identity());
   EXPECT_FALSE(factor.factorise());

@@ -7,7 +7,9 @@ namespace medulla {
 
 namespace {
 
-// Columns of the factor, by elimination of the row with fewest neighbours; the lowest number decides between equals.
+// Columns of the factor, by elimination of the row with fewest neighbours; between equals of the one that elimination
+// last changed the longest ago, then of the lowest number. So chains go from both ends and bodies by turns: as little
+// fills in, or less, and a row seldom has to wait for the one just before it.
 std::vector<std::vector<int>> eliminate(int rows, const std::vector<std::array<int, 2>>& blocks,
                                         std::vector<int>& order) {
   std::vector<std::set<int>> neighbours(rows);
@@ -15,21 +17,24 @@ std::vector<std::vector<int>> eliminate(int rows, const std::vector<std::array<i
     neighbours[a].insert(b);
     neighbours[b].insert(a);
   }
-  std::set<std::array<int, 2>> byDegree;
-  for (int i = 0; i < rows; ++i) byDegree.insert({static_cast<int>(neighbours[i].size()), i});
+  std::vector<int> changed(rows, 0);
+  const auto rankOf = [&](int i) { return std::array<int, 3>{static_cast<int>(neighbours[i].size()), changed[i], i}; };
+  std::set<std::array<int, 3>> ranks;
+  for (int i = 0; i < rows; ++i) ranks.insert(rankOf(i));
   std::vector<std::vector<int>> columns;
   order.clear();
-  while (!byDegree.empty()) {
-    const int pivot = (*byDegree.begin())[1];
-    byDegree.erase(byDegree.begin());
+  while (!ranks.empty()) {
+    const int pivot = (*ranks.begin())[2];
+    ranks.erase(ranks.begin());
     order.push_back(pivot);
     const std::vector<int> column(neighbours[pivot].begin(), neighbours[pivot].end());
     for (const int i : column) {
-      byDegree.erase({static_cast<int>(neighbours[i].size()), i});
+      ranks.erase(rankOf(i));
       neighbours[i].erase(pivot);
       for (const int k : column)
         if (k != i) neighbours[i].insert(k);
-      byDegree.insert({static_cast<int>(neighbours[i].size()), i});
+      changed[i] = static_cast<int>(order.size());
+      ranks.insert(rankOf(i));
     }
     columns.push_back(column);
   }
@@ -64,26 +69,35 @@ void BlockCholesky::analyse(int rows, const std::vector<std::array<int, 2>>& blo
   }
   slot_.clear();
   turned_.clear();
+  isFirst_.clear();
+  std::vector<char> given(entryRow_.size(), 0);
   for (const auto& [a, b] : blocks) {
     const int row = std::max(position_[a], position_[b]), column = std::min(position_[a], position_[b]);
     slot_.push_back(find(row, column));
     turned_.push_back(position_[a] < position_[b]);
+    isFirst_.push_back(!given[slot_.back()]);
+    given[slot_.back()] = 1;
   }
+  fill_.clear();
+  for (std::size_t k = 0; k < given.size(); ++k)
+    if (!given[k]) fill_.push_back(static_cast<int>(k));
   entry_.resize(entryRow_.size());
   diagonal_.resize(rows);
   work_.resize(rows);
 }
 
-void BlockCholesky::setZero() {
-  for (Block6& b : entry_) b.setZero();
-  for (Block6& b : diagonal_) b.setZero();
+void BlockCholesky::clear() {
+  for (const int k : fill_) entry_[k].setZero();
 }
 
 void BlockCholesky::addBlock(int k, const Block6& block) {
-  if (turned_[k]) {
-    entry_[slot_[k]] += block.transpose();
+  Block6& to = entry_[slot_[k]];
+  if (!isFirst_[k]) {
+    to += turned_[k] ? Block6(block.transpose()) : block;
+  } else if (turned_[k]) {
+    to = block.transpose();
   } else {
-    entry_[slot_[k]] += block;
+    to = block;
   }
 }
 

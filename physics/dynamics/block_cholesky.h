@@ -15,9 +15,10 @@ class BlockCholesky {
   // Row and column of the blocks beside the diagonal; either order, repeats add up.
   void analyse(int rows, const std::vector<std::array<int, 2>>& blocks);
 
-  void setZero();
+  // A new matrix: clear(), then all diagonal blocks and, in their order, all of analyse()'s, the k-th in (row, column)
+  // as given there.
+  void clear();
   Block6& diagonal(int row) { return diagonal_[position_[row]]; }
-  // Adds to the k-th of analyse()'s blocks, which stands in (row, column) as given there.
   void addBlock(int k, const Block6& block);
 
   // False where a pivot is not positive: the matrix is not definite, or not finite.
@@ -35,8 +36,10 @@ class BlockCholesky {
   std::vector<Block6> entry_, diagonal_;  // after factorise(): L, and of its diagonal blocks L^-T
   std::vector<int> firstUpdate_;          // per column
   std::vector<Update> updates_;
-  std::vector<int> slot_;     // of analyse()'s blocks: an entry
-  std::vector<char> turned_;  // whether the block goes in transposed
+  std::vector<int> slot_;      // of analyse()'s blocks: an entry
+  std::vector<char> turned_;   // whether the block goes in transposed
+  std::vector<char> isFirst_;  // whether it is its entry's first
+  std::vector<int> fill_;      // entries without any
   mutable std::vector<Vector6> work_;
 };
 

@@ -60,8 +60,8 @@ struct ImplicitData {
   std::vector<int> starPair;                  // in `pairs`; -1 - k: the other way round
   // Of the present iteration.
   std::vector<Block6> diagonal, beside;      // spheres and links alone, per sphere and per pair
-  std::vector<Block6> lumped, lumpedBeside;  // and with surface and loads lumped into them
-  BlockCholesky spheres;                     // of the latter
+  std::vector<Block6> lumped, lumpedBeside;  // and with the surface's share in them
+  BlockCholesky spheres;                     // of the latter and of loads
   std::vector<Vector6> starRate;             // (N/m)^1/2, as starSphere
   std::vector<LoadRow> rows;
   std::vector<int> rowQuad;

@@ -72,30 +72,17 @@ void negate(std::vector<Quad>& q) {
   for (Quad& a : q) store(a, splat(0) - load(a));
 }
 
-// Of every load, the part that each of its spheres would feel alone.
-void lumpRows(const WorldData& d, ImplicitData& s) {
-  const int quads = 2 * d.spheres.count;
-  for (const LoadRow& row : s.rows) {
-    for (int k = row.first; k < row.end; ++k) {
-      const int quad = s.rowQuad[k];
-      if (quad >= quads || quad % 2 != 0) continue;  // a node; the turning half of the sphere before
-      Vector6 c = Vector6::Zero();
-      c.head<3>() = vectorOf(s.rowCoefficient[k]);
-      if (k + 1 < row.end && s.rowQuad[k + 1] == quad + 1) c.tail<3>() = vectorOf(s.rowCoefficient[k + 1]);
-      s.lumped[quad / 2].noalias() += row.weight * c * c.transpose();
-    }
-  }
-}
-
-// Held freedoms: a row and column of the unit matrix.
-void loadFactor(const WorldData& d, ImplicitData& s) {
-  s.spheres.setZero();
+// The preconditioner's matrix: that of spheres, links and the surface's share in them, `diagonal` and `beside`; of held
+// freedoms a row and column of the unit matrix; and of every load the part that each of its spheres would feel alone.
+void loadFactor(const WorldData& d, ImplicitData& s, const std::vector<Block6>& diagonal,
+                const std::vector<Block6>& beside) {
+  s.spheres.clear();
   for (int i = 0; i < d.spheres.count; ++i) {
     Block6& to = s.spheres.diagonal(i);
-    to = s.lumped[i];
+    to = diagonal[i];
     if (!isHeld(s, i)) continue;
     const Vector6 m = blockOf(s.freedom, i);
-    to = m.asDiagonal() * s.lumped[i] * m.asDiagonal();
+    to = m.asDiagonal() * diagonal[i] * m.asDiagonal();
     for (int k = 0; k < 6; ++k)
       if (m[k] == 0) to(k, k) = 1;
   }
@@ -104,11 +91,23 @@ void loadFactor(const WorldData& d, ImplicitData& s) {
     const auto [i, j] = s.pairs[k];
     if (j < 0) continue;
     if (!isHeld(s, i) && !isHeld(s, j)) {
-      s.spheres.addBlock(blocks++, s.lumpedBeside[k]);
+      s.spheres.addBlock(blocks++, beside[k]);
       continue;
     }
     const Vector6 m0 = blockOf(s.freedom, i), m1 = blockOf(s.freedom, j);
-    s.spheres.addBlock(blocks++, m0.asDiagonal() * s.lumpedBeside[k] * m1.asDiagonal());
+    s.spheres.addBlock(blocks++, m0.asDiagonal() * beside[k] * m1.asDiagonal());
+  }
+  const int quads = 2 * d.spheres.count;
+  for (const LoadRow& row : s.rows) {
+    for (int k = row.first; k < row.end; ++k) {
+      const int quad = s.rowQuad[k];
+      if (quad >= quads || quad % 2 != 0) continue;  // a node; the turning half of the sphere before
+      Vector6 c = Vector6::Zero();
+      c.head<3>() = vectorOf(s.rowCoefficient[k]);
+      if (k + 1 < row.end && s.rowQuad[k + 1] == quad + 1) c.tail<3>() = vectorOf(s.rowCoefficient[k + 1]);
+      c = c.cwiseProduct(blockOf(s.freedom, quad / 2));
+      s.spheres.diagonal(quad / 2).noalias() += row.weight * c * c.transpose();
+    }
   }
 }
 
@@ -178,11 +177,14 @@ static void setMasses(const WorldData& d, ImplicitData& s) {
 void assembleSystem(WorldData& d, ImplicitData& s) {
   setMasses(d, s);
   addLinkStiffness(d, s);
-  s.lumped = s.diagonal;
-  s.lumpedBeside = s.beside;
-  addCarriedMass(d, s.carriedMass, s.lumped, s.lumpedBeside);
-  lumpRows(d, s);
-  loadFactor(d, s);
+  if (d.nodes.dynamicEnd > 0) {
+    s.lumped = s.diagonal;
+    s.lumpedBeside = s.beside;
+    addCarriedMass(d, s.carriedMass, s.lumped, s.lumpedBeside);
+    loadFactor(d, s, s.lumped, s.lumpedBeside);
+  } else {
+    loadFactor(d, s, s.diagonal, s.beside);
+  }
   s.spheres.factorise();
 }
 
