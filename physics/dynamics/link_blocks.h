@@ -5,6 +5,13 @@
 // Matrices of three by three in four lanes, and the blocks that four links add to their spheres'.
 namespace medulla {
 
+// How four links stand; as in LinkFrame.
+struct LinkPose {
+  Lanes3 line, n, arm0, arm1, spinAxis0, spinAxis1, spinLever0, spinLever1;
+  Lanes twist, inverseLength;
+};
+LinkPose poseOfLinks(const WorldData& d, std::size_t group);  // link_force.cpp; of the present state
+
 struct Matrix3Lanes {
   Lanes3 row[3];
 };

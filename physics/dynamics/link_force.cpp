@@ -3,6 +3,7 @@
 #include "physics/dynamics/anchor.h"
 #include "physics/dynamics/angles.h"
 #include "physics/dynamics/identified_stages.h"
+#include "physics/dynamics/link_blocks.h"
 #include "physics/dynamics/link_frame.h"
 #include "physics/dynamics/stages.h"
 
@@ -329,6 +330,15 @@ void returnLinkForces(WorldData& d, const Batch& batch) {
                   &d.links.slots[8 * g]);
   }
   returnFrameForces(d, batch);
+}
+
+LinkPose poseOfLinks(const WorldData& d, std::size_t group) {
+  const LinkGroup& link = d.links.groups[group];
+  const SphereLanes s0 = gatherSpheres(d.spheres, link.sphere0, link.restArm0, link.hasArms);
+  const SphereLanes s1 = gatherSpheres(d.spheres, link.sphere1, link.restArm1, link.hasArms);
+  const LinkMeasures m = measure(link, s0, s1, load(d.links.unwoundTwist[group]));
+  return {m.line,          m.n,          s0.arm,       s1.arm,  m.end0.spinAxis,
+          m.end1.spinAxis, m.end0.lever, m.end1.lever, m.twist, m.inverseLength};
 }
 
 // J, of the link in one lane.

@@ -11,7 +11,7 @@ namespace medulla {
 namespace {
 
 // Gradient by the line of what has the gradient `byN` by its direction.
-MEDULLA_INLINE Lanes3 lineGradient(const LinkFrame& f, const Lanes3& byN) {
+MEDULLA_INLINE Lanes3 lineGradient(const LinkPose& f, const Lanes3& byN) {
   return f.inverseLength * fnma(dot(f.n, byN), f.n, byN);
 }
 
@@ -34,7 +34,7 @@ struct EndRows {
   Lanes3 lineA, lineB, turnA, turnB;
 };
 
-MEDULLA_INLINE EndRows endRows(const LinkGroup& g, const Spheres& s, const std::uint32_t* i, const LinkFrame& f) {
+MEDULLA_INLINE EndRows endRows(const LinkGroup& g, const Spheres& s, const std::uint32_t* i, const LinkPose& f) {
   const EndGradients e = endGradients(g, s, i, f.n);
   return {lineGradient(f, e.a), lineGradient(f, e.b), cross(e.a, f.n), cross(e.b, f.n)};
 }
@@ -61,7 +61,7 @@ struct Couples {
   Lanes a, b, sine;
 };
 
-MEDULLA_INLINE Couples couplesOf(const LinkGroup& g, const LinkFrame& f, Lanes damped) {
+MEDULLA_INLINE Couples couplesOf(const LinkGroup& g, const LinkPose& f, Lanes damped) {
   const Lanes largest = squareRoot(_mm256_min_pd(g.flexionU0 * g.flexionV1, g.flexionV0 * g.flexionU1));
   const Lanes couple = select(isLess(largest, g.couple), largest, g.couple);
   Lanes cosine, sine;
@@ -71,7 +71,7 @@ MEDULLA_INLINE Couples couplesOf(const LinkGroup& g, const LinkFrame& f, Lanes d
 }
 
 // What flexions and torsion add.
-MEDULLA_INLINE void addTurning(const LinkGroup& g, const LinkFrame& f, const Spheres& s, Lanes damped, LinkBlocks& m) {
+MEDULLA_INLINE void addTurning(const LinkGroup& g, const LinkPose& f, const Spheres& s, Lanes damped, LinkBlocks& m) {
   const EndRows e0 = endRows(g, s, g.sphere0, f), e1 = endRows(g, s, g.sphere1, f);
   const Couples c = couplesOf(g, f, damped);
   const Lanes minusSine = splat(0) - c.sine;
@@ -106,7 +106,7 @@ MEDULLA_INLINE void addTurning(const LinkGroup& g, const LinkFrame& f, const Sph
 }
 
 // The ends lie on arms, so that turning moves them: turn0 += line x arm0, turn1 += arm1 x line in every gradient.
-MEDULLA_INLINE void addArms(const LinkFrame& f, LinkBlocks& m) {
+MEDULLA_INLINE void addArms(const LinkPose& f, LinkBlocks& m) {
   const Lanes3 back1 = splat(-1) * f.arm1;
   const Matrix3Lanes from0 = transposed(m.line0), from1 = transposed(m.line1);
   m.line0 = m.line0 + rowsCrossed(m.line, f.arm0);
@@ -117,7 +117,7 @@ MEDULLA_INLINE void addArms(const LinkFrame& f, LinkBlocks& m) {
 }
 
 // Of the elongation, and of a tension across the line.
-MEDULLA_INLINE Matrix3Lanes lineStiffness(const LinkGroup& g, const LinkFrame& f, Lanes damped, Lanes h2) {
+MEDULLA_INLINE Matrix3Lanes lineStiffness(const LinkGroup& g, const LinkPose& f, Lanes damped, Lanes h2) {
   Lanes slope, tension;
   elongationLaw(g, squareRoot(dot(f.line, f.line)), slope, tension);
   const Lanes across = h2 * larger(tension, splat(0)) * f.inverseLength;
@@ -127,7 +127,7 @@ MEDULLA_INLINE Matrix3Lanes lineStiffness(const LinkGroup& g, const LinkFrame& f
   return m;
 }
 
-void setStiffness(const LinkGroup& g, const LinkFrame& f, const Spheres& s, double duration, LinkBlocks& m) {
+void setStiffness(const LinkGroup& g, const LinkPose& f, const Spheres& s, double duration, LinkBlocks& m) {
   const Lanes h2 = splat(duration * duration), damped = fma(splat(duration), g.relaxation, h2);
   m.line = lineStiffness(g, f, damped, h2);
   m.line0 = m.line1 = m.turn0 = m.between = m.turn1 = zeroMatrix();
@@ -172,7 +172,7 @@ void addLinkBlocks(const LinkBlocks& m, const int (&pair)[4], ImplicitData& s) {
 void addLinkStiffness(const WorldData& d, ImplicitData& s) {
   for (std::size_t group = 0; group < d.links.groups.size(); ++group) {
     LinkBlocks m;
-    setStiffness(d.links.groups[group], d.links.frames[group], d.spheres, s.duration, m);
+    setStiffness(d.links.groups[group], poseOfLinks(d, group), d.spheres, s.duration, m);
     int pair[4];
     for (int lane = 0; lane < 4; ++lane) {
       const int link = 4 * static_cast<int>(group) + lane;

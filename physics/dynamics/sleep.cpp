@@ -86,10 +86,9 @@ void moveImpulses(const WorldData& d, bool asleep, std::vector<CarriedImpulse>& 
   to = std::move(all);
 }
 
-// Links' frames are for nodes that move by themselves, and for skins that loads act on; implicit steps take them all.
+// Links' frames are for nodes that move by themselves, and for skins that loads act on.
 void shareOutLinkGroups(WorldData& d) {
-  const bool all = d.settings.integrator == Integrator::implicit;
-  std::vector<char> framed(d.links.groups.size(), all ? 1 : 0);
+  std::vector<char> framed(d.links.groups.size(), 0);
   for (std::size_t b = 0; b < d.awake.loadedSkins.size(); ++b) {
     if (!d.awake.loadedSkins[b]) continue;
     for (int k = 0; k < d.ranges[b].linkCount; ++k) framed[(d.ranges[b].firstLink + k) / 4] = 1;
