@@ -129,8 +129,9 @@ struct Identified {
   std::vector<CarriedFrame> carried;  // per frame
   std::vector<IdentifiedLinkGroup> links;
   int linkCount = 0;
-  std::vector<StrainedLinkState> strained;  // as links, of the current substep; empty where no body has strains
-  std::vector<double> strains;              // per frame, likewise: (N m)^1/2, of its cell
+  std::vector<StrainedLinkState> strained;   // as links, of the current substep; empty where no body has strains
+  std::vector<double> strains;               // per frame, likewise: (N m)^1/2, of its cell
+  mutable std::vector<double> stillStrains;  // the same without rates, while an energy is summed up
   std::vector<SkinHost> hosts;
   std::vector<SkinTerms> terms;
   std::vector<SkinTermState> termStates;  // of the current substep

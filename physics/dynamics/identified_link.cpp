@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "physics/dynamics/identified_measures.h"
 #include "physics/dynamics/identified_stages.h"
 
@@ -136,16 +138,18 @@ void returnFrameForces(WorldData& d, const Batch& batch) {
 
 double identifiedLinkEnergy(const Identified& s, const IdentifiedBody& body) {
   double sum = 0;
-  std::vector<double> strains(s.frames.size(), 0);
+  s.stillStrains.resize(s.frames.size());
+  const auto first = s.stillStrains.begin() + body.firstFrame, end = s.stillStrains.begin() + body.endFrame;
+  std::fill(first, end, 0);
   for (int g = body.firstLinkGroup; g < body.endLinkGroup; ++g) {
     const IdentifiedLinkGroup& link = s.links[g];
     const LinkTurn m = turnOf(link, s.frames.data());
     const LinkMeasures6 measures{fma(m.hyper - m.along, link.along, m.t), m.w};
     const MeasureForces forces = forcesOn(link, measures);
     sum += 0.5 * sumOfLanes(dot(measures.t, forces.onT) + dot(measures.w, forces.onW));
-    addStrains(link, measures, strains.data());
+    addStrains(link, measures, s.stillStrains.data());
   }
-  for (const double strain : strains) sum += 0.5 * strain * strain;
+  for (auto strain = first; strain != end; ++strain) sum += 0.5 * *strain * *strain;
   return sum;
 }
 

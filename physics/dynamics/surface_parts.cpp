@@ -179,22 +179,21 @@ void partsChanged(WorldData& d) {
   listAwake(d);
 }
 
-// Parts that loads act on, and those beside them.
-std::vector<char> loadedParts(const WorldData& d, const Loads& loads) {
-  std::vector<char> loaded(d.surface.parts.size(), 0);
+// Wanted are the parts that loads act on, and those beside them.
+void wantLoadedParts(WorldData& d, const Loads& loads) {
+  for (SurfacePart& part : d.surface.parts) part.isWanted = false;
   const auto add = [&](int body, int node) {
     const int index = d.ranges[body].node[node];
     if (isSkin(d, index)) return;
-    const int part = d.surface.ofGroup[index / 4];
-    loaded[part] = 1;
-    for (const int beside : d.surface.parts[part].neighbours) loaded[beside] = 1;
+    SurfacePart& part = d.surface.parts[d.surface.ofGroup[index / 4]];
+    part.isWanted = true;
+    for (const int beside : part.neighbours) d.surface.parts[beside].isWanted = true;
   };
   for (const ToolSpring& t : loads.toolSprings)
     for (const int node : t.nodes) add(t.body, node);
   for (const HeldNode& held : loads.heldNodes) add(held.body, held.node);
   for (std::size_t b = 0; b < d.bodies.size(); ++b)
     for (const DeadLoad& load : d.bodies[b].deadLoads) add(static_cast<int>(b), load.node);
-  return loaded;
 }
 
 // Shifts of the part's nodes that move. Returns the largest of those that have the choice, m.
@@ -281,11 +280,10 @@ void layOutSurfaceParts(WorldData& d, const std::vector<BodyMechanics>& mechanic
 
 void moveLoadedParts(WorldData& d, const Loads& loads) {
   if (!hasChoice(d.surface)) return;
-  const std::vector<char> loaded = loadedParts(d, loads);
+  wantLoadedParts(d, loads);
   bool changed = false;
-  for (std::size_t k = 0; k < loaded.size(); ++k) {
-    SurfacePart& part = d.surface.parts[k];
-    if (!loaded[k] || part.moves) continue;
+  for (SurfacePart& part : d.surface.parts) {
+    if (!part.isWanted || part.moves) continue;
     part.moves = changed = true;
     part.quietFrames = 0;
   }
@@ -304,26 +302,30 @@ HostRange movingRange(const WorldData& d, std::size_t part) {
 void chooseSurfaceParts(WorldData& d, const Loads& loads) {
   if (!hasChoice(d.surface)) return;
   std::vector<SurfacePart>& parts = d.surface.parts;
-  std::vector<char> wanted = loadedParts(d, loads), beside(parts.size(), 0);
-  std::vector<double> unrest(parts.size(), 0);
+  wantLoadedParts(d, loads);
+  for (SurfacePart& part : parts) {
+    part.isBeside = false;
+    part.shifted = 0;
+  }
   for (std::size_t k = 0; k < parts.size(); ++k) {
     const bool moves = parts[k].moves || parts[k].firstChoice > rangeOf(d, k).firstGroup;
     if (!moves || parts[k].neighbours.empty()) continue;
-    unrest[k] = measureShifts(d, k);
-    for (const int other : parts[k].neighbours) beside[other] = 1;
+    parts[k].shifted = measureShifts(d, k);
+    for (const int other : parts[k].neighbours) parts[other].isBeside = true;
   }
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    if (parts[k].moves) continue;
-    if (!beside[k]) clearShifts(d, k);
-    if (beside[k] && balanceShifts(d, k) > parts[k].unrest) wanted[k] = 1;
+    SurfacePart& part = parts[k];
+    if (part.moves) continue;
+    if (!part.isBeside) clearShifts(d, k);
+    if (part.isBeside && balanceShifts(d, k) > part.unrest) part.isWanted = true;
   }
   bool changed = false;
   for (std::size_t k = 0; k < parts.size(); ++k) {
     SurfacePart& part = parts[k];
     if (part.always) continue;
-    const bool quiet = !wanted[k] && unrest[k] < kQuiet * part.unrest;
+    const bool quiet = !part.isWanted && part.shifted < kQuiet * part.unrest;
     part.quietFrames = quiet ? part.quietFrames + 1 : 0;
-    if (!part.moves && wanted[k]) {
+    if (!part.moves && part.isWanted) {
       part.moves = changed = true;
     } else if (part.moves && part.quietFrames > kQuietFrames) {
       carry(d, k);

@@ -300,11 +300,9 @@ Energies World::energies() const {
 
 double World::volumeRatio(int body) const {
   const BodyRange& r = data_->ranges.at(body);
-  std::vector<Eigen::Vector3d> x;
-  x.reserve(r.node.size());
-  for (const int i : r.node) x.push_back(vectorAt(data_->nodes.position, i));
+  const auto at = [&](int node) { return vectorAt(data_->nodes.position, r.node[node]); };
   double volume = 0;
-  for (const auto& t : data_->bodies[body].model->triangles) volume += x[t[0]].dot(x[t[1]].cross(x[t[2]]));
+  for (const auto& t : data_->bodies[body].model->triangles) volume += at(t[0]).dot(at(t[1]).cross(at(t[2])));
   return volume / (6 * r.restVolume);
 }
 

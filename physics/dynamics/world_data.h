@@ -225,6 +225,8 @@ struct SurfacePart {            // of one host; part k is that of Nodes::onLinks
   std::vector<int> neighbours;  // parts that edges join to this one, itself included
   double unrest = 0;            // m: it moves where its neighbours' edges would shift a node of it by more
   double heldBulk = 0;          // N/m5: HostRange::bulk where the groups that have the choice hang still and give way
+  bool isWanted = false, isBeside = false;  // while parts are chosen: it is to move; it is beside one that moves
+  double shifted = 0;                       // m, likewise: by how much its nodes that move are
 };
 
 // A sphere without any node's mass, kg and kg m2 in its frame; what a carried node adds.
