@@ -238,8 +238,7 @@ Buckets::Buckets(const std::vector<std::shared_ptr<const SoftBodyModel>>& bodies
   surface.to.resize(surface.bodyOfNode.size());
   copyNodes(rest, surface.from);
   copyNodes(rest, surface.to);
-  surface.stepBefore.assign(surface.from.size(), Vector3d::Zero());
-  surface.step = surface.stepBefore;
+  for (auto& step : surface.steps) step.assign(surface.from.size(), Vector3d::Zero());
   for (std::size_t k = 0; k < data_->buckets.size(); ++k) {
     Bucket& bucket = data_->buckets[k];
     bucket.surface = &surface;
@@ -262,14 +261,16 @@ const BlendedSurface& Buckets::surface() const {
 
 // ---- Dynamics side ---------------------------------------------------------------------------------------
 
-void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<Vector3d>& stepBefore) {
+void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to,
+                     const std::array<std::vector<Vector3d>, 3>& stepsBefore) {
   BlendedSurface& surface = data_->surface;
-  assert(stepBefore.size() == surface.step.size());
+  assert(stepsBefore[0].size() == surface.from.size());
   copyNodes(from, surface.from);
   copyNodes(to, surface.to);
   surface.duration = to.time - from.time;
-  surface.stepBefore = stepBefore;
-  for (std::size_t n = 0; n < surface.step.size(); ++n) surface.step[n] = surface.to[n] - surface.from[n];
+  surface.steps[2] = stepsBefore[1];
+  surface.steps[1] = stepsBefore[0];
+  for (std::size_t n = 0; n < surface.from.size(); ++n) surface.steps[0][n] = surface.to[n] - surface.from[n];
   for (Bucket& bucket : data_->buckets) {
     data_->bounds[bucket.index] = boundingSphere(bucket);
     bucket.fitted = false;

@@ -20,13 +20,17 @@ struct BlendedSurface {
   // The triangles of node n: trianglesOfNode[firstTriangleOfNode[n]] up to those of n + 1.
   std::vector<int> firstTriangleOfNode, trianglesOfNode;
   std::vector<Eigen::Vector3d> from, to;  // m, world, per node
-  // m, what each node moved in the frame before `from`, and from `from` to `to`
-  std::vector<Eigen::Vector3d> stepBefore, step;
+  // m, what each node moved from `from` to `to`, in the frame before and in the one before that
+  std::array<std::vector<Eigen::Vector3d>, 3> steps;
   double duration = 0;  // s, between the two frames
 
   Eigen::Vector3d node(int n, double alpha) const { return blendPoint(from[n], to[n], alpha); }
   // What a node moves within one frame at its present velocity, m; continuous from frame to frame.
-  Eigen::Vector3d nodeStep(int n, double alpha) const { return blendPoint(stepBefore[n], step[n], alpha); }
+  Eigen::Vector3d nodeStep(int n, double alpha) const { return blendPoint(steps[1][n], steps[0][n], alpha); }
+  // By how far it is by now ahead of its place at alpha, at its present acceleration; continuous likewise.
+  Eigen::Vector3d nodeLead(int n, double alpha) const {
+    return blendPoint(2 * steps[1][n] - steps[2][n], 2 * steps[0][n] - steps[1][n], alpha);
+  }
   Triangle triangle(int t, double alpha) const {
     const auto& [a, b, c] = triangles[t];
     return {node(a, alpha), node(b, alpha), node(c, alpha)};
@@ -55,9 +59,10 @@ class Buckets {
 
   const BlendedSurface& surface() const;
 
-  // The two frames to blend from now on, and what each node moved in the frame before (m). Bounding spheres are renewed
-  // around both frames; Embree's bounds only by refitNear().
-  void commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<Eigen::Vector3d>& stepBefore);
+  // The two frames to blend from now on, and the steps (BlendedSurface) of the commit before. Bounding spheres are
+  // renewed around both frames; Embree's bounds only by refitNear().
+  void commit(const DynamicsFrame& from, const DynamicsFrame& to,
+              const std::array<std::vector<Eigen::Vector3d>, 3>& stepsBefore);
   // Renews Embree's bounds in the buckets within largestRadius + `distance` (m) of `centre`. Buckets that are left out
   // are searched triangle by triangle, with the same result.
   void refitNear(const Eigen::Vector3d& centre, double distance);

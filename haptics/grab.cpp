@@ -45,4 +45,11 @@ Eigen::Vector3d meanHeldStep(const BlendedSurface& surface, double alpha, const 
   return sum / double(grip.held.size());
 }
 
+Eigen::Vector3d meanHeldLead(const BlendedSurface& surface, double alpha, const Grip& grip) {
+  assert(!grip.held.empty());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const HeldOffset& held : grip.held) sum += surface.nodeLead(held.node, alpha);
+  return sum / double(grip.held.size());
+}
+
 }  // namespace medulla

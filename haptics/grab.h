@@ -37,8 +37,9 @@ inline Eigen::Vector3d heldTarget(const ToolSample& device, const HeldOffset& he
 }
 
 // Mean over the held nodes of node minus target, m: the springs share the tool's stiffness equally, so stiffness times
-// this is the force on the tool. And the mean of their steps (BlendedSurface::nodeStep).
+// this is the force on the tool. And the means of their steps and leads (BlendedSurface).
 Eigen::Vector3d meanHeldGap(const BlendedSurface& surface, double alpha, const ToolSample& device, const Grip& grip);
 Eigen::Vector3d meanHeldStep(const BlendedSurface& surface, double alpha, const Grip& grip);
+Eigen::Vector3d meanHeldLead(const BlendedSurface& surface, double alpha, const Grip& grip);
 
 }  // namespace medulla

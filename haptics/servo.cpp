@@ -38,7 +38,7 @@ struct Tool {
 
 struct Servo::Data {
   TripleBuffer<Buckets> surfaces;
-  std::vector<Vector3d> lastStep;  // dynamics' side: of the nodes, in the frame committed last
+  std::array<std::vector<Vector3d>, 3> steps;  // dynamics' side: of the surface committed last
   double tickDuration;
   double alpha = 0;  // of the last tick
   std::vector<Tool> tools;
@@ -92,10 +92,10 @@ static Vector3d meanContactStep(const BlendedSurface& surface, double alpha, con
 // dynamics: the proxy's own, differenced over ticks, would jump at every edge. And the lead: the blended surface is one
 // frame late, by just the step that it moves in a frame; uncorrected, a device that presses at speed v feels k v T too
 // much, on soft tissue several times the tissue's own force.
-static Vector3d motionForce(const ToolSettings& tool, const Vector3d& step, double frameDuration,
+static Vector3d motionForce(const ToolSettings& tool, const Vector3d& lead, const Vector3d& step, double frameDuration,
                             const Vector3d& deviceVelocity) {
   const Vector3d velocity = frameDuration > 0 ? Vector3d(step / frameDuration) : Vector3d::Zero();
-  return tool.stiffness * step + tool.damping * (velocity - deviceVelocity);
+  return tool.stiffness * lead + tool.damping * (velocity - deviceVelocity);
 }
 
 // The coupling of a contact that pushes, or that the tool is leaving: along the normal the spring, negative once the
@@ -114,7 +114,7 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   const double spring = tool.settings.stiffness * depth;
   tool.largestPush = std::max(tool.largestPush, spring);
   const Vector3d step = isPressed ? meanContactStep(surface, alpha, proxy) : contactStep(surface, alpha, last);
-  const Vector3d motion = motionForce(tool.settings, step, surface.duration, deviceVelocity);
+  const Vector3d motion = motionForce(tool.settings, step, step, surface.duration, deviceVelocity);
   const double push = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
   return push * normal + (proxy.slipping ? Vector3d::Zero() : tangential(motion, normal));
 }
@@ -122,7 +122,8 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
 static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Tool& tool,
                           const Vector3d& deviceVelocity) {
   return tool.settings.stiffness * meanHeldGap(surface, alpha, tool.device, tool.grip) +
-         motionForce(tool.settings, meanHeldStep(surface, alpha, tool.grip), surface.duration, deviceVelocity);
+         motionForce(tool.settings, meanHeldLead(surface, alpha, tool.grip), meanHeldStep(surface, alpha, tool.grip),
+                     surface.duration, deviceVelocity);
 }
 
 // In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
@@ -217,8 +218,8 @@ bool Servo::beginFrame() {
 void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<ToolState>& tools) {
   constexpr double kTravel = 0.02;  // m that a tool moves in a frame at 1 m/s and 50 Hz
   Buckets& buckets = data_->surfaces.writing();
-  buckets.commit(from, to, data_->lastStep);
-  data_->lastStep = buckets.surface().step;
+  buckets.commit(from, to, data_->steps);
+  data_->steps = buckets.surface().steps;
   for (const ToolState& tool : tools) buckets.refitNear(tool.proxy, (tool.device - tool.proxy).norm() + kTravel);
   data_->surfaces.publish();
 }
@@ -370,7 +371,7 @@ Servo::Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSet
     : data_(new Data{makeSurfaces(bodies, tools, rest, embree), {}, tickDuration, 0, {}, {}, {}}) {
   assert(tools.size() == start.size() && tickDuration > 0);
   const Buckets& buckets = data_->surfaces.reading();
-  data_->lastStep.assign(buckets.surface().from.size(), Vector3d::Zero());
+  data_->steps = buckets.surface().steps;
   data_->contacts.reserve(contactPatchCapacity);
   data_->tools.reserve(tools.size());
   data_->states.reserve(tools.size());

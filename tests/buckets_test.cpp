@@ -111,7 +111,7 @@ TEST(Buckets, SweepsEqualBruteForceBitForBitForAnyNumberOfBuckets) {
   for (const int count : {1, 7, 40}) {
     const TouchShape shape = ellipsoid(18, 14, count);
     Buckets buckets({shape}, 0.003, frameAt(*shape, 0));
-    const std::vector<Vector3d> still(shape->restNodes.size(), Vector3d::Zero());
+    const auto still = buckets.surface().steps;
     for (int frame = 0; frame < 5; ++frame) {
       buckets.commit(frameAt(*shape, frame, wave), frameAt(*shape, frame + 1, wave), still);
       if (frame % 2 == 0) buckets.refitNear(Vector3d::Zero(), 0.1);  // others are searched triangle by triangle
