@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
 #include "app/commands/commands.h"
@@ -25,7 +26,8 @@ BuildOptions buildOptions(const BuildArguments& a) {
   if (!options.fine.empty() && options.fine.size() != options.meshes.size())
     usageError("--fine", options.fine.back(),
                fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
-  options.identification.links = a.linkForm == "full" ? LinkForm::full : LinkForm::diagonal;
+  const auto form = std::find(kLinkForms.begin(), kLinkForms.end(), a.linkForm);
+  options.identification.links = static_cast<LinkForm>(form - kLinkForms.begin());
   if (options.identify && options.meshes.size() > 1)
     usageError("--identify", "", fmt::format("a single mesh, not {}", options.meshes.size()));
   return options;
@@ -45,8 +47,10 @@ void addIdentification(CLI::App& c, BuildArguments& a) {
   c.add_option("--poisson", a.options.identification.poisson, "Poisson's ratio of the tissue, 0 to less than 0.5")
       ->needs(identify)
       ->capture_default_str();
-  c.add_option("--link-form", a.linkForm, "six scalars per link, or any stiffness between its two frames")
-      ->check(CLI::IsMember({"diagonal", "full"}))
+  c.add_option("--link-form", a.linkForm,
+               "six scalars per link; any stiffness between its two frames; and one that couples the links of a cell: "
+               "nearer, with shorter substeps")
+      ->check(CLI::IsMember(std::vector<std::string>(kLinkForms.begin(), kLinkForms.end())))
       ->needs(identify)
       ->capture_default_str();
 }

@@ -43,9 +43,8 @@ std::string repeatingCommand(const BuildJob& job, const BuildOptions& options) {
   if (options.unit != "m") command += " --unit " + options.unit;
   if (!job.finePath.empty()) command += " --fine " + fs::path(job.finePath).filename().string();
   if (options.identify) {
-    const bool full = options.identification.links == LinkForm::full;
-    command += fmt::format(" --identify --poisson {} --link-form {}", options.identification.poisson,
-                           full ? "full" : "diagonal");
+    const char* form = kLinkForms[static_cast<std::size_t>(options.identification.links)];
+    command += fmt::format(" --identify --poisson {} --link-form {}", options.identification.poisson, form);
     for (const FixedPatch& patch : job.model.identified->patches) command += " --fix " + patch.region;
   }
   return command;

@@ -154,16 +154,16 @@ Matrix6d measured(const MatrixXd& m, const IdentifiedLink& link, const Matrix6x1
 // compliance that finite elements give its measures; and with the whole triangle two vectors s in strain = T s.
 class LinkFit {
  public:
-  LinkFit(const MatrixXd& compliance, const MatrixXd& grounding, double lengthScale, LinkForm form, bool strained,
+  LinkFit(const MatrixXd& compliance, const MatrixXd& grounding, double lengthScale, LinkForm form,
           std::vector<IdentifiedLink>& links)
       : compliance_(compliance),
         grounding_(grounding),
         links_(links),
         frames_(static_cast<int>(compliance.rows() / 6)) {
     for (int b = 0; b < 6; ++b) {
-      for (int a = b; a < (form == LinkForm::full ? 6 : b + 1); ++a) places_.push_back({a, b});
+      for (int a = b; a < (form == LinkForm::diagonal ? b + 1 : 6); ++a) places_.push_back({a, b});
     }
-    perLink_ = static_cast<Index>(places_.size()) + (strained ? 12 : 0);
+    perLink_ = static_cast<Index>(places_.size()) + (form == LinkForm::full ? 12 : 0);
     for (const IdentifiedLink& link : links) {
       measures_.push_back(linkMeasures(link, lengthScale));
       const Matrix6d h = measured(compliance, link, measures_.back(), frames_);
@@ -316,11 +316,11 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double leng
     descend(value(fit, 1, 0), {warmUp}, at);
     return descend(value(fit, klWeight, responseWeight), {iterations}, at);
   };
-  const LinkFit plain(compliance, grounding, lengthScale, form, false, links);
+  const LinkFit plain(compliance, grounding, lengthScale, std::min(form, LinkForm::uncoupled), links);
   VectorXd x = plain.start();
   const double reached = minimise(plain, x);
   if (form == LinkForm::full && !inARow) {
-    const LinkFit strained(compliance, grounding, lengthScale, form, true, links);
+    const LinkFit strained(compliance, grounding, lengthScale, form, links);
     VectorXd both = strained.startAt(plain.start());
     if (minimise(strained, both) < reached) {
       strained.setLinks(both);
