@@ -1,11 +1,12 @@
 #include "physics/dynamics/identified_mechanics.h"
-#include "physics/model/cross_matrix.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+
+#include "physics/model/cross_matrix.h"
 
 namespace medulla {
 

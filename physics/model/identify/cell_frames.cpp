@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "physics/model/cross_matrix.h"
+
 namespace medulla {
 
 using Eigen::Index;
@@ -65,12 +67,6 @@ void integrate(const VoxelSolid& solid, const std::vector<int>& frameOfPiece, co
   }
 }
 
-Matrix3d cross(const Vector3d& r) {
-  Matrix3d m;
-  m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
-  return m;
-}
-
 // The cell's motion N = (1 / V; lengthScale J^-1 r x) of its held pieces' displacements: integral N N^T over stiffness.
 Matrix6d giveOf(const RawCell& cell, const RawCell& held, double stiffness, double lengthScale) {
   const Matrix3d inverse = lengthScale * inertia(cell.secondMoment).inverse();
@@ -80,7 +76,7 @@ Matrix6d giveOf(const RawCell& cell, const RawCell& held, double stiffness, doub
                           held.volume * cell.centroid * cell.centroid.transpose();
   Matrix6d out;
   out.topLeftCorner<3, 3>() = held.volume / (cell.volume * cell.volume) * Matrix3d::Identity();
-  out.bottomLeftCorner<3, 3>() = inverse * cross(first) / cell.volume;
+  out.bottomLeftCorner<3, 3>() = inverse * crossMatrix(first) / cell.volume;
   out.topRightCorner<3, 3>() = out.bottomLeftCorner<3, 3>().transpose();
   out.bottomRightCorner<3, 3>() = inverse * inertia(second) * inverse;
   return out / stiffness;
@@ -116,10 +112,10 @@ CellFrames makeCellFrames(const TriangleMesh& mesh, const std::vector<Ball>& bal
     for (const SharedPart& part : parts[c]) {
       const RawCell& cell = raw[part.frame];
       // The voxels' centroid is not quite the frame's place: t is carried over by theta.
-      const Matrix3d carry = cross(origin + cell.centroid - out.frames[part.frame].restPosition);
+      const Matrix3d carry = crossMatrix(origin + cell.centroid - out.frames[part.frame].restPosition);
       for (int a = 0; a < kHexNodes; ++a) {
         const Matrix3d turn =
-            inverseInertia[part.frame] * cross(part.shapeTimesPosition[a] - part.shape[a] * cell.centroid);
+            inverseInertia[part.frame] * crossMatrix(part.shapeTimesPosition[a] - part.shape[a] * cell.centroid);
         const Matrix3d move = part.shape[a] / cell.volume * Matrix3d::Identity() + carry * turn;
         for (int i = 0; i < 3; ++i) {
           for (int j = 0; j < 3; ++j) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <set>
 
+#include "physics/model/cross_matrix.h"
 #include "physics/model/identify/lbfgs.h"
 #include "physics/model/identify/skin_fit.h"
 #include "physics/model/symmetric_eigen.h"
@@ -55,12 +56,6 @@ std::vector<double> heldAreas(const TriangleMesh& mesh, const CellFrames& cells,
   return areas;
 }
 
-Matrix3d cross(const Vector3d& r) {
-  Matrix3d m;
-  m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
-  return m;
-}
-
 }  // namespace
 
 std::vector<IdentifiedLink> layOutLinks(const TriangleMesh& mesh, const CellFrames& cells,
@@ -93,7 +88,7 @@ std::vector<IdentifiedLink> layOutLinks(const TriangleMesh& mesh, const CellFram
 
 Matrix6x12d linkMeasures(const IdentifiedLink& link, double lengthScale) {
   Matrix6x12d g = Matrix6x12d::Zero();
-  const Matrix3d bend = link.axes * cross(link.restPoint1 - link.restPoint0) / (2 * lengthScale);
+  const Matrix3d bend = link.axes * crossMatrix(link.restPoint1 - link.restPoint0) / (2 * lengthScale);
   g.block<3, 3>(0, 0) = -link.axes;
   g.block<3, 3>(0, 3) = bend;
   g.block<3, 3>(0, 6) = link.axes;
