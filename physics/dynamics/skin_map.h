@@ -115,7 +115,8 @@ MEDULLA_INLINE void addScaled(const float (&factor)[4], const double* numbers, c
   if (withRates) put(fma(f, broadcastThree(rates), to.rate), to.rate);
 }
 
-// Twelve sums at a time are what the registers hold, and as many do not wait for each other: ways first, then turns.
+// Twelve sums at a time are what the registers hold, and as many do not wait for each other: those of the maps first,
+// then what a way does along its line and the nodes' own turns.
 template <bool withRates>
 MEDULLA_INLINE SkinPlace placeSkin(const Identified& s, const SkinGroup& g, const SkinTermState* states) {
   const Lanes zero = splat(0);
