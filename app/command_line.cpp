@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "app/commands/commands.h"
+#include "app/files/joined.h"
 #include "app/files/number_text.h"
 #include "app/files/output_file.h"
 #include "app/interrupt.h"

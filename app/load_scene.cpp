@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "app/files/input_error.h"
+#include "app/files/joined.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/recording_file.h"
@@ -166,9 +167,7 @@ static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene&
 static void requireLook(const Scene& scene, int line, const std::string& look) {
   const std::vector<std::string> known = lookNames();
   if (std::find(known.begin(), known.end(), look) != known.end()) return;
-  std::string expected;  // by hand: g++ 12 sees an overflow in fmt::join where there is none
-  for (const std::string& name : known) expected += (expected.empty() ? "" : ", ") + name;
-  throw inputError(scene.path, line, fmt::format("unknown look \"{}\": expected {}", look, expected));
+  throw inputError(scene.path, line, fmt::format("unknown look \"{}\": expected {}", look, joined(known, ", ")));
 }
 
 static Trajectory loadTrajectory(const Scene& scene, SceneTool& tool) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "app/files/joined.h"
 #include "app/files/xml_element.h"
 
 namespace medulla {
@@ -23,17 +24,12 @@ const std::vector<ShownPart>& shownParts() {
   return parts;
 }
 
-std::string joined(const std::vector<std::string>& names, const std::string& separator) {
-  std::string list;  // by hand: g++ 12 sees an overflow in fmt::join where there is none
-  for (const std::string& name : names) list += (list.empty() ? "" : separator) + name;
-  return list;
-}
-
 static const ShownPart& findPart(const std::string& name) {
   const std::vector<ShownPart>& parts = shownParts();
   const auto found = std::find_if(parts.begin(), parts.end(), [&](const ShownPart& p) { return name == p.name; });
   if (found != parts.end()) return *found;
   std::vector<std::string> known;
+  known.reserve(parts.size());
   for (const ShownPart& p : parts) known.emplace_back(p.name);
   throw std::invalid_argument(joined(known, ", ") + "; did you mean \"" + nearestName(name, known) + "\"?");
 }

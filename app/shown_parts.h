@@ -28,8 +28,6 @@ Shown readShown(const std::vector<std::string>& names);
 
 std::string namesOf(const Shown& shown);  // comma-separated; what readShown() would need
 
-std::string joined(const std::vector<std::string>& names, const std::string& separator);
-
 bool namesModelPart(const std::vector<std::string>& names);
 
 }  // namespace medulla

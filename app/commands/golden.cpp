@@ -129,6 +129,7 @@ std::vector<Moment> renderMoments(const std::string& path, const std::string& co
   renderedWith = renderer.description();
   const SceneView view(loaded, simulation.current(), renderer);
   std::vector<double> times;
+  times.reserve(moments.size());
   for (const Moment& moment : moments) times.push_back(moment.frame / scene.fps);
   PictureTimes pictures(times, 0);
   Picture picture;

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <sstream>
 
+#include "app/files/joined.h"
 #include "app/files/mesh_file.h"
 #include "app/files/placement.h"
 
@@ -19,9 +20,8 @@ std::size_t readNamed(const XmlElement& element, const std::string& attribute, c
   const std::string name = readText(element, attribute, fallback);
   const auto found = std::find(known.begin(), known.end(), name);
   if (found != known.end()) return static_cast<std::size_t>(found - known.begin());
-  std::string list;  // by hand: g++ 12 sees an overflow in fmt::join where there is none
-  for (const std::string& k : known) list += (list.empty() ? "" : ", ") + k;
-  refuse(element, attribute, fmt::format("did you mean \"{}\"? known: {}", nearestName(name, known), list));
+  refuse(element, attribute,
+         fmt::format("did you mean \"{}\"? known: {}", nearestName(name, known), joined(known, ", ")));
 }
 
 const XmlElement& childOf(const XmlElement& parent, const std::string& name) {

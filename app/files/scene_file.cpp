@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "app/files/content_hash.h"
+#include "app/files/joined.h"
 #include "app/files/placement.h"
 #include "app/files/scene_overrides.h"
 #include "app/files/scene_rules.h"
@@ -135,11 +136,9 @@ NodeChoice readNodeChoice(const XmlElement& e, const std::vector<std::string>& o
   std::vector<std::string> ways = others;
   ways.insert(ways.end(), {"box", "sphere", "plane", "vertices"});
   const auto given = [&](const std::string& way) { return e.find(way) != nullptr; };
-  if (std::count_if(ways.begin(), ways.end(), given) != 1) {
-    std::string list;  // by hand: g++ 12 sees an overflow in fmt::join where there is none
-    for (const std::string& way : ways) list += (list.empty() ? "" : ", ") + way;
-    throw std::runtime_error(fmt::format("{}: <{}> says where by one attribute of {}", e.where, e.name, list));
-  }
+  if (std::count_if(ways.begin(), ways.end(), given) != 1)
+    throw std::runtime_error(
+        fmt::format("{}: <{}> says where by one attribute of {}", e.where, e.name, joined(ways, ", ")));
   NodeChoice choice;
   choice.region = readRegion(e);
   if (e.find("vertices")) choice.verticesPath = readPath(e, "vertices", scenePath);

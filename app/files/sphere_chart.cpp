@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "app/files/joined.h"
 #include "app/files/output_file.h"
 
 namespace medulla {
@@ -69,7 +70,7 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
         "$rows using 1:5 axes x1y2 with linespoints lw 2 pt 11 ps 0.7 lc '#009e73' title 'cost (right)'");
   }
   if (anyFailed) plots.emplace_back("$rows using 1:6 with points pt 2 ps 1 lw 2 lc '#555555' title 'failed'");
-  return fmt::format("{}plot {}\n", out, fmt::join(plots, ", \\\n  "));
+  return fmt::format("{}plot {}\n", out, joined(plots, ", \\\n  "));
 }
 
 }  // namespace medulla

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <span>
+#include <string_view>
 
 #include "app/files/csv_rows.h"
 #include "app/files/input_error.h"
+#include "app/files/joined.h"
 #include "app/files/text_file.h"
 
 namespace medulla {
@@ -16,12 +18,6 @@ namespace {
 
 constexpr std::array<std::string_view, 1> kVertexColumns = {"vertex"};
 constexpr std::array<std::string_view, 4> kForceColumns = {"vertex", "fx[N]", "fy[N]", "fz[N]"};
-
-std::string joined(std::span<const std::string_view> names) {
-  std::string out;
-  for (const std::string_view name : names) out.append(out.empty() ? "" : ",").append(name);
-  return out;
-}
 
 // A header may leave the units away.
 bool isHeader(std::span<const std::string_view> cells, std::span<const std::string_view> columns) {
@@ -40,14 +36,14 @@ void forEachVertex(std::string_view text, const std::string& name, const SoftBod
   for (; rows.next(); first = false) {
     if (first && isHeader(rows.cells(), columns)) continue;
     if (rows.cells().size() != columns.size())
-      rows.fail(fmt::format("{} columns in this row, expected {}", rows.cells().size(), joined(columns)));
+      rows.fail(fmt::format("{} columns in this row, expected {}", rows.cells().size(), joined(columns, ",")));
     const int vertex = rows.index(0, columns[0], model.nodeOfInputVertex.size());
     const int node = model.nodeOfInputVertex[vertex];
     if (node < 0) rows.fail(fmt::format("vertex {} is none of the surface: repair dropped it from the mesh", vertex));
     row(rows, node);
     any = true;
   }
-  if (!any) throw inputError(name, 0, fmt::format("no rows, expected at least one of {}", joined(columns)));
+  if (!any) throw inputError(name, 0, fmt::format("no rows, expected at least one of {}", joined(columns, ",")));
 }
 
 }  // namespace

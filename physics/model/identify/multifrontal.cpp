@@ -21,8 +21,7 @@ double operations(double own, double all) {
 
 class Dissector {
  public:
-  Dissector(const HexGrid& grid, DissectionPlan& plan)
-      : grid_(grid), plan_(plan), first_(grid.nodes.size(), -1), last_(grid.nodes.size(), -1) {
+  explicit Dissector(const HexGrid& grid) : grid_(grid), first_(grid.nodes.size(), -1), last_(grid.nodes.size(), -1) {
     plan_.nodes = static_cast<int>(grid.nodes.size());
     plan_.cellOrder.resize(grid.cells.size());
     std::iota(plan_.cellOrder.begin(), plan_.cellOrder.end(), 0);
@@ -35,6 +34,8 @@ class Dissector {
     }
     for (Front& front : plan_.fronts) gatherNodes(front);
   }
+
+  DissectionPlan takePlan() { return std::move(plan_); }
 
  private:
   // Splits along the longest axis by the plane that leaves the halves most equal; returns the first cell beyond it.
@@ -99,7 +100,7 @@ class Dissector {
   }
 
   const HexGrid& grid_;
-  DissectionPlan& plan_;
+  DissectionPlan plan_;
   std::vector<int> first_, last_;  // of each node's cells, places in cellOrder
 };
 
@@ -143,9 +144,7 @@ void gather(const RowMatrix& x, const int* nodes, Index count, RowMatrix& rows) 
 }  // namespace
 
 DissectionPlan planDissection(const HexGrid& grid) {
-  DissectionPlan plan;
-  Dissector(grid, plan);
-  return plan;
+  return Dissector(grid).takePlan();
 }
 
 FrontFactors factorise(const DissectionPlan& plan, const HexGrid& grid,
