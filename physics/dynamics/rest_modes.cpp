@@ -8,8 +8,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "physics/dynamics/identified_mechanics.h"
-#include "physics/dynamics/rest_measures.h"
+#include "physics/dynamics/rest_model.h"
 
 namespace medulla {
 
@@ -19,276 +18,6 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
-
-class RestModel {
- public:
-  RestModel(const BodyDescription& body, const BodyMechanics& mechanics)
-      : model_(*body.model),
-        mechanics_(mechanics),
-        rows_(measureRows(*body.model, mechanics)),
-        strains_(strainRows(*body.model, mechanics)),
-        isBeam_(body.links == LinkModel::beam),
-        thinning_(isBeam_ ? body.tissue.poisson : 0),
-        spheres_(static_cast<int>(mechanics.sphereMass.size())),
-        nodes_(body.surface != SurfaceMode::skin ? static_cast<int>(mechanics.attachments.size()) : 0) {
-    for (const Matrix3d& i : mechanics.sphereInertia) inverseInertia_.push_back(i.inverse());
-    for (std::size_t i = 0; i < mechanics.skin.size(); ++i)
-      hosts_.push_back(hostRates(model_, mechanics.skin[i], static_cast<int>(i)));
-  }
-
-  int size() const { return 6 * spheres_ + 3 * nodes_; }
-
-  // y = (links * K_links + surface * K_surface) x
-  VectorXd stiffnessTimes(const VectorXd& x, double links, double surface) const {
-    VectorXd y = VectorXd::Zero(size());
-    for (const MeasureRow& r : rows_) {
-      const int i0 = 6 * r.sphere0, i1 = 6 * r.sphere1;
-      if (i1 < 0) {
-        const double f = links * r.stiffness * (r.turn0.dot(x.segment<3>(i0 + 3)) - r.line.dot(x.segment<3>(i0)));
-        y.segment<3>(i0) -= f * r.line;
-        y.segment<3>(i0 + 3) += f * r.turn0;
-        continue;
-      }
-      const double rate = r.line.dot(x.segment<3>(i1) - x.segment<3>(i0)) + r.turn0.dot(x.segment<3>(i0 + 3)) +
-                          r.turn1.dot(x.segment<3>(i1 + 3));
-      const double f = links * r.stiffness * rate;
-      y.segment<3>(i1) += f * r.line;
-      y.segment<3>(i0) -= f * r.line;
-      y.segment<3>(i0 + 3) += f * r.turn0;
-      y.segment<3>(i1 + 3) += f * r.turn1;
-    }
-    addStrains(x, links, y);
-    if (nodes_ == 0) return y;
-    std::vector<Vector3d> displaced(nodes_), force(nodes_);
-    std::vector<double> onLinks(model_.links.size(), 0), onSpheres(model_.spheres.size(), 0);  // volumes
-    const auto volume = [&](const Attachment& a) -> double& { return (a.onLink ? onLinks : onSpheres)[a.host]; };
-    for (int i = 0; i < nodes_; ++i) {
-      displaced[i] = x.segment<3>(node(i)) - anchorRate(i, x);
-      force[i] = mechanics_.attachmentStiffness[i] * displaced[i];
-      const Attachment& a = mechanics_.attachments[i];
-      volume(a) += a.area * mechanics_.normal[i].dot(displaced[i]);
-    }
-    for (int i = 0; i < nodes_; ++i) {
-      const Attachment& a = mechanics_.attachments[i];
-      const double bulk = (a.onLink ? mechanics_.linkBulk : mechanics_.sphereBulk)[a.host];
-      force[i] += bulk * volume(a) * a.area * mechanics_.normal[i];
-      if (!hosts_.empty())
-        force[i] += mechanics_.normalExcess[i] * mechanics_.normal[i].dot(displaced[i]) * mechanics_.normal[i];
-    }
-    for (std::size_t e = 0; e < model_.edges.size(); ++e) {
-      const auto& [a, b] = model_.edges[e];
-      const Vector3d f = mechanics_.edgeStiffness[e] * (displaced[b] - displaced[a]);
-      force[b] += f;
-      force[a] -= f;
-    }
-    for (int i = 0; i < nodes_; ++i) {
-      y.segment<3>(node(i)) += surface * force[i];
-      addAnchorLoad(i, -surface * force[i], y);
-    }
-    return y;
-  }
-
-  // The largest eigenvalue of M^-1 K by power iteration from a fixed start; it is approached from below, within about 2
-  // %.
-  double largestEigenvalue(double links, double surface) const {
-    constexpr int kIterations = 150;
-    VectorXd x(size());
-    for (int i = 0; i < size(); ++i) x[i] = startValue(i);
-    x = divideByMass(x);
-    double eigenvalue = 0;
-    for (int k = 0; k < kIterations; ++k) {
-      const double norm = std::sqrt(x.dot(timesMass(x)));
-      if (!std::isfinite(norm)) throw std::runtime_error("stiffness over mass is not finite");
-      if (!(norm > 0)) return 0;
-      x /= norm;
-      const VectorXd force = stiffnessTimes(x, links, surface);
-      eigenvalue = x.dot(force);
-      x = divideByMass(force);
-    }
-    return eigenvalue;
-  }
-
-  // Stiffness of the links, and mass with the nodes' through their anchors' motion J: M + J^T m J. 6 spheres square.
-  MatrixXd linkStiffness() const {
-    MatrixXd k(6 * spheres_, 6 * spheres_);
-    for (int i = 0; i < k.cols(); ++i) k.col(i) = stiffnessTimes(VectorXd::Unit(size(), i), 1, 0).head(k.rows());
-    return k;
-  }
-  MatrixXd carriedMass() const {
-    const int count = 6 * spheres_;
-    std::vector<Eigen::Triplet<double>> entries;
-    for (int i = 0; i < nodes_; ++i) {
-      const double root = mechanics_.nodeMoves[i] ? std::sqrt(mechanics_.nodeMass[i]) : 0;
-      for (const int host : hostsOf(i))
-        for (int k = 6 * host; k < 6 * host + 6; ++k) {
-          const Vector3d rate = root * anchorRate(i, VectorXd::Unit(count, k));
-          for (int c = 0; c < 3; ++c) entries.emplace_back(3 * i + c, k, rate[c]);
-        }
-    }
-    Eigen::SparseMatrix<double> motion(3 * nodes_, count);
-    motion.setFromTriplets(entries.begin(), entries.end());
-    MatrixXd mass = motion.transpose() * motion;
-    for (int i = 0; i < spheres_; ++i) {
-      mass.block<3, 3>(6 * i, 6 * i) += mechanics_.sphereMass[i] * Matrix3d::Identity();
-      mass.block<3, 3>(6 * i + 3, 6 * i + 3) += mechanics_.sphereInertia[i];
-    }
-    return mass;
-  }
-
-  // Where the spheres' motions (6 spheres x loads) carry the nodes, and what forces on the nodes do to the spheres.
-  MatrixXd carried(const MatrixXd& motions) const {
-    MatrixXd out(3 * static_cast<Eigen::Index>(mechanics_.attachments.size()), motions.cols());
-    for (Eigen::Index load = 0; load < out.cols(); ++load) {
-      const VectorXd x = motions.col(load);
-      for (int i = 0; 3 * i < out.rows(); ++i) out.block<3, 1>(3 * i, load) = anchorRate(i, x);
-    }
-    return out;
-  }
-  MatrixXd onSpheres(const MatrixXd& forces) const {
-    MatrixXd out(6 * spheres_, forces.cols());
-    for (Eigen::Index load = 0; load < out.cols(); ++load) {
-      VectorXd y = VectorXd::Zero(6 * spheres_);
-      for (int i = 0; 3 * i < forces.rows(); ++i) addAnchorLoad(i, forces.block<3, 1>(3 * i, load), y);
-      out.col(load) = y;
-    }
-    return out;
-  }
-
-  // A repeatable, structureless start vector: the fractional parts of multiples of the golden ratio.
-  static double startValue(int i) {
-    const double a = 0.6180339887498949 * (i + 1);
-    return a - std::floor(a) - 0.5;
-  }
-
- private:
-  int node(int i) const { return 6 * spheres_ + 3 * i; }
-
-  void addStrains(const VectorXd& x, double scale, VectorXd& y) const {
-    for (const StrainRow& r : strains_) {
-      double rate = 0;
-      for (std::size_t k = 0; k < r.spheres.size(); ++k) rate += r.rates[k].dot(x.segment<6>(6 * r.spheres[k]));
-      for (std::size_t k = 0; k < r.spheres.size(); ++k) y.segment<6>(6 * r.spheres[k]) += scale * rate * r.rates[k];
-    }
-  }
-
-  std::vector<int> hostsOf(int i) const {
-    std::vector<int> out;
-    if (!hosts_.empty()) {
-      for (const HostRate& h : hosts_[i]) out.push_back(h.sphere);
-      return out;
-    }
-    const Attachment& a = mechanics_.attachments[i];
-    if (!a.onLink) return {a.host};
-    return {model_.links[a.host].sphere0, model_.links[a.host].sphere1};
-  }
-
-  // An anchor on a link, at rest.
-  struct LinkAnchor {
-    int s0, s1;  // the spheres' places in the vector of freedoms
-    double along, twistShare, length, thinning;
-    Vector3d n, arm0, arm1, offset;
-    double bump;  // m, of the centre line per turn of its ends against each other (anchor.h); 0 where it stays a chord
-  };
-
-  LinkAnchor linkAnchor(int i) const {
-    const Attachment& a = mechanics_.attachments[i];
-    const ElasticLink& l = model_.links[a.host];
-    const LinkSpan& span = mechanics_.spans[a.host];
-    const Vector3d line = span.end1 - span.end0;
-    const double length = line.norm();
-    return {6 * l.sphere0,
-            6 * l.sphere1,
-            a.along,
-            mechanics_.twistShare[i],
-            length,
-            thinning_ / length,
-            line / length,
-            span.end0 - model_.spheres[l.sphere0].restFrame,
-            span.end1 - model_.spheres[l.sphere1].restFrame,
-            a.restOffset,
-            0.5 * a.along * (1 - a.along) * (isBeam_ ? length : 0)};
-  }
-
-  // Where freedoms' rates x carry the anchor of node i.
-  Vector3d anchorRate(int i, const VectorXd& x) const {
-    if (!hosts_.empty()) {
-      Vector3d sum = Vector3d::Zero();
-      for (const HostRate& h : hosts_[i])
-        sum += h.linear * x.segment<3>(6 * h.sphere) + h.angular * x.segment<3>(6 * h.sphere + 3);
-      return sum;
-    }
-    const Attachment& a = mechanics_.attachments[i];
-    if (!a.onLink) return x.segment<3>(6 * a.host) + x.segment<3>(6 * a.host + 3).cross(a.restOffset);
-    const LinkAnchor p = linkAnchor(i);
-    const Vector3d w0 = x.segment<3>(p.s0 + 3), w1 = x.segment<3>(p.s1 + 3);
-    const Vector3d v0 = x.segment<3>(p.s0) + w0.cross(p.arm0), dv = x.segment<3>(p.s1) + w1.cross(p.arm1) - v0;
-    const double spin = p.n.dot((1 - p.twistShare) * w0 + p.twistShare * w1);
-    const Vector3d leaning = isBeam_ ? Vector3d((1 - p.along) * w0 + p.along * w1) : p.n.cross(dv) / p.length;
-    const Vector3d omega = leaning + (spin - p.n.dot(leaning)) * p.n;
-    return v0 + p.along * dv + p.bump * (w0 - w1).cross(p.n) + omega.cross(p.offset) -
-           p.thinning * p.n.dot(dv) * p.offset;
-  }
-
-  // The transpose: y += what a force f on the anchor of node i does to its spheres.
-  void addAnchorLoad(int i, const Vector3d& f, VectorXd& y) const {
-    if (!hosts_.empty()) {
-      for (const HostRate& h : hosts_[i]) {
-        y.segment<3>(6 * h.sphere) += h.linear.transpose() * f;
-        y.segment<3>(6 * h.sphere + 3) += h.angular.transpose() * f;
-      }
-      return;
-    }
-    const Attachment& a = mechanics_.attachments[i];
-    if (!a.onLink) {
-      y.segment<3>(6 * a.host) += f;
-      y.segment<3>(6 * a.host + 3) += a.restOffset.cross(f);
-      return;
-    }
-    const LinkAnchor p = linkAnchor(i);
-    const Vector3d moment = p.offset.cross(f);
-    const Vector3d about = p.n.dot(moment) * p.n, lean = moment - about;
-    const Vector3d swing = (isBeam_ ? Vector3d(Vector3d::Zero()) : Vector3d(moment.cross(p.n) / p.length)) -
-                           p.thinning * p.offset.dot(f) * p.n;
-    const Vector3d f0 = (1 - p.along) * f - swing, f1 = p.along * f + swing;
-    const Vector3d bow = p.bump * p.n.cross(f);
-    const double leaning = isBeam_ ? 1 : 0;
-    y.segment<3>(p.s0) += f0;
-    y.segment<3>(p.s1) += f1;
-    y.segment<3>(p.s0 + 3) += (1 - p.twistShare) * about + leaning * (1 - p.along) * lean + bow + p.arm0.cross(f0);
-    y.segment<3>(p.s1 + 3) += p.twistShare * about + leaning * p.along * lean - bow + p.arm1.cross(f1);
-  }
-
-  VectorXd timesMass(const VectorXd& x) const {
-    VectorXd y = x;
-    for (int i = 0; i < spheres_; ++i) {
-      y.segment<3>(6 * i) *= mechanics_.sphereMass[i];
-      y.segment<3>(6 * i + 3) = mechanics_.sphereInertia[i] * x.segment<3>(6 * i + 3);
-    }
-    for (int i = 0; i < nodes_; ++i) y.segment<3>(node(i)) *= mechanics_.nodeMass[i];
-    return y;
-  }
-
-  // Fixed freedoms have no inverse mass.
-  VectorXd divideByMass(const VectorXd& x) const {
-    VectorXd y = x;
-    for (int i = 0; i < spheres_; ++i) {
-      y.segment<3>(6 * i) *= mechanics_.moves[i] ? 1 / mechanics_.sphereMass[i] : 0;
-      y.segment<3>(6 * i + 3) = (mechanics_.turns[i] ? 1.0 : 0.0) * (inverseInertia_[i] * x.segment<3>(6 * i + 3));
-    }
-    for (int i = 0; i < nodes_; ++i) y.segment<3>(node(i)) *= mechanics_.nodeMoves[i] ? 1 / mechanics_.nodeMass[i] : 0;
-    return y;
-  }
-
-  const SoftBodyModel& model_;
-  const BodyMechanics& mechanics_;
-  std::vector<MeasureRow> rows_;
-  std::vector<StrainRow> strains_;
-  std::vector<Matrix3d> inverseInertia_;
-  std::vector<std::vector<HostRate>> hosts_;  // per node of an identified body; empty of others
-  bool isBeam_;
-  double thinning_;  // relative, of what hangs on a link, per relative stretch
-  int spheres_, nodes_;
-};
 
 // Whole cells: what a sphere and its share of the surface weigh together.
 struct CellMasses {
@@ -353,6 +82,17 @@ void forEachStiffness(const std::vector<MeasureRow>& rows, const std::vector<Str
         for (int i = 0; i < 36; ++i)
           visit(6 * r.spheres[a] + i / 6, 6 * r.spheres[b] + i % 6, r.rates[a][i / 6] * r.rates[b][i % 6]);
   }
+}
+
+double sumOfTraces(const std::vector<Matrix3d>& matrices) {
+  double sum = 0;
+  for (const Matrix3d& m : matrices) sum += m.trace();
+  return sum;
+}
+
+Matrix3d positivePart(const Matrix3d& symmetric) {
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> e(symmetric);
+  return e.eigenvectors() * e.eigenvalues().cwiseMax(0).asDiagonal() * e.eigenvectors().transpose();
 }
 
 }  // namespace
@@ -421,6 +161,29 @@ std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMe
     if (squared > kRigid * modes.eigenvalues().maxCoeff() && static_cast<int>(out.size()) < count)
       out.push_back(std::sqrt(squared) / (2 * std::numbers::pi));
   return out;
+}
+
+void raiseRotaryInertia(const BodyDescription& body, BodyMechanics& mechanics) {
+  // A step that is shorter by 2.5 % is let be; moments of inertia grow by a hundredth in all at most.
+  constexpr double kExcess = 1.05, kMostAdded = 0.01, kLeastShare = 0.125;
+  BodyMechanics locked = mechanics;
+  locked.turns.assign(locked.turns.size(), false);
+  const double moving = RestModel(body, locked).largestEigenvalue(1, 1);
+  if (!(moving > 0)) return;
+  const double most = (1 + kMostAdded) * sumOfTraces(mechanics.sphereInertia);
+  const RestModel rest(body, mechanics);
+  double fastest = rest.largestEigenvalue(1, 1);
+  std::vector<Matrix3d> stiffness;
+  for (int i = 0; fastest > kExcess * moving && i < static_cast<int>(mechanics.turns.size()); ++i)
+    stiffness.push_back(mechanics.turns[i] ? rest.turningStiffness(i) : Matrix3d::Zero());
+  for (double share = 1; fastest > kExcess * moving && share >= kLeastShare; share /= 2) {
+    BodyMechanics raised = mechanics;
+    for (std::size_t i = 0; i < stiffness.size(); ++i)
+      raised.sphereInertia[i] += positivePart(stiffness[i] / (share * moving) - mechanics.sphereInertia[i]);
+    if (sumOfTraces(raised.sphereInertia) > most) return;
+    fastest = RestModel(body, raised).largestEigenvalue(1, 1);
+    mechanics = std::move(raised);
+  }
 }
 
 double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrator integrator) {

@@ -6,6 +6,13 @@
 // the second the step.
 namespace medulla {
 
+// Raises the moments of inertia of spheres that turn faster than anything moves, until the body's stiffest mode is
+// hardly faster than with all turning locked: for a semi-implicit step, which none should shorten. A surface that holds
+// on to a light cell of a thin rim would otherwise set the step of the whole body, though nobody sees that cell's own
+// turning; where masses sit, statics and slow modes stay (Key and Beisinger 1971; Hughes, Cohen and Haroun 1978 on
+// beams and shells).
+void raiseRotaryInertia(const BodyDescription& body, BodyMechanics& mechanics);
+
 // Sets both relaxations of `mechanics` from the tissue's damping ratio and returns the largest stable substep (s) of
 // the body under semi-implicit Euler with damping taken at the old velocity.
 double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrator integrator);

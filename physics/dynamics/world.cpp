@@ -180,6 +180,7 @@ std::vector<BodyMechanics> mechanicsOf(const std::vector<BodyDescription>& bodie
     try {
       mechanics.push_back(bodyMechanics(body));
       mechanics.back().firstLike = static_cast<int>(found);
+      if (integrator == Integrator::explicitEuler) raiseRotaryInertia(body, mechanics.back());
       stable = std::min(stable, dampBody(body, mechanics.back(), integrator));
     } catch (const std::runtime_error& e) {
       throw std::runtime_error(fmt::format("body '{}' cannot be simulated: {}", body.name, e.what()));

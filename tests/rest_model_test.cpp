@@ -1,0 +1,106 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+
+#include "physics/dynamics/rest_model.h"
+#include "physics/dynamics/rest_modes.h"
+#include "tests/synthetic_model.h"
+
+namespace medulla {
+
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kSpheres = 25;
+
+// Held at one end; of sphere 3 only `share` of its cell's second moment is there.
+BodyDescription tubeWithASlenderCell(double share) {
+  const auto model = synthetic::chainModel(synthetic::straightTube(kSpheres, 0.4, 0.012, 40, 10));
+  model->spheres[3].secondMoment *= share;
+  return synthetic::body(model, 6e3, {{0, FixedFreedom::all}});
+}
+
+// Of M^-1 K, from the whole matrix.
+double largestByDenseMatrices(const BodyDescription& body, const BodyMechanics& m) {
+  const RestModel rest(body, m);
+  MatrixXd k(rest.size(), rest.size());
+  MatrixXd mass = MatrixXd::Zero(rest.size(), rest.size());
+  for (int i = 0; i < rest.size(); ++i) k.col(i) = rest.stiffnessTimes(VectorXd::Unit(rest.size(), i), 1, 1);
+  std::vector<int> free;
+  const int spheres = static_cast<int>(m.sphereMass.size());
+  for (int i = 0; i < spheres; ++i) {
+    mass.block<3, 3>(6 * i, 6 * i) = m.sphereMass[i] * Matrix3d::Identity();
+    mass.block<3, 3>(6 * i + 3, 6 * i + 3) = m.sphereInertia[i];
+    for (int c = 0; c < 6; ++c)
+      if (c < 3 ? m.moves[i] : m.turns[i]) free.push_back(6 * i + c);
+  }
+  for (int i = 0; i < static_cast<int>(m.nodeMass.size()); ++i) {
+    mass.block<3, 3>(6 * spheres + 3 * i, 6 * spheres + 3 * i) = m.nodeMass[i] * Matrix3d::Identity();
+    for (int c = 0; c < 3; ++c)
+      if (m.nodeMoves[i]) free.push_back(6 * spheres + 3 * i + c);
+  }
+  const MatrixXd some = k(free, free), weights = mass(free, free);
+  return Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(some, weights, Eigen::EigenvaluesOnly)
+      .eigenvalues()
+      .maxCoeff();
+}
+
+double largest(const BodyDescription& body, const BodyMechanics& mechanics) {
+  return RestModel(body, mechanics).largestEigenvalue(1, 1);
+}
+
+BodyMechanics turningLocked(BodyMechanics mechanics) {
+  mechanics.turns.assign(mechanics.turns.size(), false);
+  return mechanics;
+}
+
+}  // namespace
+
+TEST(RestModel, TheLargestEigenvalueIsThatOfTheWholeMatrices) {
+  for (const double share : {1.0, 0.02}) {
+    const BodyDescription body = tubeWithASlenderCell(share);
+    const BodyMechanics mechanics = bodyMechanics(body);
+    const double expected = largestByDenseMatrices(body, mechanics);
+    EXPECT_NEAR(largest(body, mechanics), expected, 1e-3 * expected);
+  }
+}
+
+TEST(RestModel, OfABodyThatIsFixedWhollyItIsZero) {
+  BodyDescription body = tubeWithASlenderCell(1);
+  body.surface = SurfaceMode::skin;
+  for (int i = 1; i < kSpheres; ++i) body.fixed.push_back({i, FixedFreedom::all});
+  EXPECT_EQ(largest(body, bodyMechanics(body)), 0);
+}
+
+TEST(RotaryInertia, OfACellThatTurnsFastIsRaisedUntilTurningCostsNoStep) {
+  const BodyDescription body = tubeWithASlenderCell(0.3);
+  const BodyMechanics before = bodyMechanics(body);
+  BodyMechanics after = before;
+  raiseRotaryInertia(body, after);
+  const double moving = largest(body, turningLocked(before));
+  EXPECT_GT(largest(body, before), 1.5 * moving) << "nothing to raise";
+  EXPECT_LT(largest(body, after), 1.06 * moving);
+  double sumBefore = 0, sumAfter = 0;
+  for (int i = 0; i < kSpheres; ++i) {
+    EXPECT_GE((after.sphereInertia[i] - before.sphereInertia[i]).eigenvalues().real().minCoeff(), -1e-18) << i;
+    sumBefore += before.sphereInertia[i].trace();
+    sumAfter += after.sphereInertia[i].trace();
+  }
+  EXPECT_LT(sumAfter, 1.01 * sumBefore);
+  EXPECT_EQ(after.sphereMass, before.sphereMass);
+  EXPECT_EQ(after.nodeMass, before.nodeMass);
+}
+
+TEST(RotaryInertia, ThatBoundsNoStepStaysWhatItIs) {
+  const BodyDescription body = tubeWithASlenderCell(1);
+  const BodyMechanics before = bodyMechanics(body);
+  ASSERT_LT(largest(body, before), 1.05 * largest(body, turningLocked(before)));
+  BodyMechanics after = before;
+  raiseRotaryInertia(body, after);
+  for (int i = 0; i < kSpheres; ++i) EXPECT_EQ(after.sphereInertia[i], before.sphereInertia[i]) << i;
+}
+
+}  // namespace medulla
