@@ -1,11 +1,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
 
 #include "physics/dynamics/body_mechanics.h"
+#include "physics/dynamics/identified_measures.h"
+#include "physics/dynamics/identified_mechanics.h"
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/rest_modes.h"
 #include "tests/dynamics_states.h"
@@ -72,6 +75,38 @@ TEST(IdentifiedLink, ForcesAreMinusTheGradientTurnedByAnyAngle) {
     ASSERT_NEAR(turnAgainstNext(d, 1), degrees / 180 * std::numbers::pi, 0.15);
     expectForcesAreMinusGradient(d, 2e-6);
   }
+}
+
+// Cells' means of a bar bent to an arc, turned by `angle` from cell to cell, its middle line longer as the section's
+// flattening makes it: what the link between cells 1 and 2 measures along it, and what it would without its terms of
+// second order, m.
+static std::array<double, 2> elongationOfArc(double angle) {
+  World world(weightless(), {chain(SurfaceMode::skin, false, 0, 0)});
+  WorldData& d = world.data();
+  const IdentifiedNetwork& n = *d.bodies[0].model->identified;
+  std::vector<FrameState>& frames = d.identified.frames;
+  const IdentifiedLinkGroup& link = d.identified.links[0];
+  const double length = link.restLength[1], nu = n.poisson;
+  for (const int i : {1, 2}) {
+    const IdentifiedFrame& cell = n.frames[i];
+    const double along = cell.secondMoment(0, 0) / cell.volume, kr2 = 4 * cell.secondMoment(1, 1) / cell.volume;
+    const double curvature = angle / length, longer = 1 + 0.25 * (1 + nu) * kr2 * curvature * curvature;
+    const double half = 0.5 * curvature * std::sqrt(12 * along);  // of the angle that the cell itself spans
+    const double radius = longer / curvature * std::sin(half) / half, at = i * angle;
+    frames[i].position = quadOf(Vector3d(radius * std::sin(at), -radius * std::cos(at), 0));
+    frames[i].orientation = {{0, 0, std::sin(0.5 * at), std::cos(0.5 * at)}};
+  }
+  const LinkTurn m =
+      measureLink(link, gatherFrames(frames.data(), link.frame0), gatherFrames(frames.data(), link.frame1));
+  return {m.hyper[1], m.along[1]};
+}
+
+TEST(IdentifiedLink, BentWithoutAxialForceItFeelsNone) {
+  const auto [once, onceLine] = elongationOfArc(0.05);
+  const auto [twice, twiceLine] = elongationOfArc(0.1);
+  EXPECT_NEAR(twiceLine / onceLine, 4, 0.05);
+  EXPECT_LT(std::abs(once), 0.01 * std::abs(onceLine));
+  EXPECT_NEAR(twice / once, 16, 1);
 }
 
 // Wound by more than 232 degrees a link would end a whole turn away from rest: the spheres behind it change their sign,

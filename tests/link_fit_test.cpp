@@ -57,4 +57,27 @@ TEST(LinkFit, StrainsOfCellsAreTheFullFormsAloneAndBringItNearer) {
   EXPECT_LT(uncoupled, errorOf(LinkForm::diagonal, false));
 }
 
+// A bar that is clamped 10 mm along x, told of a patch whose nearest point lies aside.
+TEST(LinkFit, ClampsAreCentredWithoutChangingSmallDisplacements) {
+  constexpr double kScale = 0.015;
+  const auto clampedAt = [](const Eigen::Vector3d& point) {
+    IdentifiedLink l;
+    l.frame1 = 1;
+    l.restPoint1 = point;
+    l.axes.row(0) = point.normalized();
+    l.axes.row(1) = l.axes.row(0).unitOrthogonal();
+    l.axes.row(2) = l.axes.row(0).cross(l.axes.row(1));
+    return l;
+  };
+  IdentifiedLink bar = clampedAt({0.01, 0, 0}), aside = clampedAt({0.006, 0.004, -0.006});
+  bar.stiffness = Vector6d(3, 1, 1, 0.2, 0.4, 0.4).asDiagonal();
+  const Eigen::MatrixXd stiffness = networkStiffness({bar}, kScale, 1);
+  const Matrix6d motions = linkMeasures(aside, kScale).leftCols<6>().inverse();
+  aside.stiffness = motions.transpose() * stiffness * motions;
+  const double before = aside.restPoint1.norm();
+  centreClamp(kScale, aside);
+  EXPECT_LT((networkStiffness({aside}, kScale, 1) - stiffness).norm(), 1e-12 * stiffness.norm());
+  EXPECT_NEAR((aside.restPoint1 - before * Eigen::Vector3d::UnitX()).norm(), 0, 1e-12);
+}
+
 }  // namespace medulla

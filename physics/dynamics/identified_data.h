@@ -34,6 +34,8 @@ struct IdentifiedLinkGroup {
   Lanes stiffness[21];                  // N/m: upper triangle, row after row
   Lanes strain0[6], strain1[6];         // (N/m)^1/2: what the measures add to the strains of the two frames' cells
   Lanes relaxation;                     // s, Rayleigh's beta
+  Lanes softening, lengthening;  // 1/rad2, m/rad2: of the measures, by flexion's square phi^2 / (1 + bound phi^2)
+  Lanes bound;                   // 1/rad2
 };
 
 struct ArcSeries {
@@ -51,14 +53,17 @@ struct LinkTurn {
   Lanes3 place;        // m: from frame 0 to frame 1
   Lanes3 arc;          // m: S(w) d
   ArcSeries series;
-  Lanes bent;   // w.d
-  Lanes3 t;     // m: place - arc
-  Lanes along;  // t on the link's axis
-  Lanes slope;  // of the neo-Hookean measure of that, by it
-  Lanes hyper;  // m: that measure
+  Lanes bent;       // w.d
+  Lanes3 t;         // m: place - arc
+  Lanes along;      // t on the link's axis
+  Lanes slope;      // of the neo-Hookean measure of that, less what bending lengthens, by it
+  Lanes hyper;      // m: that measure
+  Lanes3 flexed;    // rad: w across the link's axis
+  Lanes softer;     // of flexed, what is not measured
+  Lanes byFlexion;  // slope of phi^2 / (1 + bound phi^2) by phi^2
 };
 
-struct LinkMeasures6 {  // m and rad; elongation by its neo-Hookean measure
+struct LinkMeasures6 {  // m and rad: what the stiffness is of
   Lanes3 t, w;
 };
 

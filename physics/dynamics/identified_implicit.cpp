@@ -14,8 +14,7 @@ namespace medulla {
 
 namespace {
 
-// Rates of the six measures for one motion of the two frames, in the order of the stiffness: the neo-Hookean measure's
-// for that along.
+// Rates of the six measures for one motion of the two frames, in the order of the stiffness.
 struct Column {
   Lanes c[6];
 };
@@ -23,9 +22,9 @@ struct Column {
 Column columnOf(const IdentifiedLinkGroup& link, const LinkTurn& m, const Lanes3& velocity, const Lanes3& spin,
                 const Lanes3& meanSpin) {
   const auto seen = [&](const Lanes3& a) { return rotateBack(m.middle, a); };
-  const LinkRates r = ratesOf(link, m, seen(velocity), seen(spin), seen(meanSpin));
-  const Lanes3 t = fma((m.slope - splat(1)) * dot(r.t, link.along), link.along, r.t), w = link.lengthScale * r.w;
-  return {{t.x, t.y, t.z, w.x, w.y, w.z}};
+  const LinkRates r = measuredRates(link, m, ratesOf(link, m, seen(velocity), seen(spin), seen(meanSpin)));
+  const Lanes3 w = link.lengthScale * r.w;
+  return {{r.t.x, r.t.y, r.t.z, w.x, w.y, w.z}};
 }
 
 // By the line between the frames (three columns), and by the turning of sphere 0 and of sphere 1, on whose arms they

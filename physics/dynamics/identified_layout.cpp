@@ -84,6 +84,10 @@ void addLinks(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
     g.inverseRestLength[l] = 1 / line.norm();
     g.lengthScale[l] = n.lengthScale;
     g.relaxation[l] = mechanics.linkRelaxation;
+    const LinkBending bending = linkBending(n, link);
+    g.softening[l] = bending.softening;
+    g.lengthening[l] = bending.lengthening;
+    g.bound[l] = bending.bound;
     for (int i = 0; i < 6; ++i)
       for (int j = i; j < 6; ++j) g.stiffness[entryOf(i, j)][l] = mechanics.identifiedLinks[k](i, j);
     for (int i = 0; i < 6 && !mechanics.identifiedStrains.empty(); ++i) {

@@ -30,8 +30,7 @@ MEDULLA_INLINE LinkTurn turnOf(const IdentifiedLinkGroup& link, const FrameState
   return measureLink(link, gatherFrames(frames, link.frame0), gatherFrames(frames, link.frame1));
 }
 
-// With what damping adds: relaxation times their rates. The axis of elongation is measured by its neo-Hookean measure,
-// at its rate.
+// With what damping adds: relaxation times their rates.
 MEDULLA_INLINE LinkMeasures6 dampedMeasures(const IdentifiedLinkGroup& link, const LinkTurn& m,
                                             const FrameState* frames) {
   const auto seen = [&](Quad FrameState::*q, const std::uint32_t* i) {
@@ -41,39 +40,36 @@ MEDULLA_INLINE LinkMeasures6 dampedMeasures(const IdentifiedLinkGroup& link, con
                spin1 = seen(&FrameState::angularVelocity, link.frame1);
   const Lanes3 velocity = rotateBack(m.middle, gatherQuads(frames, link.frame1, &FrameState::velocity) -
                                                    gatherQuads(frames, link.frame0, &FrameState::velocity));
-  const LinkRates rate = ratesOf(link, m, velocity, spin1 - spin0, splat(0.5) * (spin0 + spin1));
-  const Lanes beta = link.relaxation;
-  const Lanes extra = fma(beta * (m.slope - splat(1)), dot(rate.t, link.along), m.hyper - m.along);
-  return {fma(beta, rate.t, fma(extra, link.along, m.t)), fma(beta, rate.w, m.w)};
+  const LinkRates rate =
+      measuredRates(link, m, ratesOf(link, m, velocity, spin1 - spin0, splat(0.5) * (spin0 + spin1)));
+  const LinkMeasures6 at = measuresOf(link, m);
+  return {fma(link.relaxation, rate.t, at.t), fma(link.relaxation, rate.w, at.w)};
 }
 
-struct MeasureForces {  // N, N m
-  Lanes3 onT, onW;
-};
-
-MEDULLA_INLINE MeasureForces forcesOn(const IdentifiedLinkGroup& link, const LinkMeasures6& m) {
-  MeasureForces out;
-  stiffnessTimes(link, m.t, m.w, out.onT, out.onW);
+// N, N m: forces on the measures.
+MEDULLA_INLINE LinkMeasures6 forcesOn(const IdentifiedLinkGroup& link, const LinkMeasures6& m) {
+  LinkMeasures6 out;
+  stiffnessTimes(link, m.t, m.w, out.t, out.w);
   return out;
 }
 
 // Each cell's strain pulls at the measures that it is summed from.
-MEDULLA_INLINE void addStrainForces(const IdentifiedLinkGroup& link, const double* strains, MeasureForces& to) {
+MEDULLA_INLINE void addStrainForces(const IdentifiedLinkGroup& link, const double* strains, LinkMeasures6& to) {
   const auto gathered = [&](const std::uint32_t* i) {
     return Lanes{strains[i[0]], strains[i[1]], strains[i[2]], strains[i[3]]};
   };
   const auto add = [&](Lanes strain, const Lanes(&of)[6]) {
-    to.onT = fma(strain, Lanes3{of[0], of[1], of[2]}, to.onT);
-    to.onW = fma(link.lengthScale * strain, Lanes3{of[3], of[4], of[5]}, to.onW);
+    to.t = fma(strain, Lanes3{of[0], of[1], of[2]}, to.t);
+    to.w = fma(link.lengthScale * strain, Lanes3{of[3], of[4], of[5]}, to.w);
   };
   add(gathered(link.frame0), link.strain0);
   add(gathered(link.frame1), link.strain1);
 }
 
-MEDULLA_INLINE void giveToFrames(const IdentifiedLinkGroup& link, const LinkTurn& m, const MeasureForces& forces,
+MEDULLA_INLINE void giveToFrames(const IdentifiedLinkGroup& link, const LinkTurn& m, const LinkMeasures6& forces,
                                  FrameLoad* loads) {
-  const Lanes3 onT = fma((m.slope - splat(1)) * dot(forces.onT, link.along), link.along, forces.onT);
-  const FrameLoads on = loadsOf(link, m, onT, forces.onW);
+  const LinkRates onTurn = forcesOnTurn(link, m, forces);
+  const FrameLoads on = loadsOf(link, m, onTurn.t, onTurn.w);
   const Lanes3 force = rotate(m.middle, on.force1);
   const Lanes minus = splat(-1);
   addFour(force, loads, link.frame0, &FrameLoad::force);
@@ -98,7 +94,7 @@ void evaluateStrained(Identified& s, const IdentifiedBody& body) {
   }
   for (int g = body.firstLinkGroup; g < body.endLinkGroup; ++g) {
     const StrainedLinkState& at = s.strained[g];
-    MeasureForces forces = forcesOn(s.links[g], at.damped);
+    LinkMeasures6 forces = forcesOn(s.links[g], at.damped);
     addStrainForces(s.links[g], s.strains.data(), forces);
     giveToFrames(s.links[g], at.turn, forces, s.loads.data());
   }
@@ -144,9 +140,8 @@ double identifiedLinkEnergy(const Identified& s, const IdentifiedBody& body) {
   for (int g = body.firstLinkGroup; g < body.endLinkGroup; ++g) {
     const IdentifiedLinkGroup& link = s.links[g];
     const LinkTurn m = turnOf(link, s.frames.data());
-    const LinkMeasures6 measures{fma(m.hyper - m.along, link.along, m.t), m.w};
-    const MeasureForces forces = forcesOn(link, measures);
-    sum += 0.5 * sumOfLanes(dot(measures.t, forces.onT) + dot(measures.w, forces.onW));
+    const LinkMeasures6 measures = measuresOf(link, m), forces = forcesOn(link, measures);
+    sum += 0.5 * sumOfLanes(dot(measures.t, forces.t) + dot(measures.w, forces.w));
     addStrains(link, measures, s.stillStrains.data());
   }
   for (auto strain = first; strain != end; ++strain) sum += 0.5 * *strain * *strain;

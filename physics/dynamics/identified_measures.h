@@ -19,11 +19,20 @@ MEDULLA_INLINE ArcSeries arcSeries(Lanes x) {
                      -9.0 / 51090942171709440000.0, 10.0 / 25852016738884976640000.0)};
 }
 
-// The measure whose square is the energy of a neo-Hookean bar, (x - 1) sqrt((x + 2) / 3x) at the stretch x, and its
-// slope; straight below kStraightBelow.
-MEDULLA_INLINE void measureElongation(const IdentifiedLinkGroup& link, LinkTurn& m) {
+// What large flexion does to the measures, by its bounded square: see LinkBending.
+MEDULLA_INLINE Lanes measureFlexion(const IdentifiedLinkGroup& link, LinkTurn& m) {
   const Lanes one = splat(1);
-  const Lanes stretch = fma(m.along, link.inverseRestLength, one), x = larger(stretch, splat(kStraightBelow));
+  put(fnma(dot(m.w, link.along), link.along, m.w), m.flexed);
+  const Lanes square = dot(m.flexed, m.flexed), kept = one / fma(link.bound, square, one);
+  m.byFlexion = kept * kept;
+  return square * kept;
+}
+
+// The measure whose square is the energy of a neo-Hookean bar, (x - 1) sqrt((x + 2) / 3x) at the stretch x, and its
+// slope; straight below kStraightBelow. `longer` (m) of the elongation is what bending alone makes.
+MEDULLA_INLINE void measureElongation(const IdentifiedLinkGroup& link, Lanes longer, LinkTurn& m) {
+  const Lanes one = splat(1);
+  const Lanes stretch = fma(m.along - longer, link.inverseRestLength, one), x = larger(stretch, splat(kStraightBelow));
   const Lanes inverse = one / x;
   const Lanes g = squareRoot(fma(splat(2.0 / 3), inverse, splat(1.0 / 3)));
   m.slope = g - (x - one) * inverse * inverse / (splat(3) * g);
@@ -51,8 +60,15 @@ MEDULLA_INLINE LinkTurn measureLink(const IdentifiedLinkGroup& link, const Frame
   put(fma(splat(0.25) * m.series.value * m.bent, m.w, fnma(x, m.series.value, one) * link.restLine), m.arc);
   put(m.place - m.arc, m.t);
   m.along = dot(m.t, link.along);
-  measureElongation(link, m);
+  const Lanes bending = measureFlexion(link, m);
+  m.softer = link.softening * bending;
+  measureElongation(link, link.lengthening * bending, m);
   return m;
+}
+
+// Elongation by its neo-Hookean measure, flexion softened.
+MEDULLA_INLINE LinkMeasures6 measuresOf(const IdentifiedLinkGroup& link, const LinkTurn& m) {
+  return {fma(m.hyper - m.along, link.along, m.t), fnma(m.softer, m.flexed, m.w)};
 }
 
 struct LinkRates {
@@ -74,6 +90,25 @@ MEDULLA_INLINE LinkRates ratesOf(const IdentifiedLinkGroup& link, const LinkTurn
                      (xRate * fma(x, m.series.slope, m.series.value)) * d;
   put(velocity - cross(middle, m.place) - arc, out.t);
   return out;
+}
+
+// From the rates of t and w to those of the measures: with a the axis, f = w across it and b = b(f^2) the bounded
+// square, a.t' becomes slope (a.t' - 2 lengthening b' f.w'), and f' becomes f' (1 - softening b) - 2 softening b'
+// (f.w') f.
+MEDULLA_INLINE LinkRates measuredRates(const IdentifiedLinkGroup& link, const LinkTurn& m, const LinkRates& r) {
+  const Lanes bending = splat(2) * m.byFlexion * dot(m.flexed, r.w), along = dot(r.t, link.along);
+  const Lanes measured = m.slope * fnma(link.lengthening, bending, along);
+  const Lanes3 across = fnma(dot(r.w, link.along), link.along, r.w);
+  return {fma(measured - along, link.along, r.t),
+          fnma(m.softer, across, fnma(link.softening * bending, m.flexed, r.w))};
+}
+
+// The transpose: from forces on the measures to those on t and w.
+MEDULLA_INLINE LinkRates forcesOnTurn(const IdentifiedLinkGroup& link, const LinkTurn& m, const LinkMeasures6& on) {
+  const Lanes pull = dot(on.t, link.along), measured = m.slope * pull;
+  const Lanes3 across = fnma(dot(on.w, link.along), link.along, on.w);
+  const Lanes bending = splat(2) * m.byFlexion * fma(link.softening, dot(m.flexed, on.w), link.lengthening * measured);
+  return {fma(measured - pull, link.along, on.t), fnma(m.softer, across, fnma(bending, m.flexed, on.w))};
 }
 
 struct FrameLoads {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "physics/model/cross_matrix.h"
+#include "physics/model/row_of_cells.h"
 
 namespace medulla {
 
@@ -109,6 +110,25 @@ std::vector<LinkStrains> identifiedStrains(const BodyDescription& body) {
     out.push_back({steered * l.strain0, steered * l.strain1});
   }
   return out;
+}
+
+LinkBending linkBending(const IdentifiedNetwork& network, const IdentifiedLink& link) {
+  if (!isRowOfCells(network.links, network.frames.size())) return {};
+  const Vector3d line = link.restPoint1 - link.restPoint0, along = link.axes.row(0);
+  double alongLine = 0, across = 0;  // m2: of the cells along the line in sum, across it in the mean
+  int cells = 0;
+  for (const int frame : {link.frame0, link.frame1}) {
+    if (frame >= static_cast<int>(network.frames.size())) continue;
+    const IdentifiedFrame& cell = network.frames[frame];
+    if (!(cell.volume > 0)) continue;
+    const double own = along.dot(cell.secondMoment * along) / cell.volume;
+    alongLine += own;
+    across += 0.5 * (cell.secondMoment.trace() / cell.volume - own);
+    ++cells;
+  }
+  if (cells == 0) return {};
+  const double length = line.norm(), nu = network.poisson, square = 4 * across / cells / (length * length);
+  return {0.5 * (0.395 - 0.433 * nu) * square, 0.25 * ((1 + nu) * square * length - alongLine / length), 2 * square};
 }
 
 std::vector<std::vector<SkinFrame>> heldSkin(const SoftBodyModel& model) {

@@ -12,6 +12,7 @@
 #include "physics/model/identify/reduction.h"
 #include "physics/model/identify/skin_fit.h"
 #include "physics/model/identify/thin_parts.h"
+#include "physics/model/row_of_cells.h"
 
 namespace medulla {
 
@@ -306,6 +307,9 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   out.links = layOutLinks(mesh, cells, out.patches, patchTriangles);
   requireLinked(mesh, cells, out.links, out.voxel);
   fitLinks(responses.frames, responses.grounding, out.lengthScale, settings.links, out.links, stage(0.4, 0.85));
+  for (IdentifiedLink& link : out.links)
+    if (link.frame1 >= static_cast<int>(cells.frames.size()) && isRowOfCells(out.links, cells.frames.size()))
+      centreClamp(out.lengthScale, link);
   out.frames = cells.frames;
   fitSurfaceAndMeasure(mesh, solid, solidSettings, cells, responses, result, stage(0.85, 1));
   requireFinite(out);

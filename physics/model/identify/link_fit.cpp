@@ -11,6 +11,7 @@
 #include "physics/model/cross_matrix.h"
 #include "physics/model/identify/lbfgs.h"
 #include "physics/model/identify/skin_fit.h"
+#include "physics/model/row_of_cells.h"
 #include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
@@ -84,6 +85,28 @@ std::vector<IdentifiedLink> layOutLinks(const TriangleMesh& mesh, const CellFram
     }
   }
   return links;
+}
+
+// Held at d + e instead of d, t = t' + e x w / 2. The trace of the stiffness on w is least, and what couples w and t
+// symmetric, at (tr(A) 1 - A) e = -2 b, with A the stiffness on t and b the axial vector of that between w and t.
+void centreClamp(double lengthScale, IdentifiedLink& link) {
+  const Matrix3d a = link.stiffness.topLeftCorner<3, 3>(), b = lengthScale * link.stiffness.bottomLeftCorner<3, 3>();
+  const Vector3d axial(b(1, 2) - b(2, 1), b(2, 0) - b(0, 2), b(0, 1) - b(1, 0));
+  const Vector3d line = link.restPoint1 - link.restPoint0;
+  const Vector3d towards =
+      line - 2 * link.axes.transpose() * (a.trace() * Matrix3d::Identity() - a).ldlt().solve(axial);
+  constexpr double kLeast = 0.1;  // of the length scale: a cell that lies behind what is held is held at its own place
+  if (!(towards.norm() > kLeast * lengthScale)) return;
+  IdentifiedLink moved =
+      linkBetween(link.frame0, link.frame1, link.restPoint0, link.restPoint0 + line.norm() * towards.normalized());
+  const Vector3d shift = link.axes * (moved.restPoint1 - link.restPoint1);
+  Matrix6d turn = Matrix6d::Zero();  // old measures from new ones
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = link.axes * moved.axes.transpose();
+  turn.topRightCorner<3, 3>() = crossMatrix(shift) * turn.topLeftCorner<3, 3>() / (2 * lengthScale);
+  const Matrix6d k = turn.transpose() * link.stiffness * turn;
+  moved.stiffness = 0.5 * (k + k.transpose());
+  moved.strain0 = turn.transpose() * link.strain0;
+  link = moved;
 }
 
 Matrix6x12d linkMeasures(const IdentifiedLink& link, double lengthScale) {
@@ -298,8 +321,6 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double leng
   constexpr double klWeight = 0.001, responseWeight = 100;
   // Where cells lie in a row there is next to nothing to couple, and what strains gain of single loads they lose of
   // others: a gallbladder of seven, with ten links, bends half a percent farther off with them.
-  constexpr double kPerCell = 1.5;  // links
-  const bool inARow = static_cast<double>(links.size()) < kPerCell * static_cast<double>(compliance.rows()) / 6;
   int calls = 0;
   const auto value = [&](const LinkFit& fit, double kl, double response) {
     return [&, kl, response](const VectorXd& at, VectorXd& gradient) {
@@ -314,7 +335,7 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double leng
   const LinkFit plain(compliance, grounding, lengthScale, std::min(form, LinkForm::uncoupled), links);
   VectorXd x = plain.start();
   const double reached = minimise(plain, x);
-  if (form == LinkForm::full && !inARow) {
+  if (form == LinkForm::full && !isRowOfCells(links, static_cast<std::size_t>(compliance.rows()) / 6)) {
     const LinkFit strained(compliance, grounding, lengthScale, form, links);
     VectorXd both = strained.startAt(plain.start());
     if (minimise(strained, both) < reached) {

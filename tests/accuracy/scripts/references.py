@@ -22,7 +22,7 @@ def summary(body, case, kept, error):
 
 def timing(body, case, nonlinear, error):
     """What FEM itself took and how far it was off, for the chart: CASE NODES SECONDS ERROR_MAX ERROR_RMS."""
-    rows, kept = [], nonlinear[body.kept[case.fix]].displacement
+    rows, kept = [], nonlinear[body.kept_grid(case)].displacement
     for _, solved in sorted(nonlinear.items()):
         off = error.error + study.difference(solved.displacement, kept, kept)
         rows.append("%s_%s %d %.1f %.3g %.3g\n" % (body.name, case.name, solved.nodes, solved.seconds, *off))
@@ -46,7 +46,7 @@ def make(project, results, work, wanted):
             if not chosen(f"{body.name}_{case.name}"):
                 continue
             nonlinear, error = solved.case(case)
-            kept = nonlinear[body.kept[case.fix]]
+            kept = nonlinear[body.kept_grid(case)]
             result_files.write_static(results, body, case, kept, error)
             rows = "".join(timing(body, case, nonlinear, error))
             result_files.publish(os.path.join(results, f"{body.name}_{case.name}.time"), rows)

@@ -149,7 +149,7 @@ class Study:
 
     def case(self, case):
         """The nonlinear solution that is kept, by grid number with the one before it, and its mesh error."""
-        grids, kept, nonlinear = self.body.grids[case.fix], self.body.kept[case.fix], {}
+        grids, kept, nonlinear = self.body.grids[case.fix], self.body.kept_grid(case), {}
         linear = self.small(case)
         for i in range(max(0, kept - 1), kept + 1):
             nonlinear[i] = solve(self.folder, self.body, self.mesh(case, grids[i]), case, False)
