@@ -66,6 +66,17 @@ IdentifiedLinkGroup emptyGroup(int frame) {  // links between a frame and itself
   return g;
 }
 
+// m: what a link stretches. One that is held bends about where it is clamped, but no more than what lies between its
+// cell and the patch's nearest node becomes longer.
+double stretchedLength(const SoftBodyModel& m, const IdentifiedLink& link, const Vector3d& line) {
+  double length = line.norm();
+  const std::size_t spheres = m.spheres.size(), frame = static_cast<std::size_t>(link.frame1);
+  if (frame < spheres) return length;
+  for (const int node : m.identified->patches[frame - spheres].nodes)
+    length = std::min(length, (m.restNodes[node] - link.restPoint0).norm());
+  return length;
+}
+
 void addLinks(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbers& frames) {
   const IdentifiedNetwork& n = *d.bodies[body].model->identified;
   std::vector<IdentifiedLinkGroup>& groups = d.identified.links;
@@ -80,8 +91,8 @@ void addLinks(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
         frames.restPoint(link.frame1, link.restPoint1) - frames.restPoint(link.frame0, link.restPoint0);
     setLane(g.restLine, l, line);
     setLane(g.along, l, link.axes.row(0).transpose());
-    g.restLength[l] = line.norm();
-    g.inverseRestLength[l] = 1 / line.norm();
+    g.restLength[l] = stretchedLength(*d.bodies[body].model, link, line);
+    g.inverseRestLength[l] = 1 / g.restLength[l];
     g.lengthScale[l] = n.lengthScale;
     g.relaxation[l] = mechanics.linkRelaxation;
     const LinkBending bending = linkBending(n, link);

@@ -92,14 +92,11 @@ std::vector<IdentifiedLink> layOutLinks(const TriangleMesh& mesh, const CellFram
 void centreClamp(double lengthScale, IdentifiedLink& link) {
   const Matrix3d a = link.stiffness.topLeftCorner<3, 3>(), b = lengthScale * link.stiffness.bottomLeftCorner<3, 3>();
   const Vector3d axial(b(1, 2) - b(2, 1), b(2, 0) - b(0, 2), b(0, 1) - b(1, 0));
-  const Vector3d line = link.restPoint1 - link.restPoint0;
-  const Vector3d towards =
-      line - 2 * link.axes.transpose() * (a.trace() * Matrix3d::Identity() - a).ldlt().solve(axial);
+  const Vector3d shift = -2 * (a.trace() * Matrix3d::Identity() - a).ldlt().solve(axial);
+  const Vector3d to = link.restPoint1 + link.axes.transpose() * shift;
   constexpr double kLeast = 0.1;  // of the length scale: a cell that lies behind what is held is held at its own place
-  if (!(towards.norm() > kLeast * lengthScale)) return;
-  IdentifiedLink moved =
-      linkBetween(link.frame0, link.frame1, link.restPoint0, link.restPoint0 + line.norm() * towards.normalized());
-  const Vector3d shift = link.axes * (moved.restPoint1 - link.restPoint1);
+  if (!((to - link.restPoint0).norm() > kLeast * lengthScale)) return;
+  IdentifiedLink moved = linkBetween(link.frame0, link.frame1, link.restPoint0, to);
   Matrix6d turn = Matrix6d::Zero();  // old measures from new ones
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = link.axes * moved.axes.transpose();
   turn.topRightCorner<3, 3>() = crossMatrix(shift) * turn.topLeftCorner<3, 3>() / (2 * lengthScale);

@@ -35,9 +35,9 @@ Eigen::MatrixXd networkStiffness(const std::vector<IdentifiedLink>& links, doubl
 void fitLinks(const Eigen::MatrixXd& compliance, const Eigen::MatrixXd& grounding, double lengthScale, LinkForm form,
               std::vector<IdentifiedLink>& links, const std::function<void(double)>& progress);
 
-// Turns a link to a patch to where it is a bar that is clamped there, as long as before, with the middle between its
-// two ends on the line to its centre of stiffness. In small displacements that changes nothing; in large ones the arc
-// that the measures expect is that of the body, wherever the patch's nearest point.
+// Moves the point at which a link to a patch is held to where it makes a bar of the link: clamped there, with the
+// middle between its two ends its centre of stiffness. In small displacements that changes nothing; in large ones the
+// arc that the measures expect is that of the body, wherever the patch's nearest point.
 void centreClamp(double lengthScale, IdentifiedLink& link);
 
 }  // namespace medulla
