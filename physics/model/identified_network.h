@@ -34,7 +34,8 @@ struct FixedPatch {
 //   w = log(R0^T R1),  Rm = R0 exp(w/2),  t = Rm^T (x1 - x0) - S(w) (restPoint1 - restPoint0)
 // where x and R are the two frames' positions and rotations since rest, and S(w) shortens and turns the rest line as
 // an arc of that bending does: S d = (sin h / h) d + (1 - sin h / h) / |w|^2 w (w.d), h = |w| / 2.
-// A patch's frame stands at the link's restPoint1 (its point nearest to the sphere) and has R = 1.
+// A patch's frame stands at the link's restPoint1 (its point nearest to the sphere; in a row of cells where the link is
+// clamped) and has R = 1.
 //
 // Each cell stores (its strain)^2 / 2 besides, times Young's modulus: the sum of strain0 . m over the links that have
 // it as frame0 and of strain1 . m over those that have it as frame1. Links with a stiffness each, none negative, know
