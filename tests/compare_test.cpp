@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 
@@ -69,7 +67,7 @@ TEST_F(Compare, WhatIsNoLogIsRefused) {
   const auto refused = [&](const ProgramResult& r, int exitCode, const std::string& words) {
     EXPECT_EQ(r.exitCode, exitCode);
     EXPECT_EQ(r.out, "");
-    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+    EXPECT_EQ(complaints(r).size(), 1) << r.err;
     EXPECT_NE(r.err.find(words), std::string::npos) << r.err;
   };
   refused(compare(kLog, edited("-2", "nan")), 1, "b.csv:3: column tool.force.x is 'nan', expected a finite number");

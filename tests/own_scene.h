@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 
@@ -47,7 +45,7 @@ class OwnScene : public testing::Test {
 inline void expectRefused(const ProgramResult& r, const std::string& words, int exitCode = 1) {
   EXPECT_EQ(r.exitCode, exitCode) << r.err;
   EXPECT_EQ(r.out, "");
-  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+  EXPECT_EQ(complaints(r).size(), 1) << r.err;
   EXPECT_NE(r.err.find(words), std::string::npos) << "no \"" << words << "\" in " << r.err;
 }
 

@@ -113,7 +113,7 @@ TEST(Plot, RefusesInOneLineAndLeavesNothing) {
   const auto refused = [&](const ProgramResult& r, const std::string& part) {
     EXPECT_EQ(r.exitCode, 1) << r.err;
     EXPECT_EQ(r.out, "");
-    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+    EXPECT_EQ(complaints(r).size(), 1) << r.err;
     EXPECT_TRUE(has(r.err, part)) << r.err;
   };
   refused(plot(folder / "none.csv", folder / "a.png"), "none.csv");

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +22,15 @@ struct ProgramResult {
   int exitCode = -1;
   std::string out, err;
 };
+
+// What it says is wrong, one per line: a slow machine has told how far it was before that.
+inline std::vector<std::string> complaints(const ProgramResult& r) {
+  std::vector<std::string> out;
+  std::istringstream lines(r.err);
+  for (std::string line; std::getline(lines, line);)
+    if (line.find("s left") == std::string::npos) out.push_back(line);
+  return out;
+}
 
 struct ProgramOptions {
   std::string folder = ".";

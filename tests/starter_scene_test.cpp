@@ -61,7 +61,7 @@ TEST(StarterScene, LeavesNothingBehindWhereTheMeshIsRefused) {
   folder.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   const ProgramResult made = makeStarter(folder, folder / "flat.obj");
   EXPECT_EQ(made.exitCode, 1);
-  EXPECT_EQ(std::count(made.err.begin(), made.err.end(), '\n'), 1) << made.err;
+  EXPECT_EQ(complaints(made).size(), 1) << made.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "mine"));
 }
 
