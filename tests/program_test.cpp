@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 
