@@ -25,9 +25,8 @@ std::vector<LinkStrains> identifiedStrains(const BodyDescription& body);
 // - its section flattens, so that it stores (0.395 - 0.433 nu) (2 k r)^2 less than EI k^2 / 2, and its middle line
 //   lengthens by (1 + nu) / 4 (2 k r)^2: solutions of the neo-Hookean section at nu = 0.3, 0.45 and 0.499;
 // - a frame is the mean of its cell, which lies off the middle line by k s^2 / 2 with s^2 the cell's second moment
-// along
-//   the line over its volume. Along the mean direction that brings two frames nearer by (s0^2 + s1^2) phi^2 / 4 l, of
-//   an arc that is as long as before. What is held is a point: s = 0.
+//   along the line over its volume. Along the mean direction that brings two frames nearer by
+//   (s0^2 + s1^2) phi^2 / 4 l, of an arc that is as long as before. What is held is a point: s = 0.
 // Where cells lie side by side none is a bar of its own, and all are 0: with these a liver of 20 bent 2.0 / 0.5 % off
 // instead of 1.2 / 0.3. `bound` keeps to where these series hold: beyond (2 k r)^2 of a half they level off.
 struct LinkBending {
