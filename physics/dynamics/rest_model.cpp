@@ -2,9 +2,7 @@
 
 #include <Eigen/Dense>
 #include <Eigen/SparseCore>
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 

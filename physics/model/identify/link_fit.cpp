@@ -316,8 +316,6 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double leng
   // motions alike, the shortest too, and takes what it gains there from the modes: with 0.1 the second bending of a
   // cylinder of seven cells was 4 % too fast and the gallbladder's fourth and fifth mode 6 %.
   constexpr double klWeight = 0.001, responseWeight = 100;
-  // Where cells lie in a row there is next to nothing to couple, and what strains gain of single loads they lose of
-  // others: a gallbladder of seven, with ten links, bends half a percent farther off with them.
   int calls = 0;
   const auto value = [&](const LinkFit& fit, double kl, double response) {
     return [&, kl, response](const VectorXd& at, VectorXd& gradient) {
@@ -332,6 +330,8 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double leng
   const LinkFit plain(compliance, grounding, lengthScale, std::min(form, LinkForm::uncoupled), links);
   VectorXd x = plain.start();
   const double reached = minimise(plain, x);
+  // Where cells lie in a row there is next to nothing to couple, and what strains gain of single loads they lose of
+  // others: a gallbladder of seven, with ten links, bends half a percent farther off with them.
   if (form == LinkForm::full && !isRowOfCells(links, static_cast<std::size_t>(compliance.rows()) / 6)) {
     const LinkFit strained(compliance, grounding, lengthScale, form, links);
     VectorXd both = strained.startAt(plain.start());
