@@ -8,6 +8,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "physics/model/identify/held_give.h"
 #include "physics/model/identify/layer_fit.h"
 #include "physics/model/identify/reduction.h"
 #include "physics/model/identify/skin_fit.h"
@@ -23,6 +24,8 @@ using Eigen::VectorXd;
 using Progress = std::function<void(double)>;
 
 namespace {
+
+constexpr double kLargerCells = 4. / 3;  // times the size: the grid that tells how far the finite elements are off
 
 void checkSettings(const IdentifySettings& s) {
   if (!(s.poisson >= 0 && s.poisson < 0.5))
@@ -243,8 +246,8 @@ void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Respons
 }
 
 // Fits skin and layer to loads of their own, and measures the network on others, which nothing was fitted to; then
-// solves those again in cells a third larger.
-void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const SolidSettings& settings,
+// solves those again in `larger` cells.
+void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const VoxelSolid& larger,
                           const CellFrames& cells, const Responses& responses, Identification& result,
                           const Progress& progress) {
   constexpr int count = 16;
@@ -254,15 +257,13 @@ void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, con
   teaching << trials.loads(LoadKind::bulk, count, 1), trials.loads(LoadKind::poke, count, 1);
   const MatrixXd under = trials.exact(solid, teaching);
   chooseSkin(mesh, cells, responses, trials, teaching, under, out);
-  progress(0.4);
-  const VoxelSolid other = makeVoxelSolid(mesh, 4. / 3 * solid.grid.size, settings);
-  progress(0.8);
+  progress(0.5);
   const RowMatrix bulk = trials.loads(LoadKind::bulk, count, 2), poke = trials.loads(LoadKind::poke, count, 2);
   const MatrixXd bulkExact = trials.exact(solid, bulk), pokeExact = trials.exact(solid, poke);
   out.bulk = errorOf(trials.ofNetwork(bulk), bulkExact);
   out.poke = errorOf(trials.ofNetwork(poke), pokeExact);
-  const IdentifiedError ofBulk = errorOf(trials.exact(other, bulk), bulkExact),
-                        ofPoke = errorOf(trials.exact(other, poke), pokeExact);
+  const IdentifiedError ofBulk = errorOf(trials.exact(larger, bulk), bulkExact),
+                        ofPoke = errorOf(trials.exact(larger, poke), pokeExact);
   out.ofFiniteElements = {std::max(ofBulk.maximum, ofPoke.maximum), std::max(ofBulk.rms, ofPoke.rms)};
   result.forces = bulk;
   result.displacements = bulkExact;
@@ -297,21 +298,23 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   };
   std::vector<Ball> balls;
   for (const FillingSphere& s : model.spheres) balls.push_back({s.restBallCentre, s.radius});
-  const VoxelSolid solid = makeSolid(model, mesh, settings, solidSettings, stage(0, 0.2));
+  VoxelSolid solid = makeSolid(model, mesh, settings, solidSettings, stage(0, 0.15));
   requireWithinReach(solid.grid, mesh, solidSettings.heldTriangles);
   const CellFrames cells = makeCellFrames(mesh, balls, solid);
-  Responses responses = solveFrames(solid, cells, freeAreas(measureNodes(mesh, out.patches)), stage(0.2, 0.4));
-  if (held.empty()) responses = balancedResponses(mesh, cells, responses);
   out.voxel = solid.grid.size;
   out.lengthScale = cells.lengthScale;
   out.links = layOutLinks(mesh, cells, out.patches, patchTriangles);
   requireLinked(mesh, cells, out.links, out.voxel);
+  VoxelSolid larger = makeVoxelSolid(mesh, kLargerCells * solid.grid.size, solidSettings, stage(0.15, 0.2));
+  solid.give = larger.give = giveOfHeld(mesh, solidSettings, solid, larger);
+  Responses responses = solveFrames(solid, cells, freeAreas(measureNodes(mesh, out.patches)), stage(0.2, 0.4));
+  if (held.empty()) responses = balancedResponses(mesh, cells, responses);
   fitLinks(responses.frames, responses.grounding, out.lengthScale, settings.links, out.links, stage(0.4, 0.85));
   for (IdentifiedLink& link : out.links)
     if (link.frame1 >= static_cast<int>(cells.frames.size()) && isRowOfCells(out.links, cells.frames.size()))
       centreClamp(out.lengthScale, link);
   out.frames = cells.frames;
-  fitSurfaceAndMeasure(mesh, solid, solidSettings, cells, responses, result, stage(0.85, 1));
+  fitSurfaceAndMeasure(mesh, solid, larger, cells, responses, result, stage(0.85, 1));
   requireFinite(out);
   return result;
 }

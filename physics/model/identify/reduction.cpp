@@ -54,7 +54,7 @@ Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const Ve
   for (Index first = 0; first < n; first += block) {
     const Index count = std::min(block, n - first);
     RowMatrix x = RowMatrix(cells.motion.middleRows(first, count)).transpose();
-    solve(solid.plan, solid.factors, x);
+    solveSolid(solid, x);
     out.frames.middleCols(first, count) = cells.motion * x;
     out.nodes.middleCols(first, count) = solid.surface * x;
     // With the frames' motion A K^-1 L f under forces f: E[f f^T] L^T K^-1 A^T as forces.

@@ -48,11 +48,41 @@ void overTriangle(const TriangleMesh& mesh, const std::array<int, 3>& corners, d
   }
 }
 
+// Edges of one held triangle only.
+std::vector<std::array<Vector3d, 2>> rimOf(const TriangleMesh& mesh, const std::vector<int>& heldTriangles) {
+  std::map<std::array<int, 2>, int> triangles;
+  for (const int t : heldTriangles) {
+    for (int k = 0; k < 3; ++k) {
+      const auto [a, b] = std::minmax(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
+      ++triangles[{a, b}];
+    }
+  }
+  std::vector<std::array<Vector3d, 2>> rim;
+  for (const auto& [edge, count] : triangles)
+    if (count == 1) rim.push_back({mesh.vertices[edge[0]], mesh.vertices[edge[1]]});
+  return rim;
+}
+
+bool isNear(const Vector3d& point, const std::vector<std::array<Vector3d, 2>>& edges, double distance) {
+  return std::any_of(edges.begin(), edges.end(), [&](const std::array<Vector3d, 2>& edge) {
+    const Vector3d along = edge[1] - edge[0];
+    const double at = std::clamp((point - edge[0]).dot(along) / along.squaredNorm(), 0., 1.);
+    return (point - edge[0] - at * along).squaredNorm() < distance * distance;
+  });
+}
+
+struct HeldSprings {
+  HeldCells all, rim;  // the latter within a cell of where what is held ends
+};
+
 // Springs on what bounds the cells: held triangles where material lies behind them, fans where they cut the body.
-HeldCells heldCells(const TriangleMesh& mesh, const SolidSettings& settings, const HexGrid& grid) {
-  HeldCells held;
+HeldSprings heldSprings(const TriangleMesh& mesh, const SolidSettings& settings, const HexGrid& grid) {
+  HeldSprings held;
+  const std::vector<std::array<Vector3d, 2>> rim = rimOf(mesh, settings.heldTriangles);
   const auto hold = [&](const Vector3d& point, double area) {
-    holdPoint(grid, point, kHeldPenalty / grid.size * area, held);
+    const double stiffness = kHeldPenalty / grid.size * area;
+    holdPoint(grid, point, stiffness, held.all);
+    if (isNear(point, rim, grid.size)) holdPoint(grid, point, stiffness, held.rim);
   };
   const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
   for (const int t : settings.heldTriangles) {
@@ -73,6 +103,22 @@ HeldCells heldCells(const TriangleMesh& mesh, const SolidSettings& settings, con
     }
   }
   return held;
+}
+
+RowSparse springMatrix(const HexGrid& grid, const HeldCells& held) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (const auto& [cell, springs] : held) {
+    const std::array<int, kHexNodes>& nodes = grid.cellNodes[cell];
+    for (int b = 0; b < kHexNodes; ++b) {
+      for (int a = 0; a < kHexNodes; ++a) {
+        for (int k = 0; k < 3; ++k) entries.emplace_back(3 * nodes[a] + k, 3 * nodes[b] + k, springs(a, b));
+      }
+    }
+  }
+  const auto size = 3 * static_cast<Index>(grid.nodes.size());
+  RowSparse out(size, size);
+  out.setFromTriplets(entries.begin(), entries.end());
+  return out;
 }
 
 void addHeld(const Eigen::Matrix<double, kHexNodes, kHexNodes>& springs, MatrixXd& matrix) {
@@ -206,10 +252,11 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
     throw OverBudget(fmt::format("finite elements of {:.3g} mm would take {:.1f} GB, expected at most {:.1f} GB",
                                  1e3 * grid.size, 8e-9 * solid.plan.factorNumbers, 1e-9 * settings.memoryMax));
   }
-  const HeldCells held = heldCells(mesh, settings, grid);
+  const HeldSprings springs = heldSprings(mesh, settings, grid);
+  const HeldCells& held = springs.all;
   solid.isFree = held.empty();
   std::vector<bool> isHeld(grid.cells.size(), false);
-  for (const auto& [cell, springs] : held) isHeld[cell] = true;
+  for (const auto& [cell, shapes] : held) isHeld[cell] = true;
   requireConnected(grid, isHeld);
   const auto pinned = pinnedFreedoms(grid, solid.isFree ? isostaticPins(grid) : std::vector<GridPin>());
   // A batch of cells at once makes their matrices by one large product.
@@ -223,20 +270,30 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
       stiffness = hexStiffness(grid, perPoint, rest.first(std::min(batch, rest.size())));
     }
     matrix = stiffness.col(static_cast<Index>(next++ % batch)).reshaped(kHexFreedoms, kHexFreedoms);
-    if (const auto springs = held.find(cell); springs != held.end()) addHeld(springs->second, matrix);
+    if (const auto own = held.find(cell); own != held.end()) addHeld(own->second, matrix);
     if (const auto pins = pinned.find(cell); pins != pinned.end()) {
       for (const int freedom : pins->second) matrix(freedom, freedom) += grid.size;
     }
   };
   solid.factors = factorise(solid.plan, grid, cellStiffness, progress);
+  solid.rimSprings = springMatrix(grid, springs.rim);
   solid.surface = interpolation(grid, mesh, settings.heldTriangles);
   solid.loading = tractions(mesh, grid);
   return solid;
 }
 
+// With K the stiffness and S the rim's springs' part of it: K^-1 + give K^-1 S K^-1, positive definite.
+void solveSolid(const VoxelSolid& solid, RowMatrix& x) {
+  solve(solid.plan, solid.factors, x);
+  if (solid.give == 0) return;
+  RowMatrix more = solid.rimSprings * x;
+  solve(solid.plan, solid.factors, more);
+  x += solid.give * more;
+}
+
 RowMatrix displacementsUnder(const VoxelSolid& solid, const RowMatrix& forces) {
   RowMatrix x = solid.loading * forces;
-  solve(solid.plan, solid.factors, x);
+  solveSolid(solid, x);
   return x;
 }
 

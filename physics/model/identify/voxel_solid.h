@@ -27,8 +27,10 @@ struct VoxelSolid {
   HexGrid grid;
   DissectionPlan plan;
   FrontFactors factors;
-  RowSparse surface;  // 3 mesh nodes x 3 grid nodes: displacement of the mesh's nodes
-  RowSparse loading;  // 3 grid nodes x 3 mesh nodes: a node's force as a traction that falls to 0 on its neighbours
+  RowSparse rimSprings;  // 3 grid nodes square: the held springs' within a cell of where what is held ends
+  double give = 0;       // what these give beyond their own, in parts of it (held_give.h)
+  RowSparse surface;     // 3 mesh nodes x 3 grid nodes: displacement of the mesh's nodes
+  RowSparse loading;     // 3 grid nodes x 3 mesh nodes: a node's force as a traction that falls to 0 on its neighbours
 };
 
 struct SolidSettings {
@@ -47,6 +49,9 @@ struct OverBudget : std::runtime_error {
 // cells do not hang together.
 VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
                           const std::function<void(double)>& progress = {});
+
+// Displacements of the grid's nodes, in place of the forces on them (3 grid nodes x loads).
+void solveSolid(const VoxelSolid& solid, RowMatrix& x);
 
 // Displacements of the grid's nodes under forces on the mesh's nodes (3 mesh nodes x loads).
 RowMatrix displacementsUnder(const VoxelSolid& solid, const RowMatrix& forces);
