@@ -122,7 +122,7 @@ def write_step(folder, body, case, fix, load, beta, frequencies, response, error
 
 def make(folder, solved):
     body, (name, factor) = solved.body, solved.body.step
-    case = replace(next(c for c in body.cases if c.name == name), grids=())
+    case = next(c for c in body.cases if c.name == name)
     small = solved.small(case)  # linear: a factor scales it
     case = replace(case, name="step", load=replace(case.load, force=tuple(factor * f for f in case.load.force)))
     fix, (load, forces) = result_files.write_fix(folder, body, case.fix), result_files.write_load(folder, body, case)

@@ -137,10 +137,10 @@ class Study:
     def small(self, case):
         """Small displacements on every grid. Cases that differ by the size of the load share them, up to this size."""
         direction = np.array(case.load.force) / (np.linalg.norm(case.load.force) or 1)
-        key = (case.fix, case.load.patch, tuple(direction.round(9)), case.load.turn, case.grids)
+        key = (case.fix, case.load.patch, tuple(direction.round(9)), case.load.turn)
         if key not in self.linear:
             self.linear[key] = []
-            for grid in self.body.grids_of(case):
+            for grid in self.body.grids[case.fix]:
                 solved = solve(self.folder, self.body, self.mesh(case, grid), case, True)
                 self.say(f"{self.body.name} {case.name} small, {solved.nodes} nodes: {solved.seconds:.1f} s, "
                          f"{largest(solved.displacement):.4f} mm")
@@ -149,7 +149,7 @@ class Study:
 
     def case(self, case):
         """The nonlinear solution that is kept, by grid number with the one before it, and its mesh error."""
-        grids, kept, nonlinear = self.body.grids_of(case), self.body.kept_grid(case), {}
+        grids, kept, nonlinear = self.body.grids[case.fix], self.body.kept_grid(case), {}
         linear = self.small(case)
         for i in range(max(0, kept - 1), kept + 1):
             nonlinear[i] = solve(self.folder, self.body, self.mesh(case, grids[i]), case, False)
