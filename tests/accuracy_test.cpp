@@ -138,14 +138,14 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         StaticCase{"cylinder_tip", 7, 0.7, 0.4, 0.1}, StaticCase{"cylinder_tip_large", 7, 0.9, 0.6, 0.2},
         StaticCase{"cylinder_mid", 7, 1.2, 0.71, 0.1}, StaticCase{"cylinder_axial", 7, 2.9, 0.9, 0.6},
-        StaticCase{"cylinder_torsion", 7, 1.4, 0.5, 0.1}, StaticCase{"cylinder_poke_small", 7, 26, 4.7, 0.2},
+        StaticCase{"cylinder_torsion", 7, 1.45, 0.52, 0.1}, StaticCase{"cylinder_poke_small", 7, 26, 4.7, 0.2},
         StaticCase{"cylinder_poke_large", 7, 28.5, 8.3, 0.5}, StaticCase{"gallbladder_tip", 7, 3.5, 1.7, 0.1},
-        StaticCase{"gallbladder_tip_large", 7, 2.9, 1.4, 0.1}, StaticCase{"gallbladder_mid", 7, 3.2, 1.5, 0.1},
+        StaticCase{"gallbladder_tip_large", 7, 2.9, 1.4, 0.1}, StaticCase{"gallbladder_mid", 7, 3.3, 1.5, 0.1},
         StaticCase{"gallbladder_axial", 7, 8.8, 3.5, 0.8}, StaticCase{"gallbladder_torsion", 7, 11.5, 3.3, 0.1},
         StaticCase{"gallbladder_poke_small", 7, 51, 10, 0.2}, StaticCase{"gallbladder_poke_large", 7, 33, 18.7, 0.5},
-        StaticCase{"liver_tip", 35, 13.9, 6.4, 0.1}, StaticCase{"cylinder_tip_large", 25, 3.6, 1.8, 0.1},
-        StaticCase{"gallbladder_tip_large", 25, 6, 3, 0.2}, StaticCase{"liver_tip_in_plane", 35, 16.3, 9.6, 0.2},
-        StaticCase{"liver_mid", 35, 26.9, 10.8, 0.4}, StaticCase{"liver_axial", 35, 32.1, 17.6, 1.4},
+        StaticCase{"liver_tip", 35, 14.1, 6.4, 0.1}, StaticCase{"cylinder_tip_large", 25, 3.6, 1.8, 0.1},
+        StaticCase{"gallbladder_tip_large", 25, 6, 3, 0.2}, StaticCase{"liver_tip_in_plane", 35, 16.4, 9.7, 0.2},
+        StaticCase{"liver_mid", 35, 26.9, 10.8, 0.4}, StaticCase{"liver_axial", 35, 32, 17.7, 1.4},
         StaticCase{"gallbladder_doubled_tip_large", 7, 2.6, 1.3, 0.1}),
     [](const auto& tested) {
       const StaticCase& c = tested.param;
@@ -159,20 +159,20 @@ INSTANTIATE_TEST_SUITE_P(
 #define PEAR_ROOT "plane=-0.4887,-0.6834,0.5423,0.024"
 #define PEAR_BED "vertices=" MEDULLA_SOURCE_DIR "/tests/accuracy/results/gallbladder_bed.fix.csv"
 INSTANTIATE_TEST_SUITE_P(Identified, StaticAccuracy,
-                         testing::Values(StaticCase{"cylinder_tip", 7, 0.3, 0.15, 0.1, CYLINDER_ROOT},
-                                         StaticCase{"cylinder_tip_large", 7, 0.25, 0.12, 0.1, CYLINDER_ROOT},
-                                         StaticCase{"cylinder_mid", 7, 0.5, 0.23, 0.1, CYLINDER_ROOT},
-                                         StaticCase{"cylinder_torsion", 7, 2.6, 1, 0.1, CYLINDER_ROOT},
+                         testing::Values(StaticCase{"cylinder_tip", 7, 0.16, 0.09, 0.1, CYLINDER_ROOT},
+                                         StaticCase{"cylinder_tip_large", 7, 0.21, 0.1, 0.1, CYLINDER_ROOT},
+                                         StaticCase{"cylinder_mid", 7, 0.5, 0.24, 0.1, CYLINDER_ROOT},
+                                         StaticCase{"cylinder_torsion", 7, 2.6, 1.03, 0.1, CYLINDER_ROOT},
                                          StaticCase{"cylinder_axial", 7, 2.2, 1.1, 0.4, CYLINDER_ROOT},
                                          StaticCase{"cylinder_poke_small", 25, 27, 3.8, 0.2, CYLINDER_BED},
                                          StaticCase{"cylinder_poke_large", 25, 28.5, 5.6, 0.3, CYLINDER_BED},
-                                         StaticCase{"gallbladder_tip", 7, 0.7, 0.25, 0.1, PEAR_ROOT},
-                                         StaticCase{"gallbladder_tip_large", 7, 1.1, 0.5, 0.15, PEAR_ROOT},
-                                         StaticCase{"gallbladder_mid", 7, 1.1, 0.45, 0.17, PEAR_ROOT},
-                                         StaticCase{"gallbladder_torsion", 7, 10.8, 2.8, 0.11, PEAR_ROOT},
-                                         StaticCase{"gallbladder_axial", 7, 11.6, 2.6, 0.25, PEAR_ROOT},
-                                         StaticCase{"gallbladder_poke_small", 25, 32, 5.7, 0.2, PEAR_BED},
-                                         StaticCase{"gallbladder_poke_large", 25, 25, 6, 0.35, PEAR_BED}),
+                                         StaticCase{"gallbladder_tip", 7, 0.6, 0.26, 0.1, PEAR_ROOT},
+                                         StaticCase{"gallbladder_tip_large", 7, 0.92, 0.28, 0.15, PEAR_ROOT},
+                                         StaticCase{"gallbladder_mid", 7, 1, 0.4, 0.17, PEAR_ROOT},
+                                         StaticCase{"gallbladder_torsion", 7, 10.6, 2.8, 0.11, PEAR_ROOT},
+                                         StaticCase{"gallbladder_axial", 7, 11.6, 2.5, 0.25, PEAR_ROOT},
+                                         StaticCase{"gallbladder_poke_small", 25, 33, 5.9, 0.2, PEAR_BED},
+                                         StaticCase{"gallbladder_poke_large", 25, 23, 5.8, 0.35, PEAR_BED}),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 // Meshes that the program's own shapes do not come in: the same organs stretched and remeshed, and a kidney.
@@ -183,7 +183,7 @@ INSTANTIATE_TEST_SUITE_P(OfOtherMeshes, StaticAccuracy,
                                          StaticCase{"gallbladder_halved_pull", 7, 5.8, 1.7, 0.1, PEAR_ROOT},
                                          StaticCase{"gallbladder_doubled_tip_large", 7, 0.9, 0.35, 0.1, PEAR_ROOT},
                                          StaticCase{"gallbladder_doubled_pull", 7, 2.3, 0.8, 0.1, PEAR_ROOT},
-                                         StaticCase{"kidney_tip", 20, 3.8, 1.7, 0.1, KIDNEY_ROOT}),
+                                         StaticCase{"kidney_tip", 20, 3.8, 1.5, 0.1, KIDNEY_ROOT}),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 // Bending in both planes, torsion, second bending in both planes; then stretch. The surface swings along.
