@@ -156,7 +156,7 @@ def gallbladder():
         Case("poke_large", "bed", Load("large", tuple(-500 * front)), 3),
     ]
     return Body("gallbladder", "assets/gallbladder/gallbladder.obj", 9e3, 1040, regions, cases,
-                grids={"root": grids(1, 4, 2, 4, 2, 6), "bed": grids(1, 2, 1, 4, 1, 6)}, kept={"root": 2, "bed": 2},
+                grids={"root": grids(1, 4, 2, 4, 2, 6), "bed": grids(1, 4, 1, 6, 1, 8)}, kept={"root": 2, "bed": 2},
                 cut=("root",))
 
 
