@@ -6,9 +6,19 @@
 
 namespace medulla {
 
-void clearPatch(ContactPatch& patch) {
-  patch.entries.clear();
+void fadePatch(double factor, ContactPatch& patch) {
+  constexpr double least = 0.02;  // of the largest share: a spring that is not worth its time
+  if (!patch.isTouched) patch.entries.clear();
+  patch.isTouched = false;
+  double largest = 0;
+  for (ContactPatch::Entry& entry : patch.entries) {
+    entry.weights *= factor;
+    entry.share *= factor;
+    largest = std::max(largest, entry.share);
+  }
+  std::erase_if(patch.entries, [&](const ContactPatch::Entry& e) { return e.share < least * largest; });
   patch.total = 0;
+  for (const ContactPatch::Entry& entry : patch.entries) patch.total += entry.share;
 }
 
 void addContacts(const Proxy& proxy, double push, ContactPatch& patch) {
@@ -25,12 +35,14 @@ void addContacts(const Proxy& proxy, double push, ContactPatch& patch) {
     entry->weights += share * contact.weights;
     entry->share += share;
     patch.total += share;
+    patch.isTouched = true;
   }
 }
 
 void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ContactPatch& patch,
                    std::vector<ProxyContact>& out) {
   out.clear();
+  if (!patch.isTouched) return;
   for (const ContactPatch::Entry& entry : patch.entries) {
     ProxyContact contact;
     contact.triangle = entry.triangle;

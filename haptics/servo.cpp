@@ -26,12 +26,12 @@ struct Tool {
   Grip grip;
   Vector3d coupled = Vector3d::Zero(), coupledAtFrameStart = Vector3d::Zero();
   Vector3d coupledSum = Vector3d::Zero();  // over the frame's ticks
-  ContactPatch patch;                      // of the frame's ticks
-  ProxyContact lastContact;                // while isLeaving: in contact, or not yet clear of it
-  Vector3d lastFelt = Vector3d::Zero();    // unit; along which it was felt
-  double largestPush = 0;                  // N, of the coupling's spring during this contact
-  double clampScale = 1;                   // of the force, at the last tick
-  int ticks = 0;                           // in this frame
+  ContactPatch patch;
+  ProxyContact lastContact;              // while isLeaving: in contact, or not yet clear of it
+  Vector3d lastFelt = Vector3d::Zero();  // unit; along which it was felt
+  double largestPush = 0;                // N, of the coupling's spring during this contact
+  double clampScale = 1;                 // of the force, at the last tick
+  int ticks = 0;                         // in this frame
   bool isLeaving = false;
 };
 }  // namespace
@@ -198,18 +198,19 @@ void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
   data_->alpha = alpha;
 }
 
-static void startFrame(Tool& tool) {
+static void startFrame(double tickDuration, Tool& tool) {
+  constexpr double memory = 0.05;  // s: of three frames at 60 Hz; at half of it tissue still rattles by a tenth
   tool.deviceAtFrameStart = tool.device;
   tool.coupledAtFrameStart = tool.coupled;
   tool.coupledSum.setZero();
+  fadePatch(std::exp(-tool.ticks * tickDuration / memory), tool.patch);
   tool.ticks = 0;
-  clearPatch(tool.patch);
 }
 
 bool Servo::beginFrame() {
   if (!data_->surfaces.take()) return false;
   data_->alpha = 0;
-  for (Tool& tool : data_->tools) startFrame(tool);
+  for (Tool& tool : data_->tools) startFrame(data_->tickDuration, tool);
   return true;
 }
 
@@ -347,7 +348,7 @@ static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, const
   tool.proxy = placeProxy(buckets, start.position, settings.radius);
   tool.grip.held.reserve(buckets.surface().from.size());
   tool.patch.entries.reserve(contactPatchCapacity);
-  startFrame(tool);
+  startFrame(0, tool);
   return tool;
 }
 
