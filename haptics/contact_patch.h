@@ -9,9 +9,8 @@ namespace medulla {
 // Where on the surface a tool pushed, in the ticks of this dynamics frame and, fading, of those before: per touched
 // triangle the mean barycentric point and the share of the push. The dynamics gets one spring per entry. Coarsely
 // meshed tissue that is softer than the tool alternates between neighbouring triangles: what is pushed gives way, its
-// neighbour stands out and is pushed in its place, the more often the shorter the frame. A tool of 2.5 kN/m that holds
-// still in tissue of 14 kPa rattled by 4 N about 9 N so, where 2.5 N are right. Pushing where the tool has been lately
-// has no such cycle.
+// neighbour stands out and is pushed in its place, the more often the shorter the frame. Pushing where the tool has
+// been lately has no such cycle.
 struct ContactPatch {
   struct Entry {
     int triangle = -1;
