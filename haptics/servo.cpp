@@ -199,7 +199,7 @@ void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
 }
 
 static void startFrame(double tickDuration, Tool& tool) {
-  constexpr double memory = 0.05;  // s: of three frames at 60 Hz; at half of it tissue still rattles by a tenth
+  constexpr double memory = 0.05;  // s; half as long a force scatters by 16 % where this leaves 10
   tool.deviceAtFrameStart = tool.device;
   tool.coupledAtFrameStart = tool.coupled;
   tool.coupledSum.setZero();

@@ -101,7 +101,7 @@ std::vector<double> volumesBehind(const SoftBodyModel& model) {
 }
 
 // Cells of the spheres span three cells of the grid or more, necks between parts of the body two; 1500 for the whole
-// body take four seconds at seven spheres. Where what is held ends, displacements go as the root of the distance, which
+// body take six seconds at seven spheres. Where what is held ends, displacements go as the root of the distance, which
 // no polynomial follows, so that finer cells converge in the first order only: at 600 a gallbladder held by its neck
 // bends half a percent less.
 CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const Vector3d&)>& behind) {
