@@ -46,7 +46,8 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   sampleInputs(0, inputs_);
 
   std::vector<TouchableBody> bodies;
-  for (const auto& model : loaded.models) bodies.push_back({model});
+  for (std::size_t b = 0; b < loaded.models.size(); ++b)
+    bodies.push_back({loaded.models[b], world_.nodeGive(static_cast<int>(b))});
   std::vector<ToolSettings> tools;
   for (const SceneTool& tool : loaded.scene.tools) tools.push_back(tool.settings);
   servo_ = std::make_unique<Servo>(bodies, tools, tickDuration_, current_, inputs_, embree);

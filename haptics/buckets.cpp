@@ -224,13 +224,17 @@ static std::string deviceConfig(const EmbreeSettings& embree) {
   return config;
 }
 
-Buckets::Buckets(const std::vector<std::shared_ptr<const SoftBodyModel>>& bodies, double largestRadius,
-                 const DynamicsFrame& rest, const EmbreeSettings& embree)
+Buckets::Buckets(const std::vector<TouchableBody>& bodies, double largestRadius, const DynamicsFrame& rest,
+                 const EmbreeSettings& embree)
     : data_(std::make_unique<Data>()) {
   data_->device = rtcNewDevice(deviceConfig(embree).c_str());
   if (!data_->device) throw std::runtime_error("Embree cannot start: expected a CPU with SSE2 and memory for a device");
   BlendedSurface& surface = data_->surface;
-  for (const auto& model : bodies) appendBody(*model, surface, data_->buckets);
+  for (const TouchableBody& body : bodies) {
+    appendBody(*body.model, surface, data_->buckets);
+    surface.give.insert(surface.give.end(), body.give.begin(), body.give.end());
+    surface.give.resize(surface.bodyOfNode.size(), 0);
+  }
   listTrianglesOfNodes(surface);
   data_->near.reserve(surface.triangles.size());
   data_->bounds.resize((data_->buckets.size() + 3) / 4 * 4);

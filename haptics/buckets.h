@@ -12,11 +12,18 @@
 
 namespace medulla {
 
+// A surface that a tool can touch: a soft body's triangles grouped by filling sphere.
+struct TouchableBody {
+  std::shared_ptr<const SoftBodyModel> model;
+  std::vector<double> give{};  // m/N per node, >= 0: what it yields at once to a force on it alone; empty: nothing
+};
+
 // The surfaces of all bodies in one numbering of nodes and triangles, between two dynamics frames.
 struct BlendedSurface {
   std::vector<std::array<int, 3>> triangles;  // node numbers
   std::vector<int> bodyOfNode;
   std::vector<int> firstNode;  // of each body
+  std::vector<double> give;    // m/N per node: TouchableBody::give
   // The triangles of node n: trianglesOfNode[firstTriangleOfNode[n]] up to those of n + 1.
   std::vector<int> firstTriangleOfNode, trianglesOfNode;
   std::vector<Eigen::Vector3d> from, to;  // m, world, per node
@@ -51,8 +58,8 @@ struct SurfaceHit : SweepHit {
 class Buckets {
  public:
   // `largestRadius`: of any sphere that will be swept, m. Throws std::runtime_error when Embree cannot start.
-  Buckets(const std::vector<std::shared_ptr<const SoftBodyModel>>& bodies, double largestRadius,
-          const DynamicsFrame& rest, const EmbreeSettings& embree = {});
+  Buckets(const std::vector<TouchableBody>& bodies, double largestRadius, const DynamicsFrame& rest,
+          const EmbreeSettings& embree = {});
   ~Buckets();
   Buckets(Buckets&&) noexcept;
   Buckets& operator=(Buckets&&) noexcept;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 #include <string>
 
@@ -10,6 +11,7 @@
 #include "haptics/contact_patch.h"
 #include "haptics/grab.h"
 #include "haptics/proxy.h"
+#include "haptics/tissue_motion.h"
 #include "haptics/triple_buffer.h"
 
 namespace medulla {
@@ -30,6 +32,7 @@ struct Tool {
   ProxyContact lastContact;              // while isLeaving: in contact, or not yet clear of it
   Vector3d lastFelt = Vector3d::Zero();  // unit; along which it was felt
   double largestPush = 0;                // N, of the coupling's spring during this contact
+  DeviceMotion motion;                   // in this contact or grip
   double clampScale = 1;                 // of the force, at the last tick
   int ticks = 0;                         // in this frame
   bool isLeaving = false;
@@ -75,34 +78,27 @@ static Vector3d tangential(const Vector3d& v, const Vector3d& normal) {
   return v - v.dot(normal) * normal;
 }
 
-static Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyContact& contact) {
-  const auto& [a, b, c] = surface.triangles[contact.triangle];
-  return contact.weights.x() * surface.nodeStep(a, alpha) + contact.weights.y() * surface.nodeStep(b, alpha) +
-         contact.weights.z() * surface.nodeStep(c, alpha);
-}
-
-static Vector3d meanContactStep(const BlendedSurface& surface, double alpha, const Proxy& proxy) {
-  Vector3d sum = Vector3d::Zero();
-  for (int k = 0; k < proxy.contactCount; ++k)
-    sum += proxy.contacts[k].share * contactStep(surface, alpha, proxy.contacts[k]);
-  return sum;
-}
-
 // What the surface's motion adds to the spring's force. The damper, against the velocity of the surface point in the
 // dynamics: the proxy's own, differenced over ticks, would jump at every edge. And the lead: the blended surface is one
-// frame late, by just the step that it moves in a frame; uncorrected, a device that presses at speed v feels k v T too
-// much, on soft tissue several times the tissue's own force.
-static Vector3d motionForce(const ToolSettings& tool, const Vector3d& lead, const Vector3d& step, double frameDuration,
-                            const Vector3d& deviceVelocity) {
-  const Vector3d velocity = frameDuration > 0 ? Vector3d(step / frameDuration) : Vector3d::Zero();
-  return tool.stiffness * lead + tool.damping * (velocity - deviceVelocity);
+// frame late; uncorrected, a device that presses at speed v feels k v T too much, on soft tissue several times the
+// tissue's own force.
+static Vector3d motionForce(const Tool& tool, const TissueMotion& tissue) {
+  return tool.settings.stiffness * tissue.lead + tool.settings.damping * (tissue.velocity - tool.motion.velocity);
+}
+
+static TissueMotion touchedMotion(const BlendedSurface& surface, double alpha, const Vector3d& normal,
+                                  const Tool& tool) {
+  const Proxy& proxy = tool.proxy;
+  const auto contacts =
+      proxy.inContact() ? std::span(proxy.contacts).first(proxy.contactCount) : std::span(&tool.lastContact, 1);
+  return contactMotion(surface, alpha, contacts, normal, tool.settings.stiffness, tool.motion);
 }
 
 // The coupling of a contact that pushes, or that the tool is leaving: along the normal the spring, negative once the
 // device has left the late surface, plus the motion's part, never pulling. The motion's part is bounded by the largest
 // that the spring has been in this contact, so that force begins without a step on a surface that already moves.
 // Tangentially a slipping contact is dragged by friction alone, which the proxy's position already holds.
-static Vector3d contactForce(const BlendedSurface& surface, double alpha, const Vector3d& deviceVelocity, Tool& tool) {
+static Vector3d contactForce(const BlendedSurface& surface, double alpha, const Vector3d& way, Tool& tool) {
   if (!tool.isLeaving) return Vector3d::Zero();
   const Proxy& proxy = tool.proxy;
   const ProxyContact& last = tool.lastContact;
@@ -113,25 +109,26 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
       isPressed ? pull.norm() : normal.dot(last.point + tool.settings.radius * last.normal - tool.device.position);
   const double spring = tool.settings.stiffness * depth;
   tool.largestPush = std::max(tool.largestPush, spring);
-  const Vector3d step = isPressed ? meanContactStep(surface, alpha, proxy) : contactStep(surface, alpha, last);
-  const Vector3d motion = motionForce(tool.settings, step, step, surface.duration, deviceVelocity);
+  tool.motion.way[0] += std::max(way.dot(normal), -std::max(0.0, depth)) * normal;  // from where it touched
+  const Vector3d motion = motionForce(tool, touchedMotion(surface, alpha, normal, tool));
   const double push = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
   return push * normal + (proxy.slipping ? Vector3d::Zero() : tangential(motion, normal));
 }
 
-static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Tool& tool,
-                          const Vector3d& deviceVelocity) {
+static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Tool& tool) {
   return tool.settings.stiffness * meanHeldGap(surface, alpha, tool.device, tool.grip) +
-         motionForce(tool.settings, meanHeldLead(surface, alpha, tool.grip), meanHeldStep(surface, alpha, tool.grip),
-                     surface.duration, deviceVelocity);
+         motionForce(tool, heldMotion(surface, alpha, tool.grip, tool.settings.stiffness, tool.motion));
 }
 
 // In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
 // contact is therefore handed over until the tool is clear of the point by its radius: a spring that only pushes does
 // no harm where nothing is pushed, and without it the tissue would jump free and knock against the tool.
-static void followLeaving(const BlendedSurface& surface, double alpha, Tool& tool) {
+static void followLeaving(const BlendedSurface& surface, double alphaBefore, double alpha, Tool& tool) {
   if (tool.proxy.inContact()) {
-    if (!tool.isLeaving) tool.largestPush = 0;
+    if (!tool.isLeaving) {
+      tool.largestPush = 0;
+      beginWay(alphaBefore, tool.motion);
+    }
     tool.lastContact = tool.proxy.mainContact();
     tool.lastFelt = tool.proxy.felt.isZero(0) ? tool.lastContact.normal : tool.proxy.felt.normalized();
     tool.isLeaving = true;
@@ -160,13 +157,33 @@ static void record(const Vector3d& force, Tool& tool, ToolState& state) {
   ++tool.ticks;
 }
 
+// Opens or closes. The targets of what it takes hold of are measured where the nodes are by now, from where the contact
+// is felt by now: the springs, with what motion adds, then start with the contact's force, and the tissue with no jerk.
+static void tickGrip(const BlendedSurface& surface, double alpha, Tool& tool) {
+  Grip& grip = tool.grip;
+  const bool wasHolding = !grip.held.empty();
+  updateGrip(surface, alpha, tool.proxy, tool.device, tool.settings.gripRadius, grip);
+  if (wasHolding == !grip.held.empty()) return;
+  if (wasHolding) {
+    beginWay(alpha, tool.motion);
+    return;
+  }
+  const Vector3d pull = tool.proxy.centre + tool.proxy.shading - tool.device.position;
+  const Vector3d normal = pull.squaredNorm() > 0 ? Vector3d(pull.normalized()) : tool.lastFelt;
+  const Vector3d lead = heldMotion(surface, alpha, grip, tool.settings.stiffness, tool.motion).lead -
+                        touchedMotion(surface, alpha, normal, tool).lead - meanHeldLead(surface, alpha, grip);
+  const Eigen::Quaterniond toolFromWorld = tool.device.worldFromTool.conjugate();
+  for (HeldOffset& held : grip.held) held.offset += toolFromWorld * (surface.nodeLead(held.node, alpha) + lead);
+}
+
 // Whether the grip holds on, its force recorded.
-static bool tickGrip(const BlendedSurface& surface, double alpha, const Vector3d& deviceVelocity, Tool& tool,
-                     ToolState& state) {
+static bool feelGrip(const BlendedSurface& surface, double alpha, const Vector3d& way, Tool& tool, ToolState& state) {
   if (tool.grip.held.empty()) return false;
-  const Vector3d force = heldForce(surface, alpha, tool, deviceVelocity);
+  tool.motion.way[0] += way;
+  const Vector3d force = heldForce(surface, alpha, tool);
   if (std::min(force.norm(), tool.settings.forceMax) > tool.settings.gripForceMax) {
     letSlip(tool.grip);
+    beginWay(alpha, tool.motion);
     return false;
   }
   record(force, tool, state);
@@ -177,15 +194,16 @@ static bool tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
 static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, double tickDuration,
                      const ToolSample& input, Tool& tool, ToolState& state) {
   const BlendedSurface& surface = buckets.surface();
-  const Vector3d way = input.position - tool.device.position, deviceVelocity = way / tickDuration;
+  const Vector3d way = input.position - tool.device.position;
   state.energy += state.force.dot(way);  // the device holds a tick's force until the next (Hannaford and Ryu 2002)
   tool.device = input;
+  tool.motion.velocity = way / tickDuration;
   followSurface(buckets, alphaBefore, alpha, tool.settings.radius, tool.proxy);
-  updateGrip(surface, alpha, tool.proxy, tool.device, tool.settings.gripRadius, tool.grip);
-  if (tickGrip(surface, alpha, deviceVelocity, tool, state)) return;
+  tickGrip(surface, alpha, tool);
+  if (feelGrip(surface, alpha, way, tool, state)) return;
   followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
-  followLeaving(surface, alpha, tool);
-  record(contactForce(surface, alpha, deviceVelocity, tool), tool, state);
+  followLeaving(surface, alphaBefore, alpha, tool);
+  record(contactForce(surface, alpha, way, tool), tool, state);
   addContacts(tool.proxy, (tool.proxy.centre - tool.device.position).norm(), tool.patch);
 }
 
@@ -203,6 +221,7 @@ static void startFrame(double tickDuration, Tool& tool) {
   tool.deviceAtFrameStart = tool.device;
   tool.coupledAtFrameStart = tool.coupled;
   tool.coupledSum.setZero();
+  startFrame(tool.motion);
   fadePatch(std::exp(-tool.ticks * tickDuration / memory), tool.patch);
   tool.ticks = 0;
 }
@@ -355,15 +374,12 @@ static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, const
 static TripleBuffer<Buckets> makeSurfaces(const std::vector<TouchableBody>& bodies,
                                           const std::vector<ToolSettings>& tools, const DynamicsFrame& rest,
                                           const EmbreeSettings& embree) {
-  std::vector<std::shared_ptr<const SoftBodyModel>> models;
-  models.reserve(bodies.size());
-  for (const TouchableBody& body : bodies) models.push_back(body.model);
   double largestRadius = 0;
   for (std::size_t k = 0; k < tools.size(); ++k) {
     checkSettings(tools[k], k);
     largestRadius = std::max(largestRadius, tools[k].radius);
   }
-  const auto make = [&] { return Buckets(models, largestRadius, rest, embree); };
+  const auto make = [&] { return Buckets(bodies, largestRadius, rest, embree); };
   return TripleBuffer<Buckets>({make(), make(), make()});
 }
 

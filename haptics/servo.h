@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "haptics/embree_settings.h"
+#include "haptics/buckets.h"
 #include "haptics/tool_input.h"
 #include "physics/dynamics/frame.h"
 #include "physics/dynamics/loads.h"
@@ -18,11 +18,6 @@
 // What stands before the bar is the servo's side, what stands behind it the dynamics' side. In logical time both run in
 // turns; live each runs in a thread of its own, and commit() passes surfaces on through a TripleBuffer.
 namespace medulla {
-
-// A surface that a tool can touch: a soft body's triangles grouped by filling sphere.
-struct TouchableBody {
-  std::shared_ptr<const SoftBodyModel> model;
-};
 
 struct ToolState {
   Eigen::Vector3d device = Eigen::Vector3d::Zero();  // m

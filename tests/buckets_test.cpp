@@ -110,7 +110,7 @@ TEST(Buckets, SweepsEqualBruteForceBitForBitForAnyNumberOfBuckets) {
   };
   for (const int count : {1, 7, 40}) {
     const TouchShape shape = ellipsoid(18, 14, count);
-    Buckets buckets({shape}, 0.003, frameAt(*shape, 0));
+    Buckets buckets({{shape}}, 0.003, frameAt(*shape, 0));
     const auto still = buckets.surface().steps;
     for (int frame = 0; frame < 5; ++frame) {
       buckets.commit(frameAt(*shape, frame, wave), frameAt(*shape, frame + 1, wave), still);
@@ -130,7 +130,7 @@ TEST(Buckets, SweepsEqualBruteForceBitForBitForAnyNumberOfBuckets) {
 
 TEST(Buckets, AtASharedEdgeTheLowestTriangleOfTheEarliestTimeWins) {
   const TouchShape shape = plate(4, 0.04, 0.01, 3);
-  Buckets buckets({shape}, 0.003, frameAt(*shape, 0));
+  Buckets buckets({{shape}}, 0.003, frameAt(*shape, 0));
   for (const Vector3d& start : {Vector3d(0, 0.05, 0), Vector3d(0.01, 0.05, 0.01), Vector3d(0.02, 0.05, 0.005)}) {
     const SurfaceHit expected = bruteForce(buckets.surface(), start, {0, -0.06, 0}, 0.003, 1);
     SurfaceHit hit;
@@ -143,7 +143,7 @@ TEST(Buckets, AtASharedEdgeTheLowestTriangleOfTheEarliestTimeWins) {
 TEST(Buckets, NearMissesNoTriangleWithinReach) {
   TestRandom random;
   const TouchShape shape = ellipsoid(18, 14, 7);
-  Buckets buckets({shape}, 0.003, frameAt(*shape, 0));
+  Buckets buckets({{shape}}, 0.003, frameAt(*shape, 0));
   for (int n = 0; n < 300; ++n) {
     const Vector3d p = random.vector(0.1);
     const double reach = random.uniform(0, 0.01);

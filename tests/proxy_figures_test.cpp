@@ -17,7 +17,7 @@ static void expectReached(const char* what, double reached, double limit) {
 
 // Where the sphere of the tool touches the ellipsoid from above.
 static Vector3d touchdown(const TouchShape& shape, double radius) {
-  Buckets buckets({shape}, radius, frameAt(*shape, 0));
+  Buckets buckets({{shape}}, radius, frameAt(*shape, 0));
   SurfaceHit hit;
   EXPECT_TRUE(buckets.sweep({0.012, 0.004, 0.2}, {0, 0, -0.2}, radius, 1, -1, hit));
   return {0.012, 0.004, 0.2 - 0.2 * hit.t};

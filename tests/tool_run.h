@@ -20,11 +20,12 @@ struct ToolRun {
   Eigen::Vector3d bodyImpulse = Eigen::Vector3d::Zero();  // N s, that the dynamics took
   double bodyImpulseLength = 0;                           // N s, sum over frames of its size
   bool blend = true;                                      // false: every tick at the newest frame
+  std::vector<double> give{};                             // TouchableBody::give
 
   void run(double duration, const std::function<void(double time, const ToolState&)>& each = {}) {
     const double frameDuration = ticksPerFrame * tickDuration;
     DynamicsFrame last = body.frame(), now = last;
-    Servo servo({{body.shape}}, {tool}, tickDuration, now, {device(0)});
+    Servo servo({{body.shape, give}}, {tool}, tickDuration, now, {device(0)});
     const int frames = int(std::lround(duration / frameDuration));
     for (int frame = 0; frame < frames; ++frame) {
       for (int k = 1; k <= ticksPerFrame; ++k) {

@@ -198,6 +198,8 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
   const std::vector<BodyMechanics> mechanics = mechanicsOf(bodies, settings.integrator, stable);
   data_ = layOut(settings, std::move(bodies), mechanics);
   data_->stableSubstep = stable;
+  for (std::size_t b = 0; b < mechanics.size(); ++b)
+    data_->nodeGive.push_back(medulla::nodeGive(data_->bodies[b], mechanics[b]));
   // Below this a second of simulation takes over an hour: a wrong unit rather than a stiff tissue.
   constexpr double kLeastSubstep = 1e-8;
   if (settings.integrator == Integrator::explicitEuler && settings.substeps == 0 &&
@@ -312,6 +314,10 @@ double World::nodeSpeed(int body) const {
   for (int i : data_->ranges.at(body).node)
     squared = std::max(squared, vectorAt(data_->nodes.velocity, i).squaredNorm());
   return std::sqrt(squared);
+}
+
+const std::vector<double>& World::nodeGive(int body) const {
+  return data_->nodeGive.at(body);
 }
 
 int World::dynamicNodes(int body) const {

@@ -318,8 +318,9 @@ struct WorldData {
   Springs springs;
   Identified identified;
   SurfaceParts surface;
-  std::vector<Rest> rest;              // per body
-  std::vector<StillPlace> stillPlace;  // per sphere; state
+  std::vector<Rest> rest;                     // per body
+  std::vector<std::vector<double>> nodeGive;  // per body: World::nodeGive()
+  std::vector<StillPlace> stillPlace;         // per sphere; state
   Awake awake;
   std::vector<SphereDrive> drives;
   std::vector<NodeForce> deadLoads;  // body after body, as described

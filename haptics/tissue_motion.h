@@ -1,0 +1,46 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <span>
+
+#include "haptics/grab.h"
+#include "haptics/proxy.h"
+
+// Where touched or held tissue is by now, ahead of the blended surface, which is a frame late. What is known is how it
+// moved before, its steps; and how the device moves, which the tissue follows by a part that its give tells. So the
+// tissue's steps answer the device's way of those frames, and the way that lies beyond, where a device begins to touch
+// or changes its speed, moves the tissue by that part of it. Steps alone make a first touch on soft tissue twenty times
+// too hard for two frames.
+namespace medulla {
+
+// Of one device while it touches or holds.
+struct DeviceMotion {
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s, over the last tick
+  // m: the way that counts, in this dynamics frame so far and in the three before.
+  std::array<Eigen::Vector3d, 4> way{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
+                                     Eigen::Vector3d::Zero()};
+  double since = 0, sinceBefore = 0;  // alpha from which on it counts, in this frame and in the one before
+};
+
+void beginWay(double alpha, DeviceMotion& device);
+void startFrame(DeviceMotion& device);
+
+struct TissueMotion {
+  Eigen::Vector3d lead = Eigen::Vector3d::Zero();      // m, by now ahead of the blended surface
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s, by now
+};
+
+// Mean over contacts that share a push along `normal`, by a device of this stiffness (N/m). The steps are in all
+// directions, what lies beyond them along the normal: along the surface, friction lets tissue follow or not.
+TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
+                           const Eigen::Vector3d& normal, double stiffness, const DeviceMotion& device);
+
+// m, of the point that is touched, within a frame at its present velocity.
+Eigen::Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyContact& contact);
+
+// Mean over what a grip holds.
+TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,
+                        const DeviceMotion& device);
+
+}  // namespace medulla

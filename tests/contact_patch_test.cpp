@@ -1,0 +1,50 @@
+#include "haptics/contact_patch.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace medulla {
+
+static Proxy touching(int triangle) {
+  Proxy proxy;
+  proxy.contactCount = 1;
+  proxy.contacts[0].triangle = triangle;
+  proxy.contacts[0].weights = {0.5, 0.25, 0.25};
+  proxy.contacts[0].share = 1;
+  return proxy;
+}
+
+TEST(ContactPatch, WhatIsTouchedNowCountsHoweverManyTrianglesWereBefore) {
+  ContactPatch patch;
+  patch.entries.reserve(contactPatchCapacity);
+  const int last = 2 * contactPatchCapacity;
+  for (int triangle = 0; triangle <= last; ++triangle) {
+    fadePatch(0.99, patch);
+    addContacts(touching(triangle), 1, patch);
+  }
+  ASSERT_EQ(patch.entries.size(), contactPatchCapacity);
+  double total = 0;
+  for (const ContactPatch::Entry& entry : patch.entries) {
+    EXPECT_GT(entry.triangle, last - contactPatchCapacity);  // those touched last
+    EXPECT_NEAR(entry.weights.sum(), entry.share, 1e-12);
+    total += entry.share;
+  }
+  EXPECT_NEAR(patch.total, total, 1e-12 * total);
+  EXPECT_EQ(patch.entries.back().triangle, last);
+  EXPECT_DOUBLE_EQ(patch.entries.back().share, 1);
+}
+
+TEST(ContactPatch, FadesAndIsGoneAfterAFrameWithoutTouch) {
+  ContactPatch patch;
+  addContacts(touching(7), 2, patch);
+  fadePatch(0.5, patch);
+  ASSERT_EQ(patch.entries.size(), 1U);
+  EXPECT_DOUBLE_EQ(patch.entries[0].share, 1);
+  EXPECT_DOUBLE_EQ(patch.total, 1);
+  fadePatch(0.5, patch);
+  EXPECT_TRUE(patch.entries.empty());
+  EXPECT_DOUBLE_EQ(patch.total, 0);
+}
+
+}  // namespace medulla

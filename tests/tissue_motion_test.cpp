@@ -1,0 +1,138 @@
+#include "haptics/tissue_motion.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <vector>
+
+#include "physics/dynamics/world.h"
+#include "tests/synthetic_model.h"
+#include "tests/tool_run.h"
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+// Light tissue: it is where its springs want it within a small part of a frame.
+static ToolRun lightTissue() {
+  ToolRun run{SpringBody(ellipsoid(24, 20, 7, 0.3)), {}, {}, 24, 1.0 / 1200, {}};
+  run.body.mass = 2e-4;
+  run.body.groundDamping = 0.08;
+  run.body.edgeDamping = 0.06;
+  return run;
+}
+
+// N, of every tick, on a hand that comes down on tissue, presses, and with `grips` takes hold of it and lifts it.
+static std::vector<Vector3d> feltForces(int dynamicsRate, double give, bool grips) {
+  ToolRun run = lightTissue();
+  run.ticksPerFrame = 1200 / dynamicsRate;
+  run.give.assign(run.body.shape->restNodes.size(), give);
+  run.device = [=](double t) {
+    const double lift = grips ? 0.01 * ease(t, 0.3, 0.2) : 0;
+    return deviceAt({0.012, 0.004, 0.0585 - std::min(0.008, 0.05 * t) + lift}, grips && t > 0.3 ? 1 : 0);
+  };
+  std::vector<Vector3d> forces;
+  run.run(0.6, [&](double, const ToolState& tool) { forces.push_back(tool.force); });
+  return forces;
+}
+
+static double rmsDifference(const std::vector<Vector3d>& a, const std::vector<Vector3d>& b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - b[k]).squaredNorm();
+  return std::sqrt(sum / double(a.size()));
+}
+
+TEST(TissueMotion, WhatTissueGivesBringsTheForceNearThatOfShortFrames) {
+  const double give = 1 / lightTissue().body.ground;
+  for (const bool grips : {false, true}) {
+    const std::vector<Vector3d> fine = feltForces(300, give, grips);
+    const double with = rmsDifference(feltForces(50, give, grips), fine),
+                 without = rmsDifference(feltForces(50, 0, grips), fine);
+    std::printf("[  reached ] %s: off the force of short frames by %.3g N, %.3g N without give\n",
+                grips ? "grip" : "press", with, without);
+    EXPECT_LT(with, 0.5 * without);
+  }
+}
+
+TEST(TissueMotion, AtASteadySpeedTheStepsAreTheWholeLead) {
+  DeviceMotion device;
+  device.velocity = {0, -0.05, 0};
+  device.way.fill(0.02 * device.velocity);
+  BlendedSurface surface;
+  surface.duration = 0.02;
+  surface.triangles = {{0, 1, 2}};
+  surface.from = surface.to = {{0, 0, 0}, {0, 0, 0.01}, {0.01, 0, 0}};
+  surface.give.assign(3, 0.1);
+  for (auto& steps : surface.steps) steps.assign(3, 0.9 * device.way[0]);
+  ProxyContact contact;
+  contact.triangle = 0;
+  contact.weights = {0.2, 0.3, 0.5};
+  contact.share = 1;
+  Grip grip;
+  grip.held = {{0, Vector3d::Zero()}, {1, Vector3d::Zero()}};
+  for (const double alpha : {0.25, 0.5, 1.0}) {
+    device.way[0] = alpha * device.way[1];
+    for (const TissueMotion& motion : {contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), 400, device),
+                                       heldMotion(surface, alpha, grip, 400, device)}) {
+      EXPECT_LT((motion.lead - surface.steps[0][0]).norm(), 1e-15);
+      EXPECT_LT((motion.velocity - surface.steps[0][0] / 0.02).norm(), 1e-13);
+    }
+  }
+}
+
+TEST(TissueMotion, AtFirstTouchTissueFollowsByThePartThatItsGiveTells) {
+  BlendedSurface surface;
+  surface.duration = 0.02;
+  surface.triangles = {{0, 1, 2}};
+  surface.give = {0.01, 0, 0};
+  for (auto& steps : surface.steps) steps.assign(3, Vector3d::Zero());
+  ProxyContact contact;
+  contact.triangle = 0;
+  contact.weights = {1, 0, 0};
+  contact.share = 1;
+  DeviceMotion device;
+  beginWay(0.5, device);
+  device.velocity = {0.03, -0.05, 0};
+  const double part = 400 * 0.01 / (1 + 400 * 0.01);
+  const auto lead = [&](double alpha) {
+    return contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), 400, device).lead;
+  };
+  device.way[0] = {0, -3e-4, 0};
+  EXPECT_LT((lead(0.8) - part * Vector3d(0, -3e-4, 0)).norm(), 1e-15);
+  device.way[0] = {0, -5e-4, 0};
+  const Vector3d end = lead(1);
+  startFrame(device);
+  EXPECT_LT((lead(1e-9) - end).norm(), 1e-11);  // no step from frame to frame
+}
+
+// The other nodes beyond the neighbours, and the spheres, stand still.
+TEST(TissueMotion, ANodeGivesUnderAForceOnItAlone) {
+  for (const bool isLoaded : {false, true}) {
+    BodyDescription body = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
+    for (int i = 0; i < 5; ++i) body.fixed.push_back({i, FixedFreedom::all});
+    body.fixedNodes = {0};
+    const int node = 35;
+    const Vector3d force(0, 1e-4, 0);
+    if (isLoaded) body.deadLoads = {{node, force, 0, 0}};
+    WorldSettings settings;
+    settings.gravity.setZero();
+    World world(settings, {body});
+    if (!isLoaded) {
+      EXPECT_EQ(world.nodeGive(0)[0], 0);
+      body.surface = SurfaceMode::skin;
+      EXPECT_EQ(World(settings, {body}).nodeGive(0)[node], 0);
+      continue;
+    }
+    DynamicsFrame frame;
+    world.readFrame(frame);
+    const Vector3d rest = frame.bodies[0].nodes[node];
+    for (int k = 0; k < 100; ++k) world.advance({});
+    world.readFrame(frame);
+    const double give = (frame.bodies[0].nodes[node] - rest).norm() / force.norm();
+    std::printf("[  reached ] a node gives %.4g m/N, estimated %.4g\n", give, world.nodeGive(0)[node]);
+    EXPECT_GT(world.nodeGive(0)[node], 0.7 * give);
+    EXPECT_LT(world.nodeGive(0)[node], 1.1 * give);
+  }
+}
+
+}  // namespace medulla
