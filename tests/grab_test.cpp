@@ -45,6 +45,25 @@ TEST(Grab, ClosingInContactHoldsThePatchWithTheToolsStiffnessAndNoForceStep) {
   EXPECT_NEAR(stiffness, run.tool.stiffness, 1e-9);
 }
 
+TEST(Grab, ClosingWhileItPressesAtSpeedHasNoForceStep) {
+  constexpr double kSpeed = 0.04;  // m/s
+  for (const double give : {0.0, 0.02}) {
+    ToolRun run = grabbing();
+    run.give.assign(run.body.shape->restNodes.size(), give);
+    run.device = [=](double t) { return deviceAt(touch - kSpeed * t * Vector3d::UnitZ(), t > 0.15 ? 1 : 0); };
+    Vector3d last = Vector3d::Zero();
+    bool held = false;
+    double step = 0;
+    run.run(0.2, [&](double, const ToolState& tool) {
+      if (tool.holding && !held) step = (tool.force - last).norm();
+      held = tool.holding;
+      last = tool.force;
+    });
+    ASSERT_TRUE(held);
+    EXPECT_LT(step, 1.2 * run.tool.stiffness * kSpeed * run.tickDuration) << give;  // what a tick of the way adds
+  }
+}
+
 TEST(Grab, TissueIsFeltWhereItIsByNowWhileItAccelerates) {
   constexpr double kFrame = 0.02, kTick = 1e-3, kStart = 0.1, kAcceleration = 2;  // s, m/s2
   const auto way = [](double t) { return 0.5 * kAcceleration * std::pow(std::max(0.0, t - kStart), 2); };
