@@ -125,12 +125,12 @@ static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Too
 // no harm where nothing is pushed, and without it the tissue would jump free and knock against the tool.
 static void followLeaving(const BlendedSurface& surface, double alphaBefore, double alpha, Tool& tool) {
   if (tool.proxy.inContact()) {
-    if (!tool.isLeaving) {
-      tool.largestPush = 0;
-      beginWay(alphaBefore, tool.motion);
-    }
     tool.lastContact = tool.proxy.mainContact();
     tool.lastFelt = tool.proxy.felt.isZero(0) ? tool.lastContact.normal : tool.proxy.felt.normalized();
+    if (!tool.isLeaving) {
+      tool.largestPush = 0;
+      beginContact(surface, alphaBefore, tool.lastContact, tool.lastFelt, tool.settings.stiffness, tool.motion);
+    }
     tool.isLeaving = true;
   } else if (tool.isLeaving) {
     const Triangle triangle = surface.triangle(tool.lastContact.triangle, alpha);
@@ -165,15 +165,15 @@ static void tickGrip(const BlendedSurface& surface, double alpha, Tool& tool) {
   updateGrip(surface, alpha, tool.proxy, tool.device, tool.settings.gripRadius, grip);
   if (wasHolding == !grip.held.empty()) return;
   if (wasHolding) {
-    beginWay(alpha, tool.motion);
+    tool.isLeaving = false;
     return;
   }
   const Vector3d pull = tool.proxy.centre + tool.proxy.shading - tool.device.position;
   const Vector3d normal = pull.squaredNorm() > 0 ? Vector3d(pull.normalized()) : tool.lastFelt;
-  const Vector3d lead = heldMotion(surface, alpha, grip, tool.settings.stiffness, tool.motion).lead -
-                        touchedMotion(surface, alpha, normal, tool).lead - meanHeldLead(surface, alpha, grip);
+  const Vector3d lead = touchedMotion(surface, alpha, normal, tool).lead;
+  beginHold(surface, alpha, grip, tool.settings.stiffness, tool.motion);
   const Eigen::Quaterniond toolFromWorld = tool.device.worldFromTool.conjugate();
-  for (HeldOffset& held : grip.held) held.offset += toolFromWorld * (surface.nodeLead(held.node, alpha) + lead);
+  for (HeldOffset& held : grip.held) held.offset += toolFromWorld * (surface.nodeLead(held.node, alpha) - lead);
 }
 
 // Whether the grip holds on, its force recorded.
@@ -183,7 +183,7 @@ static bool feelGrip(const BlendedSurface& surface, double alpha, const Vector3d
   const Vector3d force = heldForce(surface, alpha, tool);
   if (std::min(force.norm(), tool.settings.forceMax) > tool.settings.gripForceMax) {
     letSlip(tool.grip);
-    beginWay(alpha, tool.motion);
+    tool.isLeaving = false;
     return false;
   }
   record(force, tool, state);

@@ -7,12 +7,6 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-void beginWay(double alpha, DeviceMotion& device) {
-  device.way.fill(Vector3d::Zero());
-  device.since = alpha;
-  device.sinceBefore = 0;
-}
-
 void startFrame(DeviceMotion& device) {
   std::rotate(device.way.begin(), device.way.end() - 1, device.way.end());
   device.way[0].setZero();
@@ -40,8 +34,13 @@ Vector3d wayOfLead(const DeviceMotion& device, double alpha) {
   return blendPoint(2 * device.way[2] - device.way[3], 2 * device.way[1] - device.way[2], alpha);
 }
 
+Vector3d meanOver(const BlendedSurface& surface, const ProxyContact& contact, const std::vector<Vector3d>& ofNodes) {
+  const auto& [a, b, c] = surface.triangles[contact.triangle];
+  return contact.weights.x() * ofNodes[a] + contact.weights.y() * ofNodes[b] + contact.weights.z() * ofNodes[c];
+}
+
 // m/N, mean over the contacts: what each yields to its share of a push.
-double giveOf(const BlendedSurface& surface, std::span<const ProxyContact> contacts) {
+double contactGive(const BlendedSurface& surface, std::span<const ProxyContact> contacts) {
   double sum = 0, shares = 0;
   for (const ProxyContact& contact : contacts) {
     double own = 0;
@@ -54,7 +53,7 @@ double giveOf(const BlendedSurface& surface, std::span<const ProxyContact> conta
 }
 
 // m/N: of springs side by side. Less than what they give together, for between them the edges do not hold.
-double giveOf(const BlendedSurface& surface, const Grip& grip) {
+double heldGive(const BlendedSurface& surface, const Grip& grip) {
   double stiffness = 0;
   for (const HeldOffset& held : grip.held) {
     if (!(surface.give[held.node] > 0)) return 0;
@@ -66,9 +65,31 @@ double giveOf(const BlendedSurface& surface, const Grip& grip) {
 }  // namespace
 
 Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyContact& contact) {
-  const auto& [a, b, c] = surface.triangles[contact.triangle];
-  return contact.weights.x() * surface.nodeStep(a, alpha) + contact.weights.y() * surface.nodeStep(b, alpha) +
-         contact.weights.z() * surface.nodeStep(c, alpha);
+  return blendPoint(meanOver(surface, contact, surface.steps[1]), meanOver(surface, contact, surface.steps[0]), alpha);
+}
+
+void beginContact(const BlendedSurface& surface, double alpha, const ProxyContact& contact, const Vector3d& normal,
+                  double stiffness, DeviceMotion& device) {
+  device.since = alpha;
+  device.sinceBefore = 0;
+  device.way.fill(Vector3d::Zero());
+  const double part = followedPart(stiffness, contactGive(surface, {&contact, 1}));
+  if (!(part > 0)) return;
+  for (int k = 0; k < 3; ++k)
+    device.way[k + 1] = normal.dot(meanOver(surface, contact, surface.steps[k])) / part * normal;
+  device.way[0] = wayOfStep(device, alpha) - (1 - alpha) * device.way[1];
+}
+
+void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness, DeviceMotion& device) {
+  device.since = device.sinceBefore = 0;
+  device.way.fill(Vector3d::Zero());
+  const double part = followedPart(stiffness, heldGive(surface, grip));
+  if (!(part > 0)) return;
+  for (int k = 0; k < 3; ++k) {
+    for (const HeldOffset& held : grip.held) device.way[k + 1] += surface.steps[k][held.node];
+    device.way[k + 1] /= part * static_cast<double>(grip.held.size());
+  }
+  device.way[0] = wayOfLead(device, alpha) - (1 - alpha) * device.way[1];
 }
 
 TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
@@ -82,7 +103,7 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
     shares += contact.share;
   }
   step /= shares;
-  const double part = followedPart(stiffness, giveOf(surface, contacts));
+  const double part = followedPart(stiffness, contactGive(surface, contacts));
   const Vector3d answered = wayOfStep(device, alpha);
   const Vector3d beyond = latestWay(device, alpha) - answered, faster = device.velocity - answered / surface.duration;
   return {step + part * normal.dot(beyond) * normal, step / surface.duration + part * normal.dot(faster) * normal};
@@ -91,7 +112,7 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,
                         const DeviceMotion& device) {
   if (!(surface.duration > 0)) return {};
-  const double part = followedPart(stiffness, giveOf(surface, grip));
+  const double part = followedPart(stiffness, heldGive(surface, grip));
   const Vector3d beyond = latestWay(device, alpha) - wayOfLead(device, alpha);
   const Vector3d faster = device.velocity - wayOfStep(device, alpha) / surface.duration;
   return {meanHeldLead(surface, alpha, grip) + part * beyond,

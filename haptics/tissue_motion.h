@@ -23,7 +23,10 @@ struct DeviceMotion {
   double since = 0, sinceBefore = 0;  // alpha from which on it counts, in this frame and in the one before
 };
 
-void beginWay(double alpha, DeviceMotion& device);
+// Tissue that moved by itself begins to follow the device: its steps so far count as answers to ways of a device.
+void beginContact(const BlendedSurface& surface, double alpha, const ProxyContact& contact,
+                  const Eigen::Vector3d& normal, double stiffness, DeviceMotion& device);
+void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness, DeviceMotion& device);
 void startFrame(DeviceMotion& device);
 
 struct TissueMotion {

@@ -91,7 +91,7 @@ TEST(TissueMotion, AtFirstTouchTissueFollowsByThePartThatItsGiveTells) {
   contact.weights = {1, 0, 0};
   contact.share = 1;
   DeviceMotion device;
-  beginWay(0.5, device);
+  beginContact(surface, 0.5, contact, Vector3d::UnitY(), 400, device);
   device.velocity = {0.03, -0.05, 0};
   const double part = 400 * 0.01 / (1 + 400 * 0.01);
   const auto lead = [&](double alpha) {
