@@ -2,8 +2,16 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <memory>
 #include <numeric>
+#include <span>
 #include <stdexcept>
+
+#include "physics/model/identify/hex_stiffness.h"
+#include "physics/model/identify/parallel.h"
 
 namespace medulla {
 
@@ -104,24 +112,34 @@ class Dissector {
   std::vector<int> first_, last_;  // of each node's cells, places in cellOrder
 };
 
+using Block = Eigen::Map<MatrixXd>;
+using ConstBlock = Eigen::Map<const MatrixXd>;
+
 // Adds `from`, whose rows are those of `nodes`, to `to` at the places that `place` gives the nodes. Lower triangles.
-void addInto(MatrixXd& to, const MatrixXd& from, const int* nodes, std::size_t count, const std::vector<int>& place) {
-  for (std::size_t b = 0; b < count; ++b) {
-    for (std::size_t a = 0; a < count; ++a) {
-      const Index i = place[nodes[a]], j = place[nodes[b]];
-      if (i < j) continue;
-      if (a >= b) {
-        to.block<3, 3>(3 * i, 3 * j) += from.block<3, 3>(3 * static_cast<Index>(a), 3 * static_cast<Index>(b));
+void addInto(Block& to, const ConstBlock& from, std::span<const int> nodes, const std::vector<int>& place) {
+  const auto count = static_cast<Index>(nodes.size());
+  for (Index b = 0; b < count; ++b) {
+    const Index j = place[nodes[b]];
+    for (Index a = b; a < count; ++a) {
+      const Index i = place[nodes[a]];
+      if (i >= j) {
+        to.block<3, 3>(3 * i, 3 * j) += from.block<3, 3>(3 * a, 3 * b);
       } else {
-        to.block<3, 3>(3 * i, 3 * j) +=
-            from.block<3, 3>(3 * static_cast<Index>(b), 3 * static_cast<Index>(a)).transpose();
+        to.block<3, 3>(3 * j, 3 * i) += from.block<3, 3>(3 * a, 3 * b).transpose();
       }
     }
   }
 }
 
-// Eliminates the first `own` freedoms; leaves their columns in `columns` and the rest's matrix in `matrix`.
-void eliminate(MatrixXd& matrix, Index own, MatrixXd& columns) {
+// Calls use(column, its first row) for the lower triangle, whole blocks of 3 x 3 on the diagonal.
+template <typename Use>
+void overLower(Index size, const Use& use) {
+  for (Index j = 0; j < size; ++j) use(j, j - j % 3);
+}
+
+// Eliminates the first `own` freedoms; leaves their columns in `columns` and the rest's matrix in the lower right
+// corner.
+void eliminate(Block& matrix, Index own, MatrixXd& columns) {
   const Index rest = matrix.rows() - own;
   columns = matrix.leftCols(own);
   if (own == 0) return;
@@ -131,15 +149,205 @@ void eliminate(MatrixXd& matrix, Index own, MatrixXd& columns) {
   if (rest == 0) return;
   columns.topRows(own).transpose().triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(
       columns.bottomRows(rest));
-  MatrixXd update = matrix.bottomRightCorner(rest, rest);
-  update.selfadjointView<Eigen::Lower>().rankUpdate(columns.bottomRows(rest), -1);
-  matrix = std::move(update);
+  matrix.bottomRightCorner(rest, rest).selfadjointView<Eigen::Lower>().rankUpdate(columns.bottomRows(rest), -1);
 }
 
-// Rows of the front's nodes, gathered from and scattered to those of the whole grid.
-void gather(const RowMatrix& x, const int* nodes, Index count, RowMatrix& rows) {
-  for (Index a = 0; a < count; ++a) rows.middleRows<3>(3 * a) = x.middleRows<3>(3 * static_cast<Index>(nodes[a]));
-}
+class Factorisation {
+ public:
+  Factorisation(const DissectionPlan& plan, const HexGrid& grid, const CellMatrices& cellMatrices,
+                const std::function<void(double)>& progress)
+      : plan_(plan), grid_(grid), cellMatrices_(cellMatrices), progress_(progress), stackSize_(plan.fronts.size()) {
+    factors_.columns.resize(plan.fronts.size());
+    for (std::size_t f = 0; f < plan.fronts.size(); ++f) {
+      const auto& [first, second] = plan.fronts[f].halves;
+      stackSize_[f] = square(plan.fronts[f].nodes.size());
+      if (first < 0) continue;
+      stackSize_[f] = std::max({stackSize_[f] + restSize(first) + restSize(second), stackSize_[first],
+                                restSize(first) + stackSize_[second]});
+    }
+  }
+
+  FrontFactors run() {
+    const int root = static_cast<int>(plan_.fronts.size()) - 1;
+    Workspace workspace = makeWorkspace(root);
+    workspace.reports = true;
+    eliminateTree(root, 0, workspace);
+    return std::move(factors_);
+  }
+
+ private:
+  static constexpr int kCellBatch = 32;   // cells' matrices at once, by one large product
+  static constexpr int kForks = 2;        // of the topmost fronts' halves: up to four threads
+  static constexpr int kForkCells = 100;  // below, threads cost more than they bring
+
+  // Of one thread. Matrices of fronts lie on a stack, above those that their halves left.
+  struct Workspace {
+    std::unique_ptr<double[]> stack;
+    std::size_t top = 0;
+    std::vector<int> place;  // of the grid's nodes in the front at work
+    int batch = -1;          // the number of the one in cellMatrices
+    MatrixXd cellMatrices;
+    bool reports = false;  // the caller's thread
+  };
+
+  static std::size_t square(std::size_t nodes) { return 9 * nodes * nodes; }
+  std::size_t restSize(int front) const { return square(plan_.fronts[front].nodes.size() - plan_.fronts[front].own); }
+
+  Workspace makeWorkspace(int root) const {
+    Workspace w;
+    w.stack.reset(new double[stackSize_[root]]);
+    w.place.resize(plan_.nodes);
+    return w;
+  }
+
+  // Leaves the rest's matrix on top of the stack. Once a thread has failed all return early, to where it throws.
+  void eliminateTree(int f, int forks, Workspace& w) {
+    const Front& front = plan_.fronts[f];
+    const std::size_t begin = w.top;
+    Workspace other;
+    std::future<void> first;  // outside of the block below: it is awaited after the others know that this one failed
+    try {
+      if (front.halves[0] >= 0 && forks < kForks && front.cellCount > kForkCells) {
+        other = makeWorkspace(front.halves[0]);
+        first = std::async(std::launch::async | std::launch::deferred,
+                           [&] { eliminateTree(front.halves[0], forks + 1, other); });
+        eliminateTree(front.halves[1], forks + 1, w);
+        awaitWhileReporting(first, w);
+      } else if (front.halves[0] >= 0) {
+        eliminateTree(front.halves[0], kForks, w);
+        eliminateTree(front.halves[1], kForks, w);
+      }
+      if (stopped_) return;
+      eliminateFront(f, begin, other.stack.get(), w);
+      report(w);
+    } catch (...) {
+      stopped_ = true;
+      throw;
+    }
+  }
+
+  void awaitWhileReporting(std::future<void>& other, const Workspace& w) {
+    while (w.reports && other.wait_for(std::chrono::milliseconds(50)) == std::future_status::timeout) report(w);
+    other.get();
+  }
+
+  // The halves' rests lie on the stack from `begin`; the first's elsewhere if `first` is given.
+  void eliminateFront(int f, std::size_t begin, const double* first, Workspace& w) {
+    const Front& front = plan_.fronts[f];
+    const auto size = 3 * static_cast<Index>(front.nodes.size()), own = 3 * static_cast<Index>(front.own);
+    for (std::size_t a = 0; a < front.nodes.size(); ++a) w.place[front.nodes[a]] = static_cast<int>(a);
+    Block matrix(w.stack.get() + w.top, size, size);
+    overLower(size, [&](Index column, Index row) { matrix.col(column).tail(size - row).setZero(); });
+    if (front.halves[0] >= 0) {
+      const double* const second = w.stack.get() + begin + (first ? 0 : restSize(front.halves[0]));
+      addRest(matrix, front.halves[0], first ? first : w.stack.get() + begin, w.place);
+      addRest(matrix, front.halves[1], second, w.place);
+    } else {
+      addCells(matrix, front, w);
+    }
+    eliminate(matrix, own, factors_.columns[f]);
+    done_ += operations(static_cast<double>(own), static_cast<double>(size));
+    const Index rest = size - own;
+    double* const to = w.stack.get() + begin;
+    overLower(rest, [&](Index column, Index row) {
+      const double* const from = matrix.data() + (own + column) * size + own;
+      std::copy(from + row, from + rest, to + column * rest + row);
+    });
+    w.top = begin + restSize(f);
+  }
+
+  void addRest(Block& matrix, int half, const double* numbers, const std::vector<int>& place) const {
+    const auto nodes = std::span(plan_.fronts[half].nodes).subspan(plan_.fronts[half].own);
+    const auto size = 3 * static_cast<Index>(nodes.size());
+    addInto(matrix, ConstBlock(numbers, size, size), nodes, place);
+  }
+
+  // Batches begin at multiples of their size in cellOrder whichever thread asks: products' bits depend on the columns.
+  void addCells(Block& matrix, const Front& front, Workspace& w) const {
+    for (int k = front.firstCell; k < front.firstCell + front.cellCount; ++k) {
+      if (k / kCellBatch != w.batch) {
+        w.batch = k / kCellBatch;
+        const auto rest = std::span(plan_.cellOrder).subspan(static_cast<std::size_t>(w.batch) * kCellBatch);
+        w.cellMatrices = cellMatrices_(rest.first(std::min<std::size_t>(kCellBatch, rest.size())));
+      }
+      const ConstBlock cell(w.cellMatrices.col(k % kCellBatch).data(), kHexFreedoms, kHexFreedoms);
+      addInto(matrix, cell, grid_.cellNodes[plan_.cellOrder[k]], w.place);
+    }
+  }
+
+  void report(const Workspace& w) const {
+    if (w.reports && progress_) progress_(done_ / plan_.operations);
+  }
+
+  const DissectionPlan& plan_;
+  const HexGrid& grid_;
+  const CellMatrices& cellMatrices_;
+  const std::function<void(double)>& progress_;
+  std::vector<std::size_t> stackSize_;  // of each front's tree, in numbers
+  FrontFactors factors_;                // threads write to different fronts'
+  std::atomic<double> done_ = 0;        // operations
+  std::atomic<bool> stopped_ = false;
+};
+
+// Of columns first to first + count of x; the others are not touched.
+class BlockSolver {
+ public:
+  BlockSolver(const DissectionPlan& plan, const FrontFactors& factors, RowMatrix& x, Index first, Index count)
+      : plan_(plan), factors_(factors), x_(x), first_(first), count_(count) {
+    std::size_t own = 0, rest = 0;
+    for (const Front& front : plan.fronts) {
+      own = std::max<std::size_t>(own, front.own);
+      rest = std::max(rest, front.nodes.size() - front.own);
+    }
+    own_.resize(3 * static_cast<Index>(own), count);
+    rest_.resize(3 * static_cast<Index>(rest), count);
+  }
+
+  void run() {
+    for (std::size_t f = 0; f < plan_.fronts.size(); ++f)
+      if (plan_.fronts[f].own > 0) forward(plan_.fronts[f], factors_.columns[f]);
+    for (std::size_t f = plan_.fronts.size(); f-- > 0;)
+      if (plan_.fronts[f].own > 0) backward(plan_.fronts[f], factors_.columns[f]);
+  }
+
+ private:
+  void forward(const Front& front, const MatrixXd& columns) {
+    const auto nodes = std::span(front.nodes);
+    auto own = own_.topRows(columns.cols()), rest = rest_.topRows(columns.rows() - columns.cols());
+    gather(nodes.first(front.own), own_);
+    if ((own.array() == 0).all()) return;  // no load on this front's tree
+    columns.topRows(own.rows()).triangularView<Eigen::Lower>().solveInPlace(own);
+    scatter(nodes.first(front.own), own_);
+    if (rest.rows() == 0) return;
+    rest.noalias() = columns.bottomRows(rest.rows()) * own;
+    const auto outer = nodes.subspan(front.own);
+    for (std::size_t a = 0; a < outer.size(); ++a) rowsOf(outer[a]) -= rest.middleRows<3>(3 * static_cast<Index>(a));
+  }
+
+  void backward(const Front& front, const MatrixXd& columns) {
+    const auto nodes = std::span(front.nodes);
+    auto own = own_.topRows(columns.cols()), rest = rest_.topRows(columns.rows() - columns.cols());
+    gather(nodes.first(front.own), own_);
+    gather(nodes.subspan(front.own), rest_);
+    if (rest.rows() > 0) own.noalias() -= columns.bottomRows(rest.rows()).transpose() * rest;
+    columns.topRows(own.rows()).transpose().triangularView<Eigen::Upper>().solveInPlace(own);
+    scatter(nodes.first(front.own), own_);
+  }
+
+  Eigen::Block<RowMatrix> rowsOf(int node) { return x_.block(3 * static_cast<Index>(node), first_, 3, count_); }
+  void gather(std::span<const int> nodes, RowMatrix& rows) {
+    for (std::size_t a = 0; a < nodes.size(); ++a) rows.middleRows<3>(3 * static_cast<Index>(a)) = rowsOf(nodes[a]);
+  }
+  void scatter(std::span<const int> nodes, const RowMatrix& rows) {
+    for (std::size_t a = 0; a < nodes.size(); ++a) rowsOf(nodes[a]) = rows.middleRows<3>(3 * static_cast<Index>(a));
+  }
+
+  const DissectionPlan& plan_;
+  const FrontFactors& factors_;
+  RowMatrix& x_;
+  const Index first_, count_;
+  RowMatrix own_, rest_;  // rows of a front's nodes
+};
 
 }  // namespace
 
@@ -147,76 +355,17 @@ DissectionPlan planDissection(const HexGrid& grid) {
   return Dissector(grid).takePlan();
 }
 
-FrontFactors factorise(const DissectionPlan& plan, const HexGrid& grid,
-                       const std::function<void(int, MatrixXd&)>& cellStiffness,
+FrontFactors factorise(const DissectionPlan& plan, const HexGrid& grid, const CellMatrices& cellMatrices,
                        const std::function<void(double)>& progress) {
-  FrontFactors factors;
-  factors.columns.resize(plan.fronts.size());
-  std::vector<MatrixXd> rest(plan.fronts.size());
-  std::vector<int> place(plan.nodes, -1);
-  MatrixXd cellMatrix(3 * kHexNodes, 3 * kHexNodes);
-  double done = 0;
-  for (std::size_t f = 0; f < plan.fronts.size(); ++f) {
-    const Front& front = plan.fronts[f];
-    const auto size = static_cast<Index>(front.nodes.size());
-    for (Index a = 0; a < size; ++a) place[front.nodes[a]] = static_cast<int>(a);
-    MatrixXd& matrix = rest[f];
-    matrix.setZero(3 * size, 3 * size);
-    if (front.halves[0] >= 0) {
-      for (const int half : front.halves) {
-        const Front& part = plan.fronts[half];
-        addInto(matrix, rest[half], part.nodes.data() + part.own, part.nodes.size() - part.own, place);
-        rest[half].resize(0, 0);
-      }
-    } else {
-      for (int k = front.firstCell; k < front.firstCell + front.cellCount; ++k) {
-        const int cell = plan.cellOrder[k];
-        cellStiffness(cell, cellMatrix);
-        addInto(matrix, cellMatrix, grid.cellNodes[cell].data(), kHexNodes, place);
-      }
-    }
-    eliminate(matrix, 3 * static_cast<Index>(front.own), factors.columns[f]);
-    done += operations(3. * front.own, 3. * static_cast<double>(size));
-    if (progress) progress(done / plan.operations);
-  }
-  return factors;
+  return Factorisation(plan, grid, cellMatrices, progress).run();
 }
 
 void solve(const DissectionPlan& plan, const FrontFactors& factors, RowMatrix& x) {
-  RowMatrix own, rest, change;
-  const auto sizes = [&](std::size_t f) {
-    const Front& front = plan.fronts[f];
-    own.resize(3 * static_cast<Index>(front.own), x.cols());
-    rest.resize(3 * static_cast<Index>(front.nodes.size() - front.own), x.cols());
-    gather(x, front.nodes.data(), front.own, own);
-    return front.nodes.data() + front.own;
-  };
-  const auto scatterOwn = [&](const Front& front) {
-    for (Index a = 0; a < front.own; ++a)
-      x.middleRows<3>(3 * static_cast<Index>(front.nodes[a])) = own.middleRows<3>(3 * a);
-  };
-  for (std::size_t f = 0; f < plan.fronts.size(); ++f) {
-    const Front& front = plan.fronts[f];
-    if (front.own == 0) continue;
-    const int* outer = sizes(f);
-    const MatrixXd& columns = factors.columns[f];
-    columns.topRows(own.rows()).triangularView<Eigen::Lower>().solveInPlace(own);
-    scatterOwn(front);
-    if (rest.rows() == 0) continue;
-    rest.noalias() = columns.bottomRows(rest.rows()) * own;
-    for (Index a = 0; 3 * a < rest.rows(); ++a)
-      x.middleRows<3>(3 * static_cast<Index>(outer[a])) -= rest.middleRows<3>(3 * a);
-  }
-  for (std::size_t f = plan.fronts.size(); f-- > 0;) {
-    const Front& front = plan.fronts[f];
-    if (front.own == 0) continue;
-    const int* outer = sizes(f);
-    const MatrixXd& columns = factors.columns[f];
-    gather(x, outer, rest.rows() / 3, rest);
-    if (rest.rows() > 0) own.noalias() -= columns.bottomRows(rest.rows()).transpose() * rest;
-    columns.topRows(own.rows()).transpose().triangularView<Eigen::Upper>().solveInPlace(own);
-    scatterOwn(front);
-  }
+  const auto blocks = static_cast<int>((x.cols() + kSolveColumns - 1) / kSolveColumns);
+  runTogether(blocks, [&](int block) {
+    const Index first = static_cast<Index>(block) * kSolveColumns;
+    BlockSolver(plan, factors, x, first, std::min<Index>(kSolveColumns, x.cols() - first)).run();
+  });
 }
 
 }  // namespace medulla

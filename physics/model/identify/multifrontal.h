@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "physics/model/identify/hex_grid.h"
@@ -11,6 +12,8 @@
 // the cells are halved again and again by planes; a front eliminates what no cell outside its part touches and hands
 // the rest, a dense matrix, to the front of both halves together. Nearly all work is on dense blocks.
 namespace medulla {
+
+constexpr int kSolveColumns = 24;  // right-hand sides per thread: a multiple of the 12 rows of Eigen's product kernel
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -36,13 +39,16 @@ struct FrontFactors {
   std::vector<Eigen::MatrixXd> columns;
 };
 
-// `cellStiffness` gives a cell's matrix (kHexFreedoms square, lower triangle read); called in the order of cellOrder.
-// `progress`, if given, is called with 0..1. Throws std::runtime_error where the matrix is not positive definite.
-FrontFactors factorise(const DissectionPlan& plan, const HexGrid& grid,
-                       const std::function<void(int cell, Eigen::MatrixXd& matrix)>& cellStiffness,
+// Matrices of cells, one per column: kHexFreedoms square, lower triangles read. Called from several threads at once.
+using CellMatrices = std::function<Eigen::MatrixXd(std::span<const int> cells)>;
+
+// Halves of the body are factorised at once; the factors' bits do not depend on how many threads there are. `progress`,
+// if given, is called from this thread with 0..1; where it throws, all work ends. Throws std::runtime_error where the
+// matrix is not positive definite.
+FrontFactors factorise(const DissectionPlan& plan, const HexGrid& grid, const CellMatrices& cellMatrices,
                        const std::function<void(double)>& progress = {});
 
-// Solves in place: 3 nodes x right-hand sides.
+// Solves in place: 3 nodes x right-hand sides, which are cheapest in multiples of kSolveColumns.
 void solve(const DissectionPlan& plan, const FrontFactors& factors, RowMatrix& x);
 
 }  // namespace medulla

@@ -121,7 +121,7 @@ RowSparse springMatrix(const HexGrid& grid, const HeldCells& held) {
   return out;
 }
 
-void addHeld(const Eigen::Matrix<double, kHexNodes, kHexNodes>& springs, MatrixXd& matrix) {
+void addHeld(const Eigen::Matrix<double, kHexNodes, kHexNodes>& springs, Eigen::Map<MatrixXd>& matrix) {
   for (int b = 0; b < kHexNodes; ++b) {
     for (int a = 0; a < kHexNodes; ++a) {
       for (int k = 0; k < 3; ++k) matrix(3 * a + k, 3 * b + k) += springs(a, b);
@@ -259,23 +259,19 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
   for (const auto& [cell, shapes] : held) isHeld[cell] = true;
   requireConnected(grid, isHeld);
   const auto pinned = pinnedFreedoms(grid, solid.isFree ? isostaticPins(grid) : std::vector<GridPin>());
-  // A batch of cells at once makes their matrices by one large product.
-  constexpr std::size_t batch = 32;
   const MatrixXd perPoint = stiffnessPerPoint(settings.poisson);
-  std::size_t next = 0;
-  MatrixXd stiffness;
-  const auto cellStiffness = [&](int cell, MatrixXd& matrix) {
-    if (next % batch == 0) {
-      const std::span<const int> rest = std::span(solid.plan.cellOrder).subspan(next);
-      stiffness = hexStiffness(grid, perPoint, rest.first(std::min(batch, rest.size())));
+  const auto cellMatrices = [&](std::span<const int> cells) {
+    MatrixXd out = hexStiffness(grid, perPoint, cells);
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+      Eigen::Map<MatrixXd> matrix(out.col(static_cast<Index>(c)).data(), kHexFreedoms, kHexFreedoms);
+      if (const auto own = held.find(cells[c]); own != held.end()) addHeld(own->second, matrix);
+      if (const auto pins = pinned.find(cells[c]); pins != pinned.end()) {
+        for (const int freedom : pins->second) matrix(freedom, freedom) += grid.size;
+      }
     }
-    matrix = stiffness.col(static_cast<Index>(next++ % batch)).reshaped(kHexFreedoms, kHexFreedoms);
-    if (const auto own = held.find(cell); own != held.end()) addHeld(own->second, matrix);
-    if (const auto pins = pinned.find(cell); pins != pinned.end()) {
-      for (const int freedom : pins->second) matrix(freedom, freedom) += grid.size;
-    }
+    return out;
   };
-  solid.factors = factorise(solid.plan, grid, cellStiffness, progress);
+  solid.factors = factorise(solid.plan, grid, cellMatrices, progress);
   solid.rimSprings = springMatrix(grid, springs.rim);
   solid.surface = interpolation(grid, mesh, settings.heldTriangles);
   solid.loading = tractions(mesh, grid);
