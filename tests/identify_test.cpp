@@ -111,6 +111,7 @@ TEST(VoxelSolid, UniformTractionStrainsAFreeBodyUniformly) {
   const TriangleMesh mesh = ellipsoidMesh(4, {0.05, 0.04, 0.03});
   const double poisson = 0.3;
   const VoxelSolid solid = makeVoxelSolid(mesh, 0.01, {poisson, {}, {}});
+  EXPECT_EQ(metCellSize(mesh, 0.01), solid.grid.size);
   // Pulled along x by 1 Pa: strain 1 along, -nu across.
   RowMatrix forces = RowMatrix::Zero(3 * static_cast<Index>(mesh.vertices.size()), 1);
   for (const auto& [a, b, c] : mesh.triangles) {

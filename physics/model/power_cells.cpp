@@ -98,9 +98,13 @@ void addSpan(VoxelBody& body, const Columns& columns, int i, int j, double low, 
 
 }  // namespace
 
+double voxelSize(double volume, int target) {
+  return std::cbrt(volume / target);
+}
+
 VoxelBody voxelise(const TriangleMesh& mesh, double volume, int target) {
   VoxelBody body;
-  body.size = std::cbrt(volume / target);
+  body.size = voxelSize(volume, target);
   const Bounds bounds = boundsOf(mesh);
   for (int a = 0; a < 3; ++a) body.count[a] = static_cast<int>((bounds.high[a] - bounds.low[a]) / body.size) + 2;
   Columns columns{

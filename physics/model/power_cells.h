@@ -26,6 +26,9 @@ struct VoxelBody {
   std::vector<int> pieceAt;        // first piece of voxel (i * count[1] + j) * count[2] + k, -1 where empty
 };
 
+// The edge of `target` voxels of that volume (m3) together.
+double voxelSize(double volume, int target);
+
 // The solid inside a closed mesh of that volume (m3) as about `target` voxels. Every column is cut exactly along z, so
 // that the volume converges faster than by counting voxels.
 VoxelBody voxelise(const TriangleMesh& mesh, double volume, int target);

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <stdexcept>
 
 #include "physics/model/identify/check_loads.h"
+#include "physics/model/identify/parallel.h"
 #include "physics/model/mesh_topology.h"
 
 namespace medulla {
@@ -23,13 +24,25 @@ VectorXd workOf(const VoxelSolid& solid, const RowMatrix& forces, const RowMatri
   return forces.cwiseProduct(RowMatrix(solid.loading.transpose() * displacements)).colwise().sum().transpose();
 }
 
-// The same body in cells twice as large, unless they fall apart.
-std::optional<VoxelSolid> doubled(const TriangleMesh& mesh, const SolidSettings& settings, const VoxelSolid& solid) {
+struct Work {
+  double size = 0;   // of the cells
+  VectorXd ofLoads;  // none where the cells fell apart
+};
+
+Work workUnder(const VoxelSolid& solid, const RowMatrix& forces) {
+  return {solid.grid.size, workOf(solid, forces, displacementsUnder(solid, forces))};
+}
+
+// In cells twice as large.
+Work workOfDoubled(const TriangleMesh& mesh, const SolidSettings& settings, double size, const RowMatrix& forces,
+                   const std::function<void(double)>& progress) {
+  VoxelSolid solid;
   try {
-    return makeVoxelSolid(mesh, 2 * solid.grid.size, settings);
+    solid = makeVoxelSolid(mesh, 2 * size, settings, progress);
   } catch (const std::runtime_error&) {
     return {};
   }
+  return workUnder(solid, forces);
 }
 
 }  // namespace
@@ -41,24 +54,26 @@ double giveOfHeld(const TriangleMesh& mesh, const SolidSettings& settings, const
                   const VoxelSolid& larger) {
   constexpr int count = 16;
   if (solid.isFree) return 0;
-  const std::optional<VoxelSolid> largest = doubled(mesh, settings, solid);
-  if (!largest) return 0;
   NodeSurface surface = measureNodes(mesh, {});
   for (const int t : settings.heldTriangles) {
     for (const int n : mesh.triangles[t]) surface.held[n] = true;
   }
   const RowMatrix forces = randomLoads(mesh, surface, LoadKind::bulk, boundsDiagonal(mesh), count, 3);
+  Alongside<Work> doubled([&](const std::function<void(double)>& goOn) {
+    return workOfDoubled(mesh, settings, solid.grid.size, forces, goOn);
+  });
   const RowMatrix x = displacementsUnder(solid, forces);
   const VectorXd work = workOf(solid, forces, x);
   const VectorXd springs =
       x.cwiseProduct(RowMatrix(solid.rimSprings * x)).colwise().sum().transpose().cwiseQuotient(work);
-  const auto giveBy = [&](const VoxelSolid& other) {
-    const VectorXd lacking =
-        VectorXd::Ones(count) - workOf(other, forces, displacementsUnder(other, forces)).cwiseQuotient(work);
-    const double ratio = other.grid.size / solid.grid.size;
+  const auto giveBy = [&](const Work& other) {
+    const VectorXd lacking = VectorXd::Ones(count) - other.ofLoads.cwiseQuotient(work);
+    const double ratio = other.size / solid.grid.size;
     return lacking.dot(springs) / springs.squaredNorm() / (std::pow(ratio, kOrder) - 1);
   };
-  return std::max(0., std::min(giveBy(larger), giveBy(*largest)));
+  const Work ofLarger = workUnder(larger, forces), ofDoubled = doubled.get();
+  if (ofDoubled.ofLoads.size() == 0) return 0;
+  return std::max(0., std::min(giveBy(ofLarger), giveBy(ofDoubled)));
 }
 
 }  // namespace medulla

@@ -122,15 +122,29 @@ HexGrid makeHexGrid(const VoxelBody& voxels, const std::vector<bool>& without) {
     grid.weights.row(q).setConstant(kFloorWeight * rule.weights[q / 25] * rule.weights[q / 5 % 5] *
                                     rule.weights[q % 5]);
   }
+  struct Layer {
+    double centre = 0, height = 0;
+    std::array<double, 5> weights{};
+  };
+  std::vector<Layer> layers(voxels.count[2]);  // most pieces are as high as the one before them in their layer
   for (std::size_t p = 0; p < voxels.pieces.size(); ++p) {
     const VoxelPiece& piece = voxels.pieces[p];
     const int cell = grid.cellAt[at(cellOf(piece))];
     if (cell < 0 || isLeftOut(p)) continue;
-    const double middle = (piece.centre.z() - grid.low.z()) / grid.size - grid.cells[cell][2];
-    const double half = piece.height / grid.size / 2;
-    const std::array<double, 5>&x = across[piece.index[0] % n], &y = across[piece.index[1] % n],
-                             z = partWeights(middle - half, middle + half);
-    for (int q = 0; q < kHexGauss; ++q) grid.weights(q, cell) += x[q / 25] * y[q / 5 % 5] * z[q % 5];
+    Layer& layer = layers[piece.index[2]];
+    if (layer.centre != piece.centre.z() || layer.height != piece.height) {
+      const double middle = (piece.centre.z() - grid.low.z()) / grid.size - grid.cells[cell][2];
+      const double half = piece.height / grid.size / 2;
+      layer = {piece.centre.z(), piece.height, partWeights(middle - half, middle + half)};
+    }
+    const std::array<double, 5>&x = across[piece.index[0] % n], &y = across[piece.index[1] % n], &z = layer.weights;
+    double* weight = grid.weights.col(cell).data();
+    for (int i = 0; i < 5; ++i) {
+      for (int j = 0; j < 5; ++j) {
+        const double xy = x[i] * y[j];
+        for (int k = 0; k < 5; ++k) *weight++ += xy * z[k];
+      }
+    }
   }
   return grid;
 }

@@ -10,6 +10,7 @@
 
 #include "physics/model/identify/held_give.h"
 #include "physics/model/identify/layer_fit.h"
+#include "physics/model/identify/parallel.h"
 #include "physics/model/identify/reduction.h"
 #include "physics/model/identify/skin_fit.h"
 #include "physics/model/identify/thin_parts.h"
@@ -74,6 +75,7 @@ void requireFinite(const IdentifiedNetwork& n) {
 struct CellSize {
   double size = 0;   // m
   std::string neck;  // where the mesh asks for it; empty where the spheres do
+  bool isGiven = false;
 };
 
 // Volume (m3) on the smaller side of each link where it alone joins two parts of the body, 0 where others join them
@@ -101,9 +103,9 @@ std::vector<double> volumesBehind(const SoftBodyModel& model) {
 }
 
 // Cells of the spheres span three cells of the grid or more, necks between parts of the body two; 1500 for the whole
-// body take six seconds at seven spheres. Where what is held ends, displacements go as the root of the distance, which
-// no polynomial follows, so that finer cells converge in the first order only: at 600 a gallbladder held by its neck
-// bends half a percent less.
+// body take four seconds of two processors at seven spheres. Where what is held ends, displacements go as the root of
+// the distance, which no polynomial follows, so that finer cells converge in the first order only: at 600 a gallbladder
+// held by its neck bends half a percent less.
 CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const Vector3d&)>& behind) {
   constexpr double perSphere = 3, perNeck = 2, perBody = 1500;
   constexpr double partMin = 0.02;  // of the body: what hangs on a thinner neck moves with it alone
@@ -128,13 +130,12 @@ CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const V
   return out;
 }
 
-VoxelSolid makeSolid(const SoftBodyModel& model, const TriangleMesh& mesh, const IdentifySettings& settings,
+VoxelSolid makeSolid(const SoftBodyModel& model, const TriangleMesh& mesh, const CellSize& cell,
                      const SolidSettings& solid, const Progress& progress) {
-  if (settings.cellSize > 0) return makeVoxelSolid(mesh, settings.cellSize, solid, progress);
-  const CellSize cell = chooseSize(model, behindHeld(solid.heldSpaces));
   try {
     return makeVoxelSolid(mesh, cell.size, solid, progress);
   } catch (const OverBudget& error) {
+    if (cell.isGiven) throw;
     const std::string why = cell.neck.empty()
                                 ? fmt::format("fewer spheres than {} would do with larger ones", model.spheres.size())
                                 : "it is too thin for its size: " + cell.neck;
@@ -253,17 +254,19 @@ void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, con
   constexpr int count = 16;
   IdentifiedNetwork& out = result.network;
   const Trials trials(mesh, out, responses.grounding);
-  RowMatrix teaching(3 * static_cast<Index>(mesh.vertices.size()), 2 * count);
-  teaching << trials.loads(LoadKind::bulk, count, 1), trials.loads(LoadKind::poke, count, 1);
-  const MatrixXd under = trials.exact(solid, teaching);
-  chooseSkin(mesh, cells, responses, trials, teaching, under, out);
+  RowMatrix all(3 * static_cast<Index>(mesh.vertices.size()), 4 * count);
+  all << trials.loads(LoadKind::bulk, count, 1), trials.loads(LoadKind::poke, count, 1),
+      trials.loads(LoadKind::bulk, count, 2), trials.loads(LoadKind::poke, count, 2);
+  const MatrixXd exact = trials.exact(solid, all);
   progress(0.5);
-  const RowMatrix bulk = trials.loads(LoadKind::bulk, count, 2), poke = trials.loads(LoadKind::poke, count, 2);
-  const MatrixXd bulkExact = trials.exact(solid, bulk), pokeExact = trials.exact(solid, poke);
+  chooseSkin(mesh, cells, responses, trials, all.leftCols(2 * count), exact.leftCols(2 * count), out);
+  const RowMatrix bulk = all.middleCols(2 * count, count), poke = all.rightCols(count);
+  const MatrixXd bulkExact = exact.middleCols(2 * count, count), pokeExact = exact.rightCols(count);
   out.bulk = errorOf(trials.ofNetwork(bulk), bulkExact);
   out.poke = errorOf(trials.ofNetwork(poke), pokeExact);
-  const IdentifiedError ofBulk = errorOf(trials.exact(larger, bulk), bulkExact),
-                        ofPoke = errorOf(trials.exact(larger, poke), pokeExact);
+  const MatrixXd inLarger = trials.exact(larger, all.rightCols(2 * count));
+  const IdentifiedError ofBulk = errorOf(inLarger.leftCols(count), bulkExact),
+                        ofPoke = errorOf(inLarger.rightCols(count), pokeExact);
   out.ofFiniteElements = {std::max(ofBulk.maximum, ofPoke.maximum), std::max(ofBulk.rms, ofPoke.rms)};
   result.forces = bulk;
   result.displacements = bulkExact;
@@ -298,14 +301,19 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   };
   std::vector<Ball> balls;
   for (const FillingSphere& s : model.spheres) balls.push_back({s.restBallCentre, s.radius});
-  VoxelSolid solid = makeSolid(model, mesh, settings, solidSettings, stage(0, 0.15));
+  const CellSize cell = settings.cellSize > 0 ? CellSize{settings.cellSize, "", true}
+                                              : chooseSize(model, behindHeld(solidSettings.heldSpaces));
+  Alongside<VoxelSolid> largerCells([&](const Progress& goOn) {
+    return makeVoxelSolid(mesh, kLargerCells * metCellSize(mesh, cell.size), solidSettings, goOn);
+  });
+  VoxelSolid solid = makeSolid(model, mesh, cell, solidSettings, stage(0, 0.2));
   requireWithinReach(solid.grid, mesh, solidSettings.heldTriangles);
   const CellFrames cells = makeCellFrames(mesh, balls, solid);
   out.voxel = solid.grid.size;
   out.lengthScale = cells.lengthScale;
   out.links = layOutLinks(mesh, cells, out.patches, patchTriangles);
   requireLinked(mesh, cells, out.links, out.voxel);
-  VoxelSolid larger = makeVoxelSolid(mesh, kLargerCells * solid.grid.size, solidSettings, stage(0.15, 0.2));
+  VoxelSolid larger = largerCells.get();
   solid.give = larger.give = giveOfHeld(mesh, solidSettings, solid, larger);
   Responses responses = solveFrames(solid, cells, freeAreas(measureNodes(mesh, out.patches)), stage(0.2, 0.4));
   if (held.empty()) responses = balancedResponses(mesh, cells, responses);

@@ -10,6 +10,7 @@
 
 #include "physics/model/cross_matrix.h"
 #include "physics/model/identify/lbfgs.h"
+#include "physics/model/identify/parallel.h"
 #include "physics/model/identify/skin_fit.h"
 #include "physics/model/row_of_cells.h"
 #include "physics/model/symmetric_eigen.h"
@@ -244,7 +245,8 @@ class LinkFit {
     const Eigen::LLT<MatrixXd> cholesky(stiffness);
     if (cholesky.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
     const double logDeterminant = 2 * cholesky.matrixLLT().diagonal().array().log().sum();
-    const MatrixXd inverse = cholesky.solve(MatrixXd::Identity(n, n));
+    MatrixXd inverse = MatrixXd::Identity(n, n);
+    overColumns([&](Index first, Index count) { cholesky.solveInPlace(inverse.middleCols(first, count)); });
     const auto size = static_cast<double>(n);
     double f = kl / size * (compliance_.cwiseProduct(stiffness).sum() - logDeterminant - size);
     MatrixXd slope = kl / size * (compliance_ - inverse);  // of f by the stiffness
@@ -253,14 +255,25 @@ class LinkFit {
       MatrixXd e = weight_.asDiagonal() * off * perResponse_.asDiagonal();
       f += response / (2 * size) * e.cwiseProduct(off).sum();
       e = (e + e.transpose()).eval() / (2 * size);
-      const MatrixXd product = inverse * e;
-      slope.noalias() -= response * product * inverse;
+      MatrixXd product(n, n);
+      overColumns([&](Index first, Index count) {
+        product.middleCols(first, count).noalias() = inverse * e.middleCols(first, count);
+      });
+      overColumns([&](Index first, Index count) {
+        slope.middleCols(first, count).noalias() -= response * product * inverse.middleCols(first, count);
+      });
     }
     setGradient(x, slope, strains, gradient);
     return f;
   }
 
  private:
+  template <typename Use>
+  void overColumns(const Use& use) const {
+    constexpr Index least = 120;  // fewer are done before another thread has begun
+    if (compliance_.rows() < least) return use(Index{0}, compliance_.rows());
+    inHalves(compliance_.rows(), use);
+  }
   bool hasStrains() const { return perLink_ > static_cast<Index>(places_.size()); }
   Matrix6d unpacked(const VectorXd& x, std::size_t link) const {
     Matrix6d out = Matrix6d::Zero();

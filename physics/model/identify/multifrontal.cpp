@@ -290,9 +290,9 @@ class Factorisation {
 };
 
 // Of columns first to first + count of x; the others are not touched.
-class BlockSolver {
+class HalfSolver {
  public:
-  BlockSolver(const DissectionPlan& plan, const FrontFactors& factors, RowMatrix& x, Index first, Index count)
+  HalfSolver(const DissectionPlan& plan, const FrontFactors& factors, RowMatrix& x, Index first, Index count)
       : plan_(plan), factors_(factors), x_(x), first_(first), count_(count) {
     std::size_t own = 0, rest = 0;
     for (const Front& front : plan.fronts) {
@@ -361,11 +361,7 @@ FrontFactors factorise(const DissectionPlan& plan, const HexGrid& grid, const Ce
 }
 
 void solve(const DissectionPlan& plan, const FrontFactors& factors, RowMatrix& x) {
-  const auto blocks = static_cast<int>((x.cols() + kSolveColumns - 1) / kSolveColumns);
-  runTogether(blocks, [&](int block) {
-    const Index first = static_cast<Index>(block) * kSolveColumns;
-    BlockSolver(plan, factors, x, first, std::min<Index>(kSolveColumns, x.cols() - first)).run();
-  });
+  inHalves(x.cols(), [&](Index first, Index count) { HalfSolver(plan, factors, x, first, count).run(); });
 }
 
 }  // namespace medulla

@@ -13,8 +13,6 @@
 // the rest, a dense matrix, to the front of both halves together. Nearly all work is on dense blocks.
 namespace medulla {
 
-constexpr int kSolveColumns = 24;  // right-hand sides per thread: a multiple of the 12 rows of Eigen's product kernel
-
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 struct Front {
@@ -48,7 +46,7 @@ using CellMatrices = std::function<Eigen::MatrixXd(std::span<const int> cells)>;
 FrontFactors factorise(const DissectionPlan& plan, const HexGrid& grid, const CellMatrices& cellMatrices,
                        const std::function<void(double)>& progress = {});
 
-// Solves in place: 3 nodes x right-hand sides, which are cheapest in multiples of kSolveColumns.
+// Solves in place, on two threads: 3 nodes x right-hand sides. The more of these at once, the less each of them costs.
 void solve(const DissectionPlan& plan, const FrontFactors& factors, RowMatrix& x);
 
 }  // namespace medulla

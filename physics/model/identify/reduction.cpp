@@ -47,7 +47,7 @@ class RandomTractions {
 
 Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const VectorXd& areas,
                       const std::function<void(double)>& progress) {
-  constexpr Index block = 48;
+  constexpr Index block = 96;  // more take more memory, 24 bytes per node of the grid and column
   const Index n = cells.motion.rows(), nodes = solid.surface.rows();
   Responses out{MatrixXd(n, n), MatrixXd(nodes, n), {}, MatrixXd(n, n), MatrixXd(nodes, n)};
   const RandomTractions tractions(solid, cells, areas);

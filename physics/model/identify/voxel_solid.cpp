@@ -229,19 +229,29 @@ RowSparse interpolation(const HexGrid& grid, const TriangleMesh& mesh, const std
   return out;
 }
 
-}  // namespace
-
-VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
-                          const std::function<void(double)>& progress) {
-  VoxelSolid solid;
-  const double volume = massProperties(mesh).volume, voxel = cellSize / HexGrid::kVoxels;
+int voxelsFor(double volume, double cellSize) {
   // Beyond, even the plan would take long; what fits has a tenth of these.
   constexpr double cellsMax = 1e5;
   if (volume / (cellSize * cellSize * cellSize) > cellsMax) {
     throw OverBudget(fmt::format("finite elements of {:.3g} mm would be {:.2g}, expected at most {:.2g}",
                                  1e3 * cellSize, volume / (cellSize * cellSize * cellSize), cellsMax));
   }
-  solid.voxels = voxelise(mesh, volume, static_cast<int>(volume / (voxel * voxel * voxel)));
+  const double voxel = cellSize / HexGrid::kVoxels;
+  return static_cast<int>(volume / (voxel * voxel * voxel));
+}
+
+}  // namespace
+
+double metCellSize(const TriangleMesh& mesh, double cellSize) {
+  const double volume = massProperties(mesh).volume;
+  return HexGrid::kVoxels * voxelSize(volume, voxelsFor(volume, cellSize));
+}
+
+VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
+                          const std::function<void(double)>& progress) {
+  VoxelSolid solid;
+  const double volume = massProperties(mesh).volume;
+  solid.voxels = voxelise(mesh, volume, voxelsFor(volume, cellSize));
   const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
   for (const VoxelPiece& piece : solid.voxels.pieces) solid.isBehind.push_back(behind(piece.centre));
   solid.grid = makeHexGrid(solid.voxels, solid.isBehind);

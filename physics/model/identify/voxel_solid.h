@@ -45,8 +45,10 @@ struct OverBudget : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// `cellSize` is met within a percent. Throws OverBudget, and std::runtime_error where the body is so thin that its
-// cells do not hang together.
+// The size of the cells that makeVoxelSolid makes when asked for `cellSize`: within a percent of it.
+double metCellSize(const TriangleMesh& mesh, double cellSize);
+
+// Throws OverBudget, and std::runtime_error where the body is so thin that its cells do not hang together.
 VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
                           const std::function<void(double)>& progress = {});
 
