@@ -25,7 +25,7 @@ HexGrid ellipsoidGrid(double cellSize) {
   return makeHexGrid(voxelise(mesh, volume, static_cast<int>(volume / std::pow(cellSize / HexGrid::kVoxels, 3))));
 }
 
-// With cells enough for two levels of halves on threads of their own.
+// With cells enough for halves on threads of their own.
 struct Body {
   HexGrid grid = ellipsoidGrid(0.008);
   DissectionPlan plan = planDissection(grid);

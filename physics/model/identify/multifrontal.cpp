@@ -177,7 +177,7 @@ class Factorisation {
 
  private:
   static constexpr int kCellBatch = 32;   // cells' matrices at once, by one large product
-  static constexpr int kForks = 2;        // of the topmost fronts' halves: up to four threads
+  static constexpr int kForks = 1;        // of the topmost front: two threads
   static constexpr int kForkCells = 100;  // below, threads cost more than they bring
 
   // Of one thread. Matrices of fronts lie on a stack, above those that their halves left.
