@@ -48,7 +48,7 @@ TEST(LinkFit, StrainsOfCellsAreTheFullFormsAloneAndBringItNearer) {
   const Eigen::MatrixXd compliance = stiffnessOf(meant).inverse();
   const auto errorOf = [&](LinkForm form, bool strained) {
     std::vector<IdentifiedLink> links = coupledLinks();
-    fitLinks(compliance, {}, 1, form, links, {});
+    fitLinks(compliance, {}, {}, 1, form, links, {});
     for (const IdentifiedLink& l : links) EXPECT_EQ(!l.strain0.isZero(0), strained);
     return (stiffnessOf(links).inverse() - compliance).norm() / compliance.norm();
   };

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "physics/model/identify/end_loads.h"
 #include "physics/model/identify/held_give.h"
 #include "physics/model/identify/layer_fit.h"
 #include "physics/model/identify/parallel.h"
@@ -218,17 +219,19 @@ class Trials {
 // scatter: concentrated and random, they say little of ends, by two or three percent of the larger half's error where
 // few spheres are. Each skin is
 // judged with the layer that goes with it: maps that take over a part of the dents are the nearer without one.
-void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Responses& responses, const Trials& trials,
-                const RowMatrix& forces, const MatrixXd& under, IdentifiedNetwork& out) {
+void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Responses& responses, const EndTwists& ends,
+                const Trials& trials, const RowMatrix& forces, const MatrixXd& under, IdentifiedNetwork& out) {
   constexpr double kScatter = 0.025;
+  constexpr double kTwist = 30;  // of ends, of unit energy as each of the loads on the frames
   const Index half = forces.cols() / 2;
   const VectorXd largest = largestOf(under);
   double first = 0, second = 0;
   std::vector<std::vector<SkinFrame>> skin;
   IdentifiedLayer layer;
   for (const double weight : {0., 3., 10., 100., 300.}) {
-    out.skin = fitSkin(mesh, cells, out.patches, responses.frames + weight * responses.framesUnderTractions,
-                       responses.nodes + weight * responses.nodesUnderTractions);
+    out.skin = fitSkin(mesh, cells, out.patches,
+                       responses.frames + weight * responses.framesUnderTractions + kTwist * ends.framesUnderTwists,
+                       responses.nodes + weight * responses.nodesUnderTractions + kTwist * ends.nodesUnderTwists);
     out.layer = fitLayer(mesh, trials.surface, forces, under - trials.ofFrames(forces), largest, out.lengthScale);
     const MatrixXd found = trials.ofNetwork(forces);
     const double bulk = errorOf(found.leftCols(half), under.leftCols(half)).rms,
@@ -246,10 +249,19 @@ void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Respons
   out.layer = layer;
 }
 
-// Fits skin and layer to loads of their own, and measures the network on others, which nothing was fitted to; then
-// solves those again in `larger` cells.
+void fitAndClampLinks(const CellFrames& cells, const Responses& responses, const LoadsOnCells& ends, LinkForm form,
+                      IdentifiedNetwork& out, const Progress& progress) {
+  fitLinks(responses.frames, responses.grounding, ends, out.lengthScale, form, out.links, progress);
+  for (IdentifiedLink& link : out.links)
+    if (link.frame1 >= static_cast<int>(cells.frames.size()) && isRowOfCells(out.links, cells.frames.size()))
+      centreClamp(out.lengthScale, link);
+}
+
+// Fits skin and layer to loads of their own, then the links, from `unfitted` ones, to what the skin makes of
+// twisted ends; measures the network on others, which nothing was fitted to, and solves those again in `larger` cells.
 void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const VoxelSolid& larger,
-                          const CellFrames& cells, const Responses& responses, Identification& result,
+                          const CellFrames& cells, const Responses& responses, const EndTwists& ends,
+                          const std::vector<IdentifiedLink>& unfitted, LinkForm form, Identification& result,
                           const Progress& progress) {
   constexpr int count = 16;
   IdentifiedNetwork& out = result.network;
@@ -259,7 +271,16 @@ void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, con
       trials.loads(LoadKind::bulk, count, 2), trials.loads(LoadKind::poke, count, 2);
   const MatrixXd exact = trials.exact(solid, all);
   progress(0.5);
-  chooseSkin(mesh, cells, responses, trials, all.leftCols(2 * count), exact.leftCols(2 * count), out);
+  const RowMatrix teaching = all.leftCols(2 * count);
+  const MatrixXd under = exact.leftCols(2 * count);
+  chooseSkin(mesh, cells, responses, ends, trials, teaching, under, out);
+  if (!ends.cells.empty()) {
+    const RowSparse skin = skinMatrix(out.skin, static_cast<int>(cells.frames.size()));
+    out.links = unfitted;
+    fitAndClampLinks(cells, responses, loadsOnEnds(ends, responses.frames, skin), form, out, {});
+    out.layer =
+        fitLayer(mesh, trials.surface, teaching, under - trials.ofFrames(teaching), largestOf(under), out.lengthScale);
+  }
   const RowMatrix bulk = all.middleCols(2 * count, count), poke = all.rightCols(count);
   const MatrixXd bulkExact = exact.middleCols(2 * count, count), pokeExact = exact.rightCols(count);
   out.bulk = errorOf(trials.ofNetwork(bulk), bulkExact);
@@ -315,14 +336,14 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   requireLinked(mesh, cells, out.links, out.voxel);
   VoxelSolid larger = largerCells.get();
   solid.give = larger.give = giveOfHeld(mesh, solidSettings, solid, larger);
-  Responses responses = solveFrames(solid, cells, freeAreas(measureNodes(mesh, out.patches)), stage(0.2, 0.4));
+  const VectorXd areas = freeAreas(measureNodes(mesh, out.patches));
+  Responses responses = solveFrames(solid, cells, areas, stage(0.2, 0.4));
   if (held.empty()) responses = balancedResponses(mesh, cells, responses);
-  fitLinks(responses.frames, responses.grounding, out.lengthScale, settings.links, out.links, stage(0.4, 0.85));
-  for (IdentifiedLink& link : out.links)
-    if (link.frame1 >= static_cast<int>(cells.frames.size()) && isRowOfCells(out.links, cells.frames.size()))
-      centreClamp(out.lengthScale, link);
+  const std::vector<IdentifiedLink> unfitted = out.links;
+  const EndTwists ends = solveEnds(mesh, solid, cells, unfitted, areas);
+  fitAndClampLinks(cells, responses, {}, settings.links, out, stage(0.4, 0.85));
   out.frames = cells.frames;
-  fitSurfaceAndMeasure(mesh, solid, larger, cells, responses, result, stage(0.85, 1));
+  fitSurfaceAndMeasure(mesh, solid, larger, cells, responses, ends, unfitted, settings.links, result, stage(0.85, 1));
   requireFinite(out);
   return result;
 }

@@ -170,10 +170,12 @@ Matrix6d measured(const MatrixXd& m, const IdentifiedLink& link, const Matrix6x1
 // compliance that finite elements give its measures; and with the whole triangle two vectors s in strain = T s.
 class LinkFit {
  public:
-  LinkFit(const MatrixXd& compliance, const MatrixXd& grounding, double lengthScale, LinkForm form,
-          std::vector<IdentifiedLink>& links)
+  LinkFit(const MatrixXd& compliance, const MatrixXd& grounding, const LoadsOnCells& ends, double lengthScale,
+          LinkForm form, std::vector<IdentifiedLink>& links)
       : compliance_(compliance),
         grounding_(grounding),
+        ends_(ends),
+        expected_(compliance),
         links_(links),
         frames_(static_cast<int>(compliance.rows() / 6)) {
     for (int b = 0; b < 6; ++b) {
@@ -193,7 +195,9 @@ class LinkFit {
     const Index n = compliance.rows();
     // Rotations count for less: they reach the surface over a cell's radius only.
     weight_ = Eigen::Matrix<double, 6, 1>(1, 1, 1, 0.09, 0.09, 0.09).replicate(n / 6, 1);
-    perResponse_ = (weight_.asDiagonal() * compliance.cwiseAbs2()).colwise().sum().cwiseInverse().transpose();
+    for (std::size_t e = 0; e < ends.cells.size(); ++e)
+      expected_.middleCols<6>(6 * ends.cells[e]) = ends.motions.middleCols<6>(6 * static_cast<Index>(e));
+    perResponse_ = (weight_.asDiagonal() * expected_.cwiseAbs2()).colwise().sum().cwiseInverse().transpose();
   }
 
   VectorXd start() const {
@@ -251,9 +255,14 @@ class LinkFit {
     double f = kl / size * (compliance_.cwiseProduct(stiffness).sum() - logDeterminant - size);
     MatrixXd slope = kl / size * (compliance_ - inverse);  // of f by the stiffness
     if (response > 0) {
-      const MatrixXd off = inverse - compliance_;
+      MatrixXd off = inverse;
+      for (std::size_t k = 0; k < ends_.cells.size(); ++k)
+        off.middleCols<6>(6 * ends_.cells[k]) = inverse * ends_.loads.middleCols<6>(6 * static_cast<Index>(k));
+      off -= expected_;
       MatrixXd e = weight_.asDiagonal() * off * perResponse_.asDiagonal();
+      if (!ends_.cells.empty()) lessenOwn(e);
       f += response / (2 * size) * e.cwiseProduct(off).sum();
+      e = slopeByInverse(e);
       e = (e + e.transpose()).eval() / (2 * size);
       MatrixXd product(n, n);
       overColumns([&](Index first, Index count) {
@@ -281,6 +290,23 @@ class LinkFit {
       out(places_[k][0], places_[k][1]) = x[static_cast<Index>(link) * perLink_ + static_cast<Index>(k)];
     return out;
   }
+  // What a cell itself does under a load spread over it is less than under one in its middle, which no row of links
+  // knows: it would make them all the stiffer. Ends have nothing else to say how stiff their link is.
+  void lessenOwn(MatrixXd& weighted) const {
+    constexpr double kOwn = 0.1;
+    for (int i = 0; i < frames_; ++i)
+      if (std::find(ends_.cells.begin(), ends_.cells.end(), i) == ends_.cells.end())
+        weighted.block<6, 6>(6 * i, 6 * i) *= kOwn;
+  }
+  // From the slope by the responses.
+  MatrixXd slopeByInverse(const MatrixXd& byResponses) const {
+    MatrixXd out = byResponses;
+    for (const int cell : ends_.cells) out.middleCols<6>(6 * cell).setZero();
+    for (std::size_t k = 0; k < ends_.cells.size(); ++k)
+      out.noalias() += byResponses.middleCols<6>(6 * ends_.cells[k]) *
+                       ends_.loads.middleCols<6>(6 * static_cast<Index>(k)).transpose();
+    return out;
+  }
   // From the value's slope by the stiffness.
   void setGradient(const VectorXd& x, const MatrixXd& slope, const MatrixXd& strains, VectorXd& gradient) const {
     const MatrixXd byStrains = 2 * slope * strains;
@@ -298,6 +324,8 @@ class LinkFit {
   }
 
   const MatrixXd &compliance_, &grounding_;
+  const LoadsOnCells& ends_;
+  MatrixXd expected_;  // responses, a column each: the compliance but for the ends'
   std::vector<IdentifiedLink>& links_;
   int frames_;
   std::vector<std::array<int, 2>> places_;
@@ -320,8 +348,8 @@ MatrixXd networkStiffness(const std::vector<IdentifiedLink>& links, double lengt
   return sum + strains * strains.transpose();
 }
 
-void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double lengthScale, LinkForm form,
-              std::vector<IdentifiedLink>& links, const std::function<void(double)>& progress) {
+void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, const LoadsOnCells& ends, double lengthScale,
+              LinkForm form, std::vector<IdentifiedLink>& links, const std::function<void(double)>& progress) {
   constexpr int warmUp = 60;
   // An iteration costs the cube of the frames: few of them have time for more.
   const int iterations = std::clamp(static_cast<int>(6 * 6000 / compliance.rows()), 300, 1000);
@@ -340,13 +368,13 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, double leng
     descend(value(fit, 1, 0), {warmUp}, at);
     return descend(value(fit, klWeight, responseWeight), {iterations}, at);
   };
-  const LinkFit plain(compliance, grounding, lengthScale, std::min(form, LinkForm::uncoupled), links);
+  const LinkFit plain(compliance, grounding, ends, lengthScale, std::min(form, LinkForm::uncoupled), links);
   VectorXd x = plain.start();
   const double reached = minimise(plain, x);
   // Where cells lie in a row there is next to nothing to couple, and what strains gain of single loads they lose of
   // others: a gallbladder of seven, with ten links, bends half a percent farther off with them.
   if (form == LinkForm::full && !isRowOfCells(links, static_cast<std::size_t>(compliance.rows()) / 6)) {
-    const LinkFit strained(compliance, grounding, lengthScale, form, links);
+    const LinkFit strained(compliance, grounding, ends, lengthScale, form, links);
     VectorXd both = strained.startAt(plain.start());
     if (minimise(strained, both) < reached) {
       strained.setLinks(both);
