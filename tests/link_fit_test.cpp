@@ -57,6 +57,43 @@ TEST(LinkFit, StrainsOfCellsAreTheFullFormsAloneAndBringItNearer) {
   EXPECT_LT(uncoupled, errorOf(LinkForm::diagonal, false));
 }
 
+// Three cells in a row from a clamp, the last of which is twisted beyond its middle: more than the network's own load
+// on it, and the other way round on the one before.
+TEST(LinkFit, ARowIsFoundFromLoadsOnItsEndThatAreNotItsOwn) {
+  constexpr int kFrames = 3;
+  const auto row = [] {
+    std::vector<IdentifiedLink> links(3);
+    for (int k = 0; k < 3; ++k) {
+      links[k].frame0 = k == 0 ? 0 : k - 1;
+      links[k].frame1 = k == 0 ? kFrames : k;
+      links[k].restPoint0 = {static_cast<double>(links[k].frame0), 0, 0};
+      links[k].restPoint1 = {k == 0 ? -0.5 : k, 0, 0};
+      links[k].axes = Eigen::Matrix3d::Identity();
+    }
+    return links;
+  };
+  std::vector<IdentifiedLink> meant = row(), plain = row(), found = row();
+  for (int k = 0; k < 3; ++k) meant[k].stiffness = Vector6d(5 + k, 2, 2, 0.5 + 0.2 * k, 0.8, 0.7).asDiagonal();
+  const Eigen::MatrixXd compliance = networkStiffness(meant, 1, kFrames).inverse();
+  LoadsOnCells ends{{2}, Eigen::MatrixXd::Zero(18, 6), {}};
+  ends.loads.bottomRows<6>().setIdentity();
+  ends.loads(15, 3) = 1.2;
+  ends.loads(9, 3) = -0.2;
+  ends.motions = compliance * ends.loads;
+  // Of couples spread over cells, the cells' own turns are what no row answers.
+  Eigen::MatrixXd spread = compliance;
+  for (const int turn : {3, 9, 15}) spread(turn, turn) *= 0.9;
+  fitLinks(spread, {}, {}, 1, LinkForm::diagonal, plain, {});
+  fitLinks(spread, {}, ends, 1, LinkForm::diagonal, found, {});
+  for (int k = 0; k < 3; ++k) {
+    const double twist = meant[k].stiffness(3, 3);
+    EXPECT_LT(std::abs(found[k].stiffness(3, 3) / twist - 1), 0.5 * std::abs(plain[k].stiffness(3, 3) / twist - 1))
+        << k;
+  }
+  EXPECT_LT((networkStiffness(found, 1, kFrames).inverse() * ends.loads - ends.motions).norm(),
+            0.02 * ends.motions.norm());
+}
+
 // A bar that is clamped 10 mm along x, told of a patch whose nearest point lies aside.
 TEST(LinkFit, ClampsAreCentredWithoutChangingSmallDisplacements) {
   constexpr double kScale = 0.015;

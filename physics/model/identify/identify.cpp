@@ -217,12 +217,12 @@ class Trials {
 // responses to tractions alone leave maps too free, which send loads to the frames by the same numbers. So tractions
 // get the largest weight among loads on the frames that costs the answer to either half of `forces` no more than these
 // scatter: concentrated and random, they say little of ends, by two or three percent of the larger half's error where
-// few spheres are. Each skin is
-// judged with the layer that goes with it: maps that take over a part of the dents are the nearer without one.
+// few spheres are. Each skin is judged with the layer that goes with it: maps that take over a part of the dents are
+// the nearer without one. Of an end that is twisted beyond its frame no random load says anything.
 void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Responses& responses, const EndTwists& ends,
                 const Trials& trials, const RowMatrix& forces, const MatrixXd& under, IdentifiedNetwork& out) {
   constexpr double kScatter = 0.025;
-  constexpr double kTwist = 30;  // of ends, of unit energy as each of the loads on the frames
+  constexpr double kTwist = 30;  // at unit energy, as each of the loads on the frames; 10 to 100 differ little
   const Index half = forces.cols() / 2;
   const VectorXd largest = largestOf(under);
   double first = 0, second = 0;

@@ -198,6 +198,7 @@ class LinkFit {
     for (std::size_t e = 0; e < ends.cells.size(); ++e)
       expected_.middleCols<6>(6 * ends.cells[e]) = ends.motions.middleCols<6>(6 * static_cast<Index>(e));
     perResponse_ = (weight_.asDiagonal() * expected_.cwiseAbs2()).colwise().sum().cwiseInverse().transpose();
+    if (!ends.cells.empty()) findRowAxes();
   }
 
   VectorXd start() const {
@@ -259,9 +260,10 @@ class LinkFit {
       for (std::size_t k = 0; k < ends_.cells.size(); ++k)
         off.middleCols<6>(6 * ends_.cells[k]) = inverse * ends_.loads.middleCols<6>(6 * static_cast<Index>(k));
       off -= expected_;
+      lessenOwnTwists(off);
       MatrixXd e = weight_.asDiagonal() * off * perResponse_.asDiagonal();
-      if (!ends_.cells.empty()) lessenOwn(e);
       f += response / (2 * size) * e.cwiseProduct(off).sum();
+      lessenOwnTwists(e);
       e = slopeByInverse(e);
       e = (e + e.transpose()).eval() / (2 * size);
       MatrixXd product(n, n);
@@ -290,13 +292,28 @@ class LinkFit {
       out(places_[k][0], places_[k][1]) = x[static_cast<Index>(link) * perLink_ + static_cast<Index>(k)];
     return out;
   }
-  // What a cell itself does under a load spread over it is less than under one in its middle, which no row of links
-  // knows: it would make them all the stiffer. Ends have nothing else to say how stiff their link is.
-  void lessenOwn(MatrixXd& weighted) const {
-    constexpr double kOwn = 0.1;
-    for (int i = 0; i < frames_; ++i)
-      if (std::find(ends_.cells.begin(), ends_.cells.end(), i) == ends_.cells.end())
-        weighted.block<6, 6>(6 * i, 6 * i) *= kOwn;
+  // Of cells between others: the direction of the row.
+  void findRowAxes() {
+    rowAxes_.assign(frames_, Eigen::Vector3d::Zero());
+    for (const IdentifiedLink& link : links_) {
+      for (const int i : {link.frame0, link.frame1}) {
+        if (i >= frames_ || std::find(ends_.cells.begin(), ends_.cells.end(), i) != ends_.cells.end()) continue;
+        const Eigen::Vector3d along = link.axes.row(0).transpose();
+        rowAxes_[i] += along.dot(rowAxes_[i]) < 0 ? Eigen::Vector3d(-along) : along;
+      }
+    }
+    for (Eigen::Vector3d& axis : rowAxes_) axis.normalize();
+  }
+  // How far a cell turns about the row under a couple spread over it is less than any row of links that twists as the
+  // body does under couples elsewhere: it would make them all the stiffer. At an end nothing else says how stiff its
+  // link is.
+  void lessenOwnTwists(MatrixXd& responses) const {
+    constexpr double kOwn = 0.32;  // counts a tenth in the squares
+    for (std::size_t i = 0; i < rowAxes_.size(); ++i) {
+      auto turns = responses.block<3, 3>(6 * static_cast<Index>(i) + 3, 6 * static_cast<Index>(i) + 3);
+      const Eigen::Vector3d& axis = rowAxes_[i];
+      turns -= (1 - kOwn) * axis.dot(turns * axis) * axis * axis.transpose();
+    }
   }
   // From the slope by the responses.
   MatrixXd slopeByInverse(const MatrixXd& byResponses) const {
@@ -325,7 +342,8 @@ class LinkFit {
 
   const MatrixXd &compliance_, &grounding_;
   const LoadsOnCells& ends_;
-  MatrixXd expected_;  // responses, a column each: the compliance but for the ends'
+  MatrixXd expected_;                     // responses, a column each: the compliance but for the ends'
+  std::vector<Eigen::Vector3d> rowAxes_;  // unit, per cell, of those between others; empty of all but rows
   std::vector<IdentifiedLink>& links_;
   int frames_;
   std::vector<std::array<int, 2>> places_;
