@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "physics/dynamics/rest_model.h"
+#include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
 
@@ -155,10 +156,10 @@ std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMe
       if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) free.push_back(6 * i + k);
   if (free.empty()) return {};
   const MatrixXd stiffness = rest.linkStiffness()(free, free), mass = rest.carriedMass()(free, free);
-  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> modes(stiffness, mass, Eigen::EigenvaluesOnly);
+  const VectorXd modes = eigenvaluesOf(stiffness, mass);
   std::vector<double> out;
-  for (const double squared : modes.eigenvalues())
-    if (squared > kRigid * modes.eigenvalues().maxCoeff() && static_cast<int>(out.size()) < count)
+  for (const double squared : modes)
+    if (squared > kRigid * modes.maxCoeff() && static_cast<int>(out.size()) < count)
       out.push_back(std::sqrt(squared) / (2 * std::numbers::pi));
   return out;
 }

@@ -9,4 +9,9 @@ SymmetricEigen symmetricEigen(const Matrix6d& matrix) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
+Eigen::VectorXd eigenvaluesOf(const Eigen::MatrixXd& stiffness, const Eigen::MatrixXd& mass) {
+  return Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(stiffness, mass, Eigen::EigenvaluesOnly)
+      .eigenvalues();
+}
+
 }  // namespace medulla
