@@ -222,7 +222,7 @@ class Trials {
 void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Responses& responses, const EndTwists& ends,
                 const Trials& trials, const RowMatrix& forces, const MatrixXd& under, IdentifiedNetwork& out) {
   constexpr double kScatter = 0.025;
-  constexpr double kTwist = 30;  // at unit energy, as each of the loads on the frames; 10 to 100 differ little
+  constexpr double kTwist = 30;  // at unit energy, as each of the loads on the frames; 30 to 100 differ little
   const Index half = forces.cols() / 2;
   const VectorXd largest = largestOf(under);
   double first = 0, second = 0;
