@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "physics/model/rotation_between.h"
 #include "tests/contact_bodies.h"
 #include "tests/dynamics_states.h"
 
@@ -50,7 +51,7 @@ void throwBody(World& w, int body, const Vector3d& velocity) {
 
 StaticShape plane(const Vector3d& normal = Vector3d::UnitY(), double friction = 0) {
   StaticShape s;
-  s.worldFromShape.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitY(), normal).toRotationMatrix();
+  s.worldFromShape.linear() = rotationBetween(Vector3d::UnitY(), normal).toRotationMatrix();
   s.friction = friction;
   return s;
 }

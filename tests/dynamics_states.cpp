@@ -2,10 +2,34 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 namespace medulla::states {
+
+Quaterniond orientation(const WorldData& d, int i) {
+  return quaternionOf(d.spheres.orientation[i]);
+}
+void setOrientation(WorldData& d, int i, const Quaterniond& q) {
+  d.spheres.orientation[i] = {{q.x(), q.y(), q.z(), q.w()}};
+}
+void turnBy(WorldData& d, int i, const Vector3d& rotation) {
+  if (rotation.norm() == 0) return;
+  setOrientation(d, i, Quaterniond(Eigen::AngleAxisd(rotation.norm(), rotation.normalized())) * orientation(d, i));
+}
+
+Eigen::Matrix3d inertia(const WorldData& d, int i) {
+  const Eigen::Matrix3d r = orientation(d, i).toRotationMatrix();
+  return r * inverseInertiaOf(d.spheres.groups[i / 4], i % 4).inverse() * r.transpose();
+}
+void setAngularVelocity(WorldData& d, int i, const Vector3d& omega) {
+  d.spheres.angularMomentum[i] = quadOf(inertia(d, i) * omega);
+  d.spheres.angularVelocity[i] = quadOf(omega);
+}
+double sphereMass(const WorldData& d, int i) {
+  return d.spheres.groups[i / 4].mass[i % 4];
+}
 
 void shake(WorldData& d, std::uint64_t seed, double angle, double shift, double speed) {
   Random random(seed);

@@ -29,28 +29,13 @@ class Random {  // xorshift64*
   std::uint64_t state_;
 };
 
-inline Quaterniond orientation(const WorldData& d, int i) {
-  return quaternionOf(d.spheres.orientation[i]);
-}
-inline void setOrientation(WorldData& d, int i, const Quaterniond& q) {
-  d.spheres.orientation[i] = {{q.x(), q.y(), q.z(), q.w()}};
-}
-inline void turnBy(WorldData& d, int i, const Vector3d& rotation) {
-  if (rotation.norm() == 0) return;
-  setOrientation(d, i, Quaterniond(Eigen::AngleAxisd(rotation.norm(), rotation.normalized())) * orientation(d, i));
-}
+Quaterniond orientation(const WorldData& d, int i);
+void setOrientation(WorldData& d, int i, const Quaterniond& q);
+void turnBy(WorldData& d, int i, const Vector3d& rotation);
 
-inline Eigen::Matrix3d inertia(const WorldData& d, int i) {  // world frame
-  const Eigen::Matrix3d r = orientation(d, i).toRotationMatrix();
-  return r * inverseInertiaOf(d.spheres.groups[i / 4], i % 4).inverse() * r.transpose();
-}
-inline void setAngularVelocity(WorldData& d, int i, const Vector3d& omega) {
-  d.spheres.angularMomentum[i] = quadOf(inertia(d, i) * omega);
-  d.spheres.angularVelocity[i] = quadOf(omega);
-}
-inline double sphereMass(const WorldData& d, int i) {
-  return d.spheres.groups[i / 4].mass[i % 4];
-}
+Eigen::Matrix3d inertia(const WorldData& d, int i);  // world frame
+void setAngularVelocity(WorldData& d, int i, const Vector3d& omega);
+double sphereMass(const WorldData& d, int i);
 
 // Every sphere turned by up to `angle` (rad) and every sphere and free node moved by up to `shift` (m), spun and
 // thrown.

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -10,6 +9,8 @@
 #include <numbers>
 #include <optional>
 #include <stdexcept>
+
+#include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
 
@@ -59,9 +60,9 @@ SectionAxes axesOf(const Vector3d& line, const Vector3d& restU) {
   return {t, u, t.cross(u)};
 }
 
-Matrix2d squareRootInverse(const Eigen::SelfAdjointEigenSolver<Matrix2d>& eigen) {
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseSqrt().cwiseInverse().asDiagonal() *
-         eigen.eigenvectors().transpose();
+Matrix2d squareRootInverse(const SymmetricEigen& eigen) {
+  const Matrix2d vectors = eigen.vectors;
+  return vectors * Vector2d(eigen.values.cwiseSqrt().cwiseInverse()).asDiagonal() * vectors.transpose();
 }
 
 // A rim that is jagged, as that of whole triangles is, clamps a section's fibres at different depths a(r), and a short
@@ -87,8 +88,8 @@ Matrix2d beyondRim(const std::vector<Vector3d>& rim, const Vector3d& outward, co
     second += r * r.transpose();
     askew += r * (node - centre).dot(outward);
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix2d> eigen(second);
-  if (!(eigen.eigenvalues()[0] > kRoundest * eigen.eigenvalues()[1])) return Matrix2d::Zero();
+  const SymmetricEigen eigen = symmetricEigen(second);
+  if (!(eigen.values[0] > kRoundest * eigen.values[1])) return Matrix2d::Zero();
   const Vector2d slope = second.inverse() * askew;
   Matrix2d sum = Matrix2d::Zero();
   for (const Vector3d& node : rim) {

@@ -1,6 +1,6 @@
 #include "physics/dynamics/rest_modes.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <array>
@@ -54,13 +54,12 @@ MatrixXd freeRigidMotions(const SoftBodyModel& m, const std::vector<int>& freedo
   }
   if (fixed.rows() == 0) return free;
   const double size = std::max(1e-12, all.leftCols(6).cwiseAbs().maxCoeff());
-  // Of a square matrix, which needs no QR first.
-  const Eigen::JacobiSVD<MatrixXd, Eigen::NoQRPreconditioner> svd(fixed.transpose() * fixed, Eigen::ComputeFullV);
+  const SymmetricEigen eigen = symmetricEigen(fixed.transpose() * fixed);
   MatrixXd out(freeCount, 0);
   for (int k = 0; k < 6; ++k) {
-    if (svd.singularValues()[k] > 1e-12 * size * size) continue;
+    if (eigen.values[k] > 1e-12 * size * size) continue;
     out.conservativeResize(Eigen::NoChange, out.cols() + 1);
-    out.rightCols(1) = free * svd.matrixV().col(k);
+    out.rightCols(1) = free * eigen.vectors.col(k);
   }
   return out;
 }
@@ -92,8 +91,9 @@ double sumOfTraces(const std::vector<Matrix3d>& matrices) {
 }
 
 Matrix3d positivePart(const Matrix3d& symmetric) {
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> e(symmetric);
-  return e.eigenvectors() * e.eigenvalues().cwiseMax(0).asDiagonal() * e.eigenvectors().transpose();
+  const SymmetricEigen e = symmetricEigen(symmetric);
+  const Matrix3d vectors = e.vectors;
+  return vectors * Vector3d(e.values.cwiseMax(0)).asDiagonal() * vectors.transpose();
 }
 
 }  // namespace

@@ -1,12 +1,12 @@
 #include "physics/model/link_sections.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "physics/model/plane_section.h"
+#include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
 
@@ -84,8 +84,8 @@ static void measureLink(const TriangleMesh& mesh, const PowerSites& sites, const
   // it.
   Eigen::Matrix2d bend = Eigen::Matrix2d::Zero();
   for (const SectionMoments& s : sections) bend += s.secondMoment.inverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> principal(bend.inverse().eval());
-  const Eigen::Vector2d u = principal.eigenvectors().col(0), v = principal.eigenvectors().col(1);
+  const SymmetricEigen principal = symmetricEigen(bend.inverse());
+  const Eigen::Vector2d u = principal.vectors.col(0), v = principal.vectors.col(1);
   link.restU = (u.x() * across.u + u.y() * across.v).normalized();
   for (int k = 0; k < ElasticLink::kSections; ++k) {
     const Eigen::Matrix2d compliance = sections[k].secondMoment.inverse();

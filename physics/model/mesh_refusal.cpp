@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 #include "physics/model/mesh_repair_stages.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/self_intersection.h"
+#include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
 
@@ -110,7 +110,7 @@ void requireThickness(const MeshUnderRepair& repair) {
   mean /= static_cast<double>(repair.mesh.vertices.size());
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (const auto& v : repair.mesh.vertices) covariance += (v - mean) * (v - mean).transpose();
-  const Eigen::Vector3d variance = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues();
+  const Eigen::Vector3d variance = symmetricEigen(covariance).values;
   if (variance[0] > kFlatExtent * kFlatExtent * variance[2]) return;
   throw std::runtime_error("the mesh is flat and encloses no volume, expected a closed surface");
 }

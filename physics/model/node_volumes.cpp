@@ -1,12 +1,12 @@
 #include "physics/model/node_volumes.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "physics/model/attachment.h"
 #include "physics/model/mesh_topology.h"
+#include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
 
@@ -70,8 +70,7 @@ double momentLoss(const MassProperties& cell, const Moments& taken, double c) {
   const double left = cell.volume - c * taken.volume;
   const Matrix3d remainder =
       cell.secondMoment - c * taken.second - c * c * taken.first * taken.first.transpose() / left;
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix3d> solver(remainder, cell.secondMoment, Eigen::EigenvaluesOnly);
-  return 1 - solver.eigenvalues()[0];
+  return 1 - eigenvaluesOf(remainder, cell.secondMoment)[0];
 }
 
 double mostVolumePerStiffness(const MassProperties& cell, const Moments& taken) {

@@ -4,8 +4,8 @@
 
 namespace medulla {
 
-SymmetricEigen symmetricEigen(const Matrix6d& matrix) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
+SymmetricEigen symmetricEigen(const Eigen::MatrixXd& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix);
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 

@@ -4,6 +4,7 @@
 
 #include "physics/dynamics/contact_stages.h"
 #include "physics/dynamics/stages.h"
+#include "physics/model/rotation_between.h"
 #include "tests/synthetic_model.h"
 
 // Cost of contact against the number of spheres: rods of four spheres with a full surface, packed so that each ball
@@ -22,8 +23,7 @@ std::vector<StaticShape> caseOf(const Eigen::Vector3d& size) {
     for (const double side : {-1.0, 1.0}) {
       StaticShape& s = planes.emplace_back();
       s.worldFromShape.linear() =
-          Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), -side * Eigen::Vector3d::Unit(axis))
-              .toRotationMatrix();
+          rotationBetween(Eigen::Vector3d::UnitY(), -side * Eigen::Vector3d::Unit(axis)).toRotationMatrix();
       if (side > 0) s.worldFromShape.translation() = size;
     }
   }

@@ -32,6 +32,12 @@ NodeSurface measureNodes(const TriangleMesh& mesh, const std::vector<FixedPatch>
   return out;
 }
 
+Eigen::VectorXd freeAreas(const NodeSurface& surface) {
+  Eigen::VectorXd out(static_cast<Index>(surface.areas.size()));
+  for (Index n = 0; n < out.size(); ++n) out[n] = surface.held[n] ? 0 : surface.areas[n];
+  return out;
+}
+
 namespace {
 
 // Indices of the three free nodes nearest to the point.
@@ -88,6 +94,19 @@ RowMatrix randomLoads(const TriangleMesh& mesh, const NodeSurface& surface, Load
     }
   }
   return forces;
+}
+
+RowMatrix consistentForces(const TriangleMesh& mesh, const RowMatrix& tractions) {
+  RowMatrix out = RowMatrix::Zero(tractions.rows(), tractions.cols());
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    const Vector3d normal =
+        (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
+    for (const int i : t) {
+      for (const int j : t)
+        out.middleRows<3>(3 * i) += (i == j ? 2 : 1) * normal.norm() / 24 * tractions.middleRows<3>(3 * j);
+    }
+  }
+  return out;
 }
 
 IdentifiedError errorOf(const MatrixXd& found, const MatrixXd& expected) {

@@ -1,5 +1,6 @@
 #include "physics/model/identify/end_loads.h"
 
+#include "physics/model/identify/check_loads.h"
 #include "physics/model/row_of_cells.h"
 
 namespace medulla {
@@ -47,20 +48,6 @@ VectorXd twistOn(const TriangleMesh& mesh, const CellFrames& cells, const End& e
   return out;
 }
 
-// Forces at the nodes that have the tractions' force and moment: the integrals of linear shapes by linear tractions.
-VectorXd consistentForces(const TriangleMesh& mesh, const VectorXd& tractions) {
-  VectorXd out = VectorXd::Zero(tractions.size());
-  for (const std::array<int, 3>& t : mesh.triangles) {
-    const Vector3d normal =
-        (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
-    for (const int i : t) {
-      for (const int j : t)
-        out.segment<3>(3 * i) += (i == j ? 2 : 1) * normal.norm() / 24 * tractions.segment<3>(3 * j);
-    }
-  }
-  return out;
-}
-
 }  // namespace
 
 EndTwists solveEnds(const TriangleMesh& mesh, const VoxelSolid& solid, const CellFrames& cells,
@@ -68,21 +55,23 @@ EndTwists solveEnds(const TriangleMesh& mesh, const VoxelSolid& solid, const Cel
   const Index n = cells.motion.rows(), nodes = solid.surface.rows();
   EndTwists out{{}, {}, MatrixXd(nodes, 0), MatrixXd(n, 0), MatrixXd::Zero(n, n), MatrixXd::Zero(nodes, n)};
   if (solid.isFree || !isRowOfCells(links, cells.frames.size())) return out;
-  for (const End& end : endsOf(links, static_cast<int>(cells.frames.size()))) {
-    const VectorXd tractions = twistOn(mesh, cells, end, areas);
-    const RowMatrix loads = areas.transpose().replicate<3, 1>().reshaped().cwiseProduct(tractions);
-    const RowMatrix moved = displacementsUnder(solid, loads);
-    const VectorXd frames = cells.motion * moved;
-    const double work = (loads.transpose() * (solid.loading.transpose() * moved)).sum();
-    if (!(work > 0)) continue;  // no free node beyond the frame
-    out.framesUnderTwists += frames * frames.transpose() / work;
-    out.nodesUnderTwists += solid.surface * moved * frames.transpose() / work;
-    out.cells.push_back(end.cell);
-    out.axes.push_back(end.axes);
+  const std::vector<End> all = endsOf(links, static_cast<int>(cells.frames.size()));
+  MatrixXd tractions(nodes, static_cast<Index>(all.size()));
+  for (Index e = 0; e < tractions.cols(); ++e) tractions.col(e) = twistOn(mesh, cells, all[e], areas);
+  const RowMatrix loads = areas.transpose().replicate<3, 1>().reshaped().asDiagonal() * tractions;
+  const RowMatrix moved = displacementsUnder(solid, loads);
+  const MatrixXd frames = cells.motion * moved, onSurface = solid.surface * moved;
+  const VectorXd work = loads.cwiseProduct(solid.loading.transpose() * moved).colwise().sum().transpose();
+  for (Index e = 0; e < tractions.cols(); ++e) {
+    if (!(work[e] > 0)) continue;  // no free node beyond the frame
+    out.framesUnderTwists += frames.col(e) * frames.col(e).transpose() / work[e];
+    out.nodesUnderTwists += onSurface.col(e) * frames.col(e).transpose() / work[e];
+    out.cells.push_back(all[e].cell);
+    out.axes.push_back(all[e].axes);
     out.forces.conservativeResize(nodes, out.forces.cols() + 1);
     out.frames.conservativeResize(n, out.frames.cols() + 1);
-    out.forces.rightCols<1>() = consistentForces(mesh, tractions);
-    out.frames.rightCols<1>() = frames;
+    out.forces.rightCols<1>() = consistentForces(mesh, tractions.col(e));
+    out.frames.rightCols<1>() = frames.col(e);
   }
   return out;
 }

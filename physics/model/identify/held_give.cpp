@@ -64,6 +64,7 @@ double giveOfHeld(const TriangleMesh& mesh, const SolidSettings& settings, const
   });
   const RowMatrix x = displacementsUnder(solid, forces);
   const VectorXd work = workOf(solid, forces, x);
+  // Without a rim nothing holds too much.
   const VectorXd springs =
       x.cwiseProduct(RowMatrix(solid.rimSprings * x)).colwise().sum().transpose().cwiseQuotient(work);
   const auto giveBy = [&](const Work& other) {
@@ -71,6 +72,7 @@ double giveOfHeld(const TriangleMesh& mesh, const SolidSettings& settings, const
     const double ratio = other.size / solid.grid.size;
     return lacking.dot(springs) / springs.squaredNorm() / (std::pow(ratio, kOrder) - 1);
   };
+  if (!(springs.squaredNorm() > 0)) return 0;
   const Work ofLarger = workUnder(larger, forces), ofDoubled = doubled.get();
   if (ofDoubled.ofLoads.size() == 0) return 0;
   return std::max(0., std::min(giveBy(ofLarger), giveBy(ofDoubled)));

@@ -85,43 +85,38 @@ std::array<double, 3> quadraticSlopes(double x) {
   return {4 * x - 3, 4 - 8 * x, 4 * x - 1};
 }
 
-HexGrid makeHexGrid(const VoxelBody& voxels, const std::vector<bool>& without) {
+namespace {
+
+std::size_t indexOf(const HexGrid& grid, const std::array<int, 3>& c) {
+  return (static_cast<std::size_t>(c[0]) * grid.count[1] + c[1]) * grid.count[2] + c[2];
+}
+
+// Of all pieces that count, in those that are large enough.
+void layOutCells(const VoxelBody& voxels, const std::vector<bool>& counts, HexGrid& grid) {
   constexpr int n = HexGrid::kVoxels;
-  const auto isLeftOut = [&](std::size_t piece) { return !without.empty() && without[piece]; };
-  HexGrid grid;
-  grid.size = n * voxels.size;
-  grid.low = voxels.low;
-  for (int a = 0; a < 3; ++a) grid.count[a] = (voxels.count[a] + n - 1) / n;
-  const auto at = [&](const std::array<int, 3>& c) {
-    return (static_cast<std::size_t>(c[0]) * grid.count[1] + c[1]) * grid.count[2] + c[2];
-  };
   std::vector<double> inside(static_cast<std::size_t>(grid.count[0]) * grid.count[1] * grid.count[2], 0);
   for (std::size_t p = 0; p < voxels.pieces.size(); ++p) {
     const VoxelPiece& piece = voxels.pieces[p];
-    if (!isLeftOut(p)) inside[at(cellOf(piece))] += piece.height / voxels.size / (n * n * n);
+    if (counts[p]) inside[indexOf(grid, cellOf(piece))] += piece.height / voxels.size / (n * n * n);
   }
   grid.cellAt.assign(inside.size(), -1);
   for (int i = 0; i < grid.count[0]; ++i) {
     for (int j = 0; j < grid.count[1]; ++j) {
       for (int k = 0; k < grid.count[2]; ++k) {
-        const double part = inside[at({i, j, k})];
+        const double part = inside[indexOf(grid, {i, j, k})];
         if (part < kFractionMin) continue;
-        grid.cellAt[at({i, j, k})] = static_cast<int>(grid.cells.size());
+        grid.cellAt[indexOf(grid, {i, j, k})] = static_cast<int>(grid.cells.size());
         grid.cells.push_back({i, j, k});
         grid.fractions.push_back(part);
       }
     }
   }
-  numberNodes(grid);
+}
 
+void addGaussWeights(const VoxelBody& voxels, const std::vector<bool>& counts, HexGrid& grid) {
+  constexpr int n = HexGrid::kVoxels;
   std::array<std::array<double, 5>, n> across;
   for (int v = 0; v < n; ++v) across[v] = voxelWeights(v);
-  const GaussRule& rule = fivePointRule();
-  grid.weights.resize(kHexGauss, static_cast<Eigen::Index>(grid.cells.size()));
-  for (int q = 0; q < kHexGauss; ++q) {
-    grid.weights.row(q).setConstant(kFloorWeight * rule.weights[q / 25] * rule.weights[q / 5 % 5] *
-                                    rule.weights[q % 5]);
-  }
   struct Layer {
     double centre = 0, height = 0;
     std::array<double, 5> weights{};
@@ -129,8 +124,8 @@ HexGrid makeHexGrid(const VoxelBody& voxels, const std::vector<bool>& without) {
   std::vector<Layer> layers(voxels.count[2]);  // most pieces are as high as the one before them in their layer
   for (std::size_t p = 0; p < voxels.pieces.size(); ++p) {
     const VoxelPiece& piece = voxels.pieces[p];
-    const int cell = grid.cellAt[at(cellOf(piece))];
-    if (cell < 0 || isLeftOut(p)) continue;
+    const int cell = grid.cellAt[indexOf(grid, cellOf(piece))];
+    if (cell < 0 || !counts[p]) continue;
     Layer& layer = layers[piece.index[2]];
     if (layer.centre != piece.centre.z() || layer.height != piece.height) {
       const double middle = (piece.centre.z() - grid.low.z()) / grid.size - grid.cells[cell][2];
@@ -146,10 +141,31 @@ HexGrid makeHexGrid(const VoxelBody& voxels, const std::vector<bool>& without) {
       }
     }
   }
+}
+
+}  // namespace
+
+HexGrid makeHexGrid(const VoxelBody& voxels, const std::vector<bool>& without) {
+  constexpr int n = HexGrid::kVoxels;
+  HexGrid grid;
+  grid.size = n * voxels.size;
+  grid.low = voxels.low;
+  for (int a = 0; a < 3; ++a) grid.count[a] = (voxels.count[a] + n - 1) / n;
+  std::vector<bool> counts(voxels.pieces.size(), true);
+  for (std::size_t p = 0; p < without.size(); ++p) counts[p] = !without[p];
+  layOutCells(voxels, counts, grid);
+  numberNodes(grid);
+  const GaussRule& rule = fivePointRule();
+  grid.weights.resize(kHexGauss, static_cast<Eigen::Index>(grid.cells.size()));
+  for (int q = 0; q < kHexGauss; ++q) {
+    grid.weights.row(q).setConstant(kFloorWeight * rule.weights[q / 25] * rule.weights[q / 5 % 5] *
+                                    rule.weights[q % 5]);
+  }
+  addGaussWeights(voxels, counts, grid);
   return grid;
 }
 
-// The cell among those around `home` whose box is nearest, the first among equals.
+// The cell whose box is nearest among those of the first ring around `home` that has any, the first among equals.
 static int nearestCell(const HexGrid& grid, const std::array<int, 3>& home, const Vector3d& local) {
   int best = -1;
   double least = std::numeric_limits<double>::infinity();

@@ -76,7 +76,6 @@ void requireFinite(const IdentifiedNetwork& n) {
 struct CellSize {
   double size = 0;   // m
   std::string neck;  // where the mesh asks for it; empty where the spheres do
-  bool isGiven = false;
 };
 
 // Volume (m3) on the smaller side of each link where it alone joins two parts of the body, 0 where others join them
@@ -118,7 +117,7 @@ CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const V
   for (std::size_t l = 0; l < model.links.size(); ++l) {
     if (beyond[l] < partMin * volume) continue;
     const ElasticLink& link = model.links[l];
-    const Vector3d from = model.spheres[link.sphere0].restFrame, to = model.spheres[link.sphere1].restFrame;
+    const Vector3d from = model.spheres[link.sphere0].restLinkEnd, to = model.spheres[link.sphere1].restLinkEnd;
     // The outer sections of a link may lie in the body's rounded end.
     for (int k = 2; k + 2 < ElasticLink::kSections; ++k) {
       const double neck = 2 * std::sqrt(link.sections[k].area / std::numbers::pi);
@@ -136,7 +135,6 @@ VoxelSolid makeSolid(const SoftBodyModel& model, const TriangleMesh& mesh, const
   try {
     return makeVoxelSolid(mesh, cell.size, solid, progress);
   } catch (const OverBudget& error) {
-    if (cell.isGiven) throw;
     const std::string why = cell.neck.empty()
                                 ? fmt::format("fewer spheres than {} would do with larger ones", model.spheres.size())
                                 : "it is too thin for its size: " + cell.neck;
@@ -163,30 +161,31 @@ VectorXd largestOf(const MatrixXd& displacements) {
   return out;
 }
 
-VectorXd freeAreas(const NodeSurface& surface) {
-  VectorXd out(static_cast<Index>(surface.areas.size()));
-  for (Index n = 0; n < out.size(); ++n) out[n] = surface.held[n] ? 0 : surface.areas[n];
-  return out;
-}
-
 // Random loads; of a free body with forces, spread by area, that balance them, and displacements without their rigid
 // part, in which two answers may differ at will.
 class Trials {
  public:
-  Trials(const TriangleMesh& mesh, const IdentifiedNetwork& network, const MatrixXd& grounding)
+  Trials(const TriangleMesh& mesh, const VoxelSolid& solid, const IdentifiedNetwork& network, const MatrixXd& grounding)
       : surface(measureNodes(mesh, network.patches)), mesh_(mesh), network_(network), grounding_(grounding) {
     if (grounding.size() == 0) return;
+    felt_ = solid.loading.transpose() *
+            rigidMotions(solid.grid.nodes, network.frames[0].restPosition, 3, network.lengthScale);
     rigid_ = rigidMotions(mesh.vertices, network.frames[0].restPosition, 3, network.lengthScale);
     VectorXd areas(rigid_.rows());
     for (Index k = 0; k < areas.size(); ++k) areas[k] = surface.areas[k / 3];
     weighted_ = areas.asDiagonal() * rigid_;
+    feltWeighted_ = areas.asDiagonal() * felt_;
   }
 
   RowMatrix loads(LoadKind kind, int count, std::uint64_t seed) const {
     RowMatrix forces = randomLoads(mesh_, surface, kind, network_.lengthScale, count, seed);
     if (rigid_.size() > 0)
-      forces -= weighted_ * (rigid_.transpose() * weighted_).ldlt().solve(MatrixXd(rigid_.transpose() * forces));
+      forces -= feltWeighted_ * solvePositive(felt_.transpose() * feltWeighted_, felt_.transpose() * forces);
     return forces;
+  }
+  RowMatrix tractions(const RowMatrix& forces) const {
+    const VectorXd areas = VectorXd::Map(surface.areas.data(), static_cast<Index>(surface.areas.size()));
+    return areas.cwiseInverse().transpose().replicate<3, 1>().reshaped().asDiagonal() * forces;
   }
   MatrixXd exact(const VoxelSolid& solid, const RowMatrix& forces) const {
     return deformation(solid.surface * displacementsUnder(solid, forces));
@@ -202,7 +201,7 @@ class Trials {
  private:
   MatrixXd deformation(MatrixXd displacements) const {
     if (rigid_.size() > 0) {
-      displacements -= rigid_ * (rigid_.transpose() * weighted_).ldlt().solve(weighted_.transpose() * displacements);
+      displacements -= rigid_ * solvePositive(rigid_.transpose() * weighted_, weighted_.transpose() * displacements);
     }
     return displacements;
   }
@@ -210,7 +209,18 @@ class Trials {
   const TriangleMesh& mesh_;
   const IdentifiedNetwork& network_;
   const MatrixXd& grounding_;
-  MatrixXd rigid_, weighted_;  // of a free body: 3 nodes x 6, and times the nodes' areas
+  // Of a free body: 3 nodes x 6, and times the nodes' areas; and what finite elements feel of forces on the nodes,
+  // which they spread, in rigid motions: their pins carry nothing under loads that are balanced so.
+  MatrixXd rigid_, weighted_, felt_, feltWeighted_;
+};
+
+// What finite elements say of a body and its cells.
+struct Solved {
+  const TriangleMesh& mesh;
+  const VoxelSolid &solid, &larger;  // the same in larger cells
+  const CellFrames& cells;
+  const Responses& responses;
+  const EndTwists& ends;
 };
 
 // Bodies are loaded on their surface, where loads spread over cells would leave a body's end unstretched and untwisted;
@@ -219,10 +229,11 @@ class Trials {
 // scatter: concentrated and random, they say little of ends, by two or three percent of the larger half's error where
 // few spheres are. Each skin is judged with the layer that goes with it: maps that take over a part of the dents are
 // the nearer without one. Of an end that is twisted beyond its frame no random load says anything.
-void chooseSkin(const TriangleMesh& mesh, const CellFrames& cells, const Responses& responses, const EndTwists& ends,
-                const Trials& trials, const RowMatrix& forces, const MatrixXd& under, IdentifiedNetwork& out) {
+void chooseSkin(const Solved& solved, const Trials& trials, const RowMatrix& forces, const MatrixXd& under,
+                IdentifiedNetwork& out) {
   constexpr double kScatter = 0.025;
   constexpr double kTwist = 30;  // at unit energy, as each of the loads on the frames; 30 to 100 differ little
+  const auto& [mesh, solid, larger, cells, responses, ends] = solved;
   const Index half = forces.cols() / 2;
   const VectorXd largest = largestOf(under);
   double first = 0, second = 0;
@@ -258,14 +269,13 @@ void fitAndClampLinks(const CellFrames& cells, const Responses& responses, const
 }
 
 // Fits skin and layer to loads of their own, then the links, from `unfitted` ones, to what the skin makes of
-// twisted ends; measures the network on others, which nothing was fitted to, and solves those again in `larger` cells.
-void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, const VoxelSolid& larger,
-                          const CellFrames& cells, const Responses& responses, const EndTwists& ends,
-                          const std::vector<IdentifiedLink>& unfitted, LinkForm form, Identification& result,
-                          const Progress& progress) {
+// twisted ends; measures the network on others, which nothing was fitted to, and solves those again in larger cells.
+void fitSurfaceAndMeasure(const Solved& solved, const std::vector<IdentifiedLink>& unfitted, LinkForm form,
+                          Identification& result, const Progress& progress) {
   constexpr int count = 16;
+  const auto& [mesh, solid, larger, cells, responses, ends] = solved;
   IdentifiedNetwork& out = result.network;
-  const Trials trials(mesh, out, responses.grounding);
+  const Trials trials(mesh, solid, out, responses.grounding);
   RowMatrix all(3 * static_cast<Index>(mesh.vertices.size()), 4 * count);
   all << trials.loads(LoadKind::bulk, count, 1), trials.loads(LoadKind::poke, count, 1),
       trials.loads(LoadKind::bulk, count, 2), trials.loads(LoadKind::poke, count, 2);
@@ -273,7 +283,7 @@ void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, con
   progress(0.5);
   const RowMatrix teaching = all.leftCols(2 * count);
   const MatrixXd under = exact.leftCols(2 * count);
-  chooseSkin(mesh, cells, responses, ends, trials, teaching, under, out);
+  chooseSkin(solved, trials, teaching, under, out);
   if (!ends.cells.empty()) {
     const RowSparse skin = skinMatrix(out.skin, static_cast<int>(cells.frames.size()));
     out.links = unfitted;
@@ -281,7 +291,15 @@ void fitSurfaceAndMeasure(const TriangleMesh& mesh, const VoxelSolid& solid, con
     out.layer =
         fitLayer(mesh, trials.surface, teaching, under - trials.ofFrames(teaching), largestOf(under), out.lengthScale);
   }
-  const RowMatrix bulk = all.middleCols(2 * count, count), poke = all.rightCols(count);
+  // Finite elements feel the forces spread into tractions. Fits to consistent ones gained pokes a tenth and lost as
+  // much of tubes that are stretched or twisted.
+  const auto consistent = [&](Index first) {
+    RowMatrix forces = consistentForces(solved.mesh, trials.tractions(all.middleCols(first, count)));
+    for (std::size_t n = 0; n < trials.surface.held.size(); ++n)
+      if (trials.surface.held[n]) forces.middleRows<3>(3 * static_cast<Index>(n)).setZero();
+    return forces;
+  };
+  const RowMatrix bulk = consistent(2 * count), poke = consistent(3 * count);
   const MatrixXd bulkExact = exact.middleCols(2 * count, count), pokeExact = exact.rightCols(count);
   out.bulk = errorOf(trials.ofNetwork(bulk), bulkExact);
   out.poke = errorOf(trials.ofNetwork(poke), pokeExact);
@@ -314,6 +332,9 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
     solidSettings.heldTriangles.insert(solidSettings.heldTriangles.end(), patchTriangles.back().begin(),
                                        patchTriangles.back().end());
   }
+  std::vector<int>& triangles = solidSettings.heldTriangles;  // each once, in however many regions
+  std::sort(triangles.begin(), triangles.end());
+  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
   solidSettings.heldSpaces = heldSpaces(mesh, held, patchTriangles);
   const auto stage = [&](double from, double to) -> Progress {
     return [&progress, from, to](double part) {
@@ -322,8 +343,7 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   };
   std::vector<Ball> balls;
   for (const FillingSphere& s : model.spheres) balls.push_back({s.restBallCentre, s.radius});
-  const CellSize cell = settings.cellSize > 0 ? CellSize{settings.cellSize, "", true}
-                                              : chooseSize(model, behindHeld(solidSettings.heldSpaces));
+  const CellSize cell = chooseSize(model, behindHeld(solidSettings.heldSpaces));
   Alongside<VoxelSolid> largerCells([&](const Progress& goOn) {
     return makeVoxelSolid(mesh, kLargerCells * metCellSize(mesh, cell.size), solidSettings, goOn);
   });
@@ -343,7 +363,7 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   const EndTwists ends = solveEnds(mesh, solid, cells, unfitted, areas);
   fitAndClampLinks(cells, responses, {}, settings.links, out, stage(0.4, 0.85));
   out.frames = cells.frames;
-  fitSurfaceAndMeasure(mesh, solid, larger, cells, responses, ends, unfitted, settings.links, result, stage(0.85, 1));
+  fitSurfaceAndMeasure({mesh, solid, larger, cells, responses, ends}, unfitted, settings.links, result, stage(0.85, 1));
   requireFinite(out);
   return result;
 }

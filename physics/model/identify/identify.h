@@ -13,13 +13,13 @@ namespace medulla {
 struct IdentifySettings {
   double poisson = 0.45;  // 0 <= poisson < 0.5
   LinkForm links = LinkForm::full;
-  double memoryMax = 3e9;  // bytes of the finite elements' factors
-  double cellSize = 0;     // m; 0: a third of the spheres' cells, half of the thinnest neck between spheres
+  double memoryMax = 3e9;  // bytes of the factors of each grid of finite elements
 };
 
 struct Identification {
   IdentifiedNetwork network;
-  // Bulk loads that nothing was fitted to, and what finite elements make of them at 1 Pa: 3 nodes x loads, N and m.
+  // Bulk loads that nothing was fitted to, none on what is held, and what finite elements make of them at 1 Pa: 3 nodes
+  // x loads, N and m.
   Eigen::MatrixXd forces, displacements;
 };
 

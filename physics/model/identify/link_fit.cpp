@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -189,7 +188,8 @@ class LinkFit {
         scales_.push_back(h.diagonal().cwiseSqrt().cwiseInverse().asDiagonal());
       } else {
         const SymmetricEigen e = symmetricEigen(h);
-        scales_.push_back(e.vectors * e.values.cwiseInverse().cwiseSqrt().asDiagonal() * e.vectors.transpose());
+        const Matrix6d vectors = e.vectors;
+        scales_.push_back(vectors * Vector6d(e.values.cwiseInverse().cwiseSqrt()).asDiagonal() * vectors.transpose());
       }
     }
     const Index n = compliance.rows();
@@ -201,25 +201,21 @@ class LinkFit {
     if (!ends.cells.empty()) findRowAxes();
   }
 
+  // Strains begin as a sum of elongations: at 0 they would stay.
   VectorXd start() const {
+    constexpr double kStrain = 0.2;
     VectorXd x = VectorXd::Zero(static_cast<Index>(links_.size()) * perLink_);
     for (std::size_t l = 0; l < links_.size(); ++l) {
+      auto own = x.segment(static_cast<Index>(l) * perLink_, perLink_);
       for (std::size_t k = 0; k < places_.size(); ++k) {
         if (places_[k][0] == places_[k][1])
-          x[static_cast<Index>(l) * perLink_ + static_cast<Index>(k)] =
-              std::sqrt(static_cast<double>(frames_) / static_cast<double>(links_.size()));
+          own[static_cast<Index>(k)] = std::sqrt(static_cast<double>(frames_) / static_cast<double>(links_.size()));
       }
+      if (!hasStrains()) continue;
+      // T = H^-1/2, so that T^-1 = H T.
+      const Vector6d unscaled = measured(compliance_, links_[l], measures_[l], frames_) * scales_[l].col(0);
+      own.tail<12>() = kStrain * unscaled.normalized().replicate<2, 1>();
     }
-    return x;
-  }
-
-  // From the unknowns of a fit without strains, which begin as a sum of elongations: at 0 they would stay.
-  VectorXd startAt(const VectorXd& plain) const {
-    constexpr double kStrain = 0.2;
-    VectorXd x(static_cast<Index>(links_.size()) * perLink_);
-    for (std::size_t l = 0; l < links_.size(); ++l)
-      x.segment(static_cast<Index>(l) * perLink_, perLink_) << plain.segment<21>(21 * static_cast<Index>(l)),
-          kStrain * scales_[l].inverse().col(0).normalized().replicate<2, 1>();
     return x;
   }
 
@@ -393,7 +389,7 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, const Loads
   // others: a gallbladder of seven, with ten links, bends half a percent farther off with them.
   if (form == LinkForm::full && !isRowOfCells(links, static_cast<std::size_t>(compliance.rows()) / 6)) {
     const LinkFit strained(compliance, grounding, ends, lengthScale, form, links);
-    VectorXd both = strained.startAt(plain.start());
+    VectorXd both = strained.start();
     if (minimise(strained, both) < reached) {
       strained.setLinks(both);
       return;

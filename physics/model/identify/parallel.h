@@ -6,8 +6,8 @@
 #include <future>
 #include <stdexcept>
 
-// Work on two threads. How it is divided never depends on the machine, so that results do not; where no other thread
-// can be had, one does all of it.
+// Work on two threads; each may again do parts on two. How it is divided never depends on the machine, so that results
+// do not; where no other thread can be had, one does all of it.
 namespace medulla {
 
 // Work on another thread while this one goes on. The work calls the function that it is given now and then, which

@@ -1,7 +1,6 @@
 #include "physics/model/identify/reduction.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <stdexcept>
 
 namespace medulla {
@@ -14,7 +13,7 @@ using Eigen::VectorXd;
 MatrixXd solvePositive(const MatrixXd& matrix, const MatrixXd& right) {
   const Eigen::LLT<MatrixXd> factors(matrix);
   if (factors.info() != Eigen::Success)
-    throw std::runtime_error("the stiffness between the spheres is not positive definite: nothing to identify");
+    throw std::runtime_error("the body's stiffness is not positive definite: nothing to identify");
   return factors.solve(right);
 }
 
@@ -29,18 +28,17 @@ class RandomTractions {
     rigid_ =
         solid.loading.transpose() * rigidMotions(solid.grid.nodes, cells.frames[0].restPosition, 3, cells.lengthScale);
     weighted_ = variance_.asDiagonal() * rigid_;
-    resultants_ = (rigid_.transpose() * weighted_).ldlt();
   }
   RowMatrix operator()(const RowMatrix& displacements) const {
     RowMatrix out = variance_.asDiagonal() * displacements;
-    if (rigid_.size() > 0) out -= weighted_ * resultants_.solve(MatrixXd(weighted_.transpose() * displacements));
+    if (rigid_.size() > 0)
+      out -= weighted_ * solvePositive(rigid_.transpose() * weighted_, weighted_.transpose() * displacements);
     return out;
   }
 
  private:
   VectorXd variance_;
   MatrixXd rigid_, weighted_;  // of a free body: what its nodes' forces work on, and that times their variance
-  Eigen::LDLT<MatrixXd> resultants_;
 };
 
 }  // namespace
@@ -90,14 +88,15 @@ Responses balancedResponses(const TriangleMesh& mesh, const CellFrames& cells, c
                  nodesRigid = rigidMotions(mesh.vertices, places[0], 3, cells.lengthScale);
   const Index n = rigid.rows();
   const MatrixXd inverse = solvePositive(pinned.frames, MatrixXd::Identity(n, n)), carried = inverse * rigid;
-  MatrixXd stiffness = inverse - carried * (rigid.transpose() * carried).ldlt().solve(carried.transpose());
+  MatrixXd stiffness = inverse - carried * solvePositive(rigid.transpose() * carried, carried.transpose());
   stiffness = (stiffness + stiffness.transpose()).eval() / 2;
-  const MatrixXd basis = rigid.householderQr().householderQ() * MatrixXd::Identity(n, 6);
+  const MatrixXd squares = rigid.transpose() * rigid;
   Responses out;
-  out.grounding = stiffness.trace() / static_cast<double>(n) * basis * basis.transpose();
+  out.grounding = stiffness.trace() / static_cast<double>(n) * rigid * solvePositive(squares, rigid.transpose());
   out.frames = solvePositive(stiffness + out.grounding, MatrixXd::Identity(n, n));
   // Nodes under unit motions of the frames: the pinned solution, and the rigid motion that it lacks.
-  const MatrixXd lacking = rigid.colPivHouseholderQr().solve(MatrixXd::Identity(n, n) - pinned.frames * stiffness);
+  const MatrixXd lacking =
+      solvePositive(squares, rigid.transpose() * (MatrixXd::Identity(n, n) - pinned.frames * stiffness));
   out.nodes = (pinned.nodes * stiffness + nodesRigid * lacking) * out.frames;
   out.framesUnderTractions = pinned.framesUnderTractions;
   out.nodesUnderTractions = pinned.nodesUnderTractions;

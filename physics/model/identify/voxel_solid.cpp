@@ -71,6 +71,11 @@ bool isNear(const Vector3d& point, const std::vector<std::array<Vector3d, 2>>& e
   });
 }
 
+Vector3d normalOf(const TriangleMesh& mesh, std::size_t triangle) {
+  const auto& [a, b, c] = mesh.triangles[triangle];
+  return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).normalized();
+}
+
 struct HeldSprings {
   HeldCells all, rim;  // the latter within a cell of where what is held ends
 };
@@ -86,9 +91,7 @@ HeldSprings heldSprings(const TriangleMesh& mesh, const SolidSettings& settings,
   };
   const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
   for (const int t : settings.heldTriangles) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    const Vector3d normal =
-        (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).normalized();
+    const Vector3d normal = normalOf(mesh, t);
     overTriangle(mesh, mesh.triangles[t], grid.size, [&](const Vector3d& point, const Vector3d&, double area) {
       if (!behind(point - 1e-3 * grid.size * normal)) hold(point, area);
     });
@@ -96,9 +99,11 @@ HeldSprings heldSprings(const TriangleMesh& mesh, const SolidSettings& settings,
   const SurfaceTree body = makeSurfaceTree(mesh);
   for (const HeldSpace& space : settings.heldSpaces) {
     for (std::size_t t = space.firstFan; t < space.surface.triangles.size(); ++t) {
+      const Vector3d aside = 1e-3 * grid.size * normalOf(space.surface, t);
       overTriangle(space.surface, space.surface.triangles[t], grid.size,
                    [&](const Vector3d& point, const Vector3d&, double area) {
-                     if (isInside(body, point)) hold(point, area);
+                     const bool isWithin = behind(point - aside) && behind(point + aside);  // of another region
+                     if (!isWithin && isInside(body, point)) hold(point, area);
                    });
     }
   }
