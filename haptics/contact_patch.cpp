@@ -57,7 +57,7 @@ void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& pro
     contact.point = contact.weights.x() * t.a + contact.weights.y() * t.b + contact.weights.z() * t.c;
     const Eigen::Vector3d outward = proxy.centre - contact.point;
     const double distance = outward.norm();
-    if (!(distance > 0)) continue;  // the point passed the proxy's centre: no direction to push it
+    if (!(distance > 0)) continue;  // the point lies in the proxy's centre: no direction to push it
     contact.normal = shadedNormal(surface, alpha, entry.triangle, contact.weights, outward / distance);
     out.push_back(contact);
   }

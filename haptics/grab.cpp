@@ -5,6 +5,16 @@
 
 namespace medulla {
 
+// Of springs side by side. Less than what they give together, for between them the edges do not hold.
+static double heldGive(const BlendedSurface& surface, const Grip& grip) {
+  double stiffness = 0;
+  for (const HeldOffset& held : grip.held) {
+    if (!(surface.give[held.node] > 0)) return 0;
+    stiffness += 1 / surface.give[held.node];
+  }
+  return 1 / stiffness;
+}
+
 static void holdPatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
                       double gripRadius, Grip& grip) {
   const ProxyContact& contact = proxy.mainContact();
@@ -19,6 +29,7 @@ static void holdPatch(const BlendedSurface& surface, double alpha, const Proxy& 
     assert(grip.held.size() < grip.held.capacity());
     grip.held.push_back({n, toolFromWorld * (x - felt)});
   }
+  grip.give = heldGive(surface, grip);
 }
 
 void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,

@@ -16,6 +16,7 @@ struct Grip {
   bool closed = false;
   bool slipped = false;          // closed, but what it held has torn away
   std::vector<HeldOffset> held;  // empty while open, and when the grip closed on nothing or slipped
+  double give = 0;               // m/N, of what is held, by the nodes' own; 0 where a node does not give
 };
 
 // Opens or closes by the sample's grip (closed above 0.5). Closing in contact holds every node of the touched body

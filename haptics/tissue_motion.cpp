@@ -11,7 +11,9 @@ void startFrame(DeviceMotion& device) {
   std::rotate(device.way.begin(), device.way.end() - 1, device.way.end());
   device.way[0].setZero();
   device.sinceBefore = device.since;
+  device.earlyBefore = device.early;
   device.since = 0;
+  device.early.setZero();
 }
 
 namespace {
@@ -21,9 +23,12 @@ double followedPart(double stiffness, double give) {
   return stiffness * give / (1 + stiffness * give);
 }
 
-// m, within the duration of a frame up to now; the way of the frame before was an even one from where it began.
+// m, within the duration of a frame up to now; the way of the frame before was an even one up to where the device's own
+// began, and from there on.
 Vector3d latestWay(const DeviceMotion& device, double alpha) {
-  return device.way[0] + std::min(1.0, (1 - alpha) / (1 - device.sinceBefore)) * device.way[1];
+  const double late = alpha < 1 ? std::min(1.0, (1 - alpha) / (1 - device.sinceBefore)) : 0;
+  const double early = device.sinceBefore > alpha ? 1 - alpha / device.sinceBefore : 0;
+  return device.way[0] + late * (device.way[1] - device.earlyBefore) + early * device.earlyBefore;
 }
 
 // m: what BlendedSurface::nodeStep() and nodeLead(), of the same frames in the same way, answer.
@@ -52,16 +57,6 @@ double contactGive(const BlendedSurface& surface, std::span<const ProxyContact> 
   return shares > 0 ? sum / (shares * shares) : 0;
 }
 
-// m/N: of springs side by side. Less than what they give together, for between them the edges do not hold.
-double heldGive(const BlendedSurface& surface, const Grip& grip) {
-  double stiffness = 0;
-  for (const HeldOffset& held : grip.held) {
-    if (!(surface.give[held.node] > 0)) return 0;
-    stiffness += 1 / surface.give[held.node];
-  }
-  return 1 / stiffness;
-}
-
 }  // namespace
 
 Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyContact& contact) {
@@ -72,18 +67,22 @@ void beginContact(const BlendedSurface& surface, double alpha, const ProxyContac
                   double stiffness, DeviceMotion& device) {
   device.since = alpha;
   device.sinceBefore = 0;
+  device.early.setZero();
+  device.earlyBefore.setZero();
   device.way.fill(Vector3d::Zero());
   const double part = followedPart(stiffness, contactGive(surface, {&contact, 1}));
   if (!(part > 0)) return;
   for (int k = 0; k < 3; ++k)
     device.way[k + 1] = normal.dot(meanOver(surface, contact, surface.steps[k])) / part * normal;
-  device.way[0] = wayOfStep(device, alpha) - (1 - alpha) * device.way[1];
+  device.way[0] = device.early = wayOfStep(device, alpha) - (1 - alpha) * device.way[1];
 }
 
 void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness, DeviceMotion& device) {
   device.since = device.sinceBefore = 0;
+  device.early.setZero();
+  device.earlyBefore.setZero();
   device.way.fill(Vector3d::Zero());
-  const double part = followedPart(stiffness, heldGive(surface, grip));
+  const double part = followedPart(stiffness, grip.give);
   if (!(part > 0)) return;
   for (int k = 0; k < 3; ++k) {
     for (const HeldOffset& held : grip.held) device.way[k + 1] += surface.steps[k][held.node];
@@ -112,7 +111,7 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,
                         const DeviceMotion& device) {
   if (!(surface.duration > 0)) return {};
-  const double part = followedPart(stiffness, heldGive(surface, grip));
+  const double part = followedPart(stiffness, grip.give);
   const Vector3d beyond = latestWay(device, alpha) - wayOfLead(device, alpha);
   const Vector3d faster = device.velocity - wayOfStep(device, alpha) / surface.duration;
   return {meanHeldLead(surface, alpha, grip) + part * beyond,

@@ -20,7 +20,10 @@ struct DeviceMotion {
   // m: the way that counts, in this dynamics frame so far and in the three before.
   std::array<Eigen::Vector3d, 4> way{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
                                      Eigen::Vector3d::Zero()};
-  double since = 0, sinceBefore = 0;  // alpha from which on it counts, in this frame and in the one before
+  // alpha from which on the device's own way counts, in this frame and in the one before; and m, what of the way came
+  // earlier in these frames, evenly, of tissue that had moved by itself.
+  double since = 0, sinceBefore = 0;
+  Eigen::Vector3d early = Eigen::Vector3d::Zero(), earlyBefore = Eigen::Vector3d::Zero();
 };
 
 // Tissue that moved by itself begins to follow the device: its steps so far count as answers to ways of a device.

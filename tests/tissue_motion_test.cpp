@@ -70,6 +70,7 @@ TEST(TissueMotion, AtASteadySpeedTheStepsAreTheWholeLead) {
   contact.share = 1;
   Grip grip;
   grip.held = {{0, Vector3d::Zero()}, {1, Vector3d::Zero()}};
+  grip.give = 0.05;
   for (const double alpha : {0.25, 0.5, 1.0}) {
     device.way[0] = alpha * device.way[1];
     for (const TissueMotion& motion : {contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), 400, device),
@@ -103,6 +104,37 @@ TEST(TissueMotion, AtFirstTouchTissueFollowsByThePartThatItsGiveTells) {
   const Vector3d end = lead(1);
   startFrame(device);
   EXPECT_LT((lead(1e-9) - end).norm(), 1e-11);  // no step from frame to frame
+}
+
+// A device that goes on as it did, and tissue that follows by its part: whenever the contact began, the steps are the
+// whole lead in that frame and in the next.
+TEST(TissueMotion, TissueThatAlreadyMovesIsTouchedWithoutAStepInItsLead) {
+  const double part = 400 * 0.01 / (1 + 400 * 0.01);
+  const Vector3d way(0, -1e-3, 0);  // of the device in a frame
+  BlendedSurface surface;
+  surface.duration = 0.02;
+  surface.triangles = {{0, 1, 2}};
+  surface.give = {0.01, 0, 0};
+  for (auto& steps : surface.steps) steps.assign(3, part * way);
+  ProxyContact contact;
+  contact.triangle = 0;
+  contact.weights = {1, 0, 0};
+  contact.share = 1;
+  for (const double began : {0.1, 0.5, 0.9, 1.0}) {
+    DeviceMotion device;
+    beginContact(surface, began, contact, Vector3d::UnitY(), 400, device);
+    device.velocity = way / surface.duration;
+    const auto lead = [&](double alpha) {
+      return contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), 400, device).lead;
+    };
+    device.way[0] += (1 - began) * way;
+    EXPECT_LT((lead(1) - part * way).norm(), 1e-15) << began;
+    startFrame(device);
+    for (const double alpha : {0.05, 0.3, 0.5, 0.75, 0.95, 1.0}) {
+      device.way[0] = alpha * way;
+      EXPECT_LT((lead(alpha) - part * way).norm(), 1e-15) << began << " " << alpha;
+    }
+  }
 }
 
 // The other nodes beyond the neighbours, and the spheres, stand still.
