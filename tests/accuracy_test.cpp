@@ -146,6 +146,8 @@ INSTANTIATE_TEST_SUITE_P(
         StaticCase{"liver_tip", 35, 14.1, 6.4, 0.1}, StaticCase{"cylinder_tip_large", 25, 3.6, 1.8, 0.1},
         StaticCase{"gallbladder_tip_large", 25, 6, 3, 0.2}, StaticCase{"liver_tip_in_plane", 35, 16.4, 9.7, 0.2},
         StaticCase{"liver_mid", 35, 26.9, 10.8, 0.4}, StaticCase{"liver_axial", 35, 32, 17.7, 1.4},
+        StaticCase{"liver_torsion", 35, 37, 8.8, 0.1}, StaticCase{"liver_poke_small", 35, 46, 4.9, 0.4},
+        StaticCase{"liver_poke_large", 35, 42, 7.5, 1.1},
         StaticCase{"gallbladder_doubled_tip_large", 7, 2.6, 1.3, 0.1}),
     [](const auto& tested) {
       const StaticCase& c = tested.param;

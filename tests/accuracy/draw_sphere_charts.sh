@@ -35,5 +35,5 @@ for body in "${bodies[@]}"; do
     fi
     models+=(--models "$model")
   done
-  "$medulla" chart "$here/${body}_tip_large.xml" --methods identified --steps 0.1 "${models[@]}" -o "$out/$body"
+  "$medulla" chart "$here/${body}_tip_large.xml" --methods identified --steps auto "${models[@]}" -o "$out/$body"
 done

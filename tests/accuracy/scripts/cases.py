@@ -176,11 +176,11 @@ def liver():
         Case("mid", "root", Load("border", (0, 0, 400))),
         Case("axial", "root", Load("tip", (1200, 0, 0))),
         Case("torsion", "root", Load("tip", turn=15000)),
-        Case("poke_small", "bed", Load("small", (0, 0, -1000))),
-        Case("poke_large", "bed", Load("large", (0, 0, -2000))),
+        Case("poke_small", "bed", Load("small", (0, 0, -500)), 4),
+        Case("poke_large", "bed", Load("large", (0, 0, -1500)), 4),
     ]
     return Body("liver", "assets/liver/liver.obj", 5e3, 1060, regions, cases,
-                grids={"root": grids(1, 2, 1, 4, 1, 6), "bed": grids(1, 0, 1, 2, 1, 4)}, kept={"root": 2, "bed": 1})
+                grids={"root": grids(1, 2, 1, 4, 1, 6), "bed": grids(1, 0, 1, 2, 1, 4)}, kept={"root": 2, "bed": 2})
 
 
 def stomach():
