@@ -43,12 +43,14 @@ std::optional<std::pair<int, int>> splitPair(const std::string& text, char separ
 }
 
 // From [TOOL=]FILE.
-std::map<std::string, std::string> filesByTool(const std::vector<std::string>& words) {
+std::map<std::string, std::string> filesByTool(const std::string& option, const std::vector<std::string>& words) {
   std::map<std::string, std::string> out;
   for (const std::string& word : words) {
     const std::size_t equals = word.find('=');
     const bool named = equals != std::string::npos;
-    out[named ? word.substr(0, equals) : ""] = named ? word.substr(equals + 1) : word;
+    const bool isFirst =
+        out.try_emplace(named ? word.substr(0, equals) : "", named ? word.substr(equals + 1) : word).second;
+    if (!isFirst) usageError(option, word, "one file per tool");
   }
   return out;
 }
@@ -132,14 +134,15 @@ RunOptions runOptions(const RunArguments& a) {
     if (equals == std::string::npos || equals == 0) usageError("--set", set, "PATH=VALUE");
     options.overrides.push_back({set.substr(0, equals), set.substr(equals + 1)});
   }
-  options.trajectories = filesByTool(a.trajectories);
-  options.records = filesByTool(a.records);
+  options.trajectories = filesByTool("--trajectory", a.trajectories);
+  options.records = filesByTool("--record", a.records);
   options.logPath = a.log;
   options.logEveryTick = a.logRate == "tick";
   options.frameTimesPath = a.frameTimes;
   for (const auto& request : a.surfaces) {
     SurfaceRequest r;
     r.path = request.at(1);
+    if (!r.path.ends_with(".obj")) usageError("--surface-at", r.path, "a file that ends in .obj");
     if (request[0] != "end") {
       r.time = parseNumber<double>(request[0]);
       if (!r.time) usageError("--surface-at", request[0], "a time in seconds or \"end\"");
@@ -248,7 +251,10 @@ int runRenders(const RenderArguments& a) {
   for (const std::string& scene : a.scenes) all.push_back(renderOptions(a, scene));
   std::vector<std::string> files;
   for (const RenderOptions& options : all) files.insert(files.end(), options.outputs.begin(), options.outputs.end());
-  if (all.size() > 1) requireDistinctFiles(files, a.scenes);
+  if (all.size() > 1) {
+    requireDistinctFiles(files, a.scenes);
+    for (const RenderOptions& options : all) readScene(options.run.scene, options.run.overrides);  // before any film
+  }
   for (const RenderOptions& options : all) {
     runRender(options);
     std::fflush(stdout);

@@ -49,7 +49,10 @@ std::vector<double> stepsOf(const std::string& option, const std::vector<std::st
 ChartOptions chartOptions(const ChartArguments& a) {
   ChartOptions options = a.options;
   options.run = runOptions(a.run);
-  options.steps = stepsOf("--steps", a.steps);
+  std::vector<std::string> given = a.steps;
+  const bool chosen = std::erase(given, "auto") > 0;
+  options.steps = numbersOf("--steps", given, 1e-3, 50, 1e-3, "milliseconds from 0.001 to 50, or auto");
+  if (chosen) options.steps.push_back(0);
   return options;
 }
 
@@ -83,8 +86,11 @@ Verb addChart(CLI::App& app) {
        "missing")
       ->type_name("DIR")
       ->required();
-  c->add_option("--steps", a.steps, "substeps to run with, ms; the nearest whole shares of a dynamics frame are taken")
-      ->type_name("MS,MS,...")
+  c->add_option(
+       "--steps", a.steps,
+       "substeps to run with, ms; the nearest whole shares of a dynamics frame are taken; auto: as long as each run's "
+       "stability estimate allows")
+      ->type_name("MS,MS,...|auto")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();

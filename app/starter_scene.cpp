@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "physics/model/rotation_between.h"
+
 namespace medulla {
 
 namespace {
@@ -106,7 +108,7 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
   out += fmt::format("  <tissue name=\"soft\" young=\"{:.3g}\" poisson=\"0.45\" density=\"1040\" damping=\"0.15\"/>\n",
                      young);
   out += fmt::format("  <body name=\"{0}\" model=\"{0}.model.xml\" tissue=\"soft\" look=\"stomach\">\n", name);
-  out += "    <!-- numbers of filling spheres: medulla render SCENE --view model shows the held ones grey -->\n";
+  out += "    <!-- numbers of filling spheres; the model view shows the held ones grey -->\n";
   out += fmt::format("    <fix spheres=\"{}\"/>\n  </body>\n", heldSpheres(model, l));
   out += fmt::format(
       "  <tool name=\"grasper\" trajectory=\"{}.csv\" radius=\"{:.3g}\" stiffness=\"{:.3g}\" damping=\"{:.3g}\" "
@@ -124,7 +126,7 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
 
 std::string trajectoryText(const Layout& l) {
   const Vector3d shaft = (l.normal + Vector3d(0.35, 0.3, 0.2)).normalized();  // comes in from the upper right
-  const Eigen::Quaterniond straight = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), shaft);
+  const Eigen::Quaterniond straight = rotationBetween(Vector3d::UnitZ(), shaft);
   const Eigen::Quaterniond twisted = straight * Eigen::AngleAxisd(1.2, Vector3d::UnitZ());
   Vector3d sideways = Vector3d::Zero();
   sideways[l.axis] = -l.held;

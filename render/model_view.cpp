@@ -166,7 +166,7 @@ ModelView::Instance ModelView::rodInstance(glm::vec3 a, glm::vec3 b, float radiu
 
 // What is thinner than a pixel breaks into dots.
 float ModelView::atLeast(const Viewpoint& v, float depth, float radius) const {
-  return std::max(radius, 0.6f * pixel_ * 2 * std::max(depth, kNearPlane) * v.tangent);
+  return std::max(radius, 0.6f * pixel_ * 2 * std::max(depth, v.nearPlane) * v.tangent);
 }
 
 glm::vec4 DepthFade::operator()(glm::vec4 colour, float depth) const {
@@ -196,7 +196,7 @@ void ModelView::sortBalls(const Viewpoint& view, const std::vector<DrawnBall>& b
   seenThrough_.clear();
   for (const DrawnBall& ball : balls) {
     const float depth = pictureFromWorld(view, ball.centre).z, radius = atLeast(view, depth, ball.radius);
-    const float size = 0.5f * radius / (std::max(depth, kNearPlane) * view.tangent);
+    const float size = 0.5f * radius / (std::max(depth, view.nearPlane) * view.tangent);
     const std::size_t level = std::size_t(size > kFinerAbove[0]) + std::size_t(size > kFinerAbove[1]);
     const glm::mat3 r(radius);
     const auto row = [&](int k) { return rowOf(k, r[0], r[1], r[2], ball.centre); };

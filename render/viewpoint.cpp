@@ -72,7 +72,9 @@ Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round) {
   v.tangent = std::tan(glm::radians(camera.fovDegrees) / 2);
   v.aspect = aspect;
   v.round = round;
-  glm::mat4 clip = glm::perspective(glm::radians(camera.fovDegrees), aspect, kNearPlane, kFarPlane);
+  const float distance = glm::length(camera.target - camera.position);
+  if (distance > 0) v.nearPlane = std::min(v.nearPlane, 0.1f * distance);
+  glm::mat4 clip = glm::perspective(glm::radians(camera.fovDegrees), aspect, v.nearPlane, kFarPlane);
   clip[1][1] = -clip[1][1];
   v.overscan = round ? 1.f : 2.f;
   clip[0][0] /= v.overscan;

@@ -19,17 +19,16 @@ struct Viewpoint {
   // Clip space reaches this many picture widths and heights. Mesa 22 spoils noperspective values where it clips a
   // triangle against two sides at once: beyond the picture nobody sees it, nor behind the round picture's mask.
   float overscan = 1;
+  // m: the instrument's shaft passes close to the lens; a tenth of the way to what a camera nearer than that looks at.
+  float nearPlane = 0.005f;
   glm::mat4 clipFromWorld{1};  // y points down, so that the first row read back is the top one
 };
-
-// Near plane, m: the instrument's shaft passes close to the lens.
-constexpr float kNearPlane = 0.005f;
 
 // x, y in picture heights from the centre (y up), z = depth in m.
 inline glm::vec3 pictureFromWorld(const Viewpoint& v, glm::vec3 p) {
   const glm::vec3 d = p - v.position;
   const float depth = -glm::dot(v.back, d);
-  const float scale = 0.5f / (glm::max(depth, kNearPlane) * v.tangent);
+  const float scale = 0.5f / (glm::max(depth, v.nearPlane) * v.tangent);
   return {glm::dot(v.right, d) * scale, glm::dot(v.up, d) * scale, depth};
 }
 

@@ -22,8 +22,8 @@ std::vector<std::size_t> frontToBack(const SceneMesh& mesh, const std::vector<gl
 }
 
 bool isVisible(glm::vec3 a, glm::vec3 b, glm::vec3 c, const Viewpoint& view) {
-  if (a.z < kNearPlane && b.z < kNearPlane && c.z < kNearPlane) return false;
-  if (a.z < kNearPlane || b.z < kNearPlane || c.z < kNearPlane) return true;  // OpenGL clips it
+  if (a.z < view.nearPlane && b.z < view.nearPlane && c.z < view.nearPlane) return false;
+  if (a.z < view.nearPlane || b.z < view.nearPlane || c.z < view.nearPlane) return true;  // OpenGL clips it
   if ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x) <= 0) return false;
   const float x0 = std::min({a.x, b.x, c.x}), x1 = std::max({a.x, b.x, c.x});
   const float y0 = std::min({a.y, b.y, c.y}), y1 = std::max({a.y, b.y, c.y});
@@ -47,7 +47,8 @@ void drawDepth(const Viewpoint& view, VisibleTriangles& out) {
   out.texel.resize(out.picture.size());
   for (std::size_t i = 0; i < out.texel.size(); ++i) {
     const glm::vec3 p = out.picture[i];
-    out.texel[i] = {(p.x / view.aspect + 0.5f) * side, (p.y + 0.5f) * side, 1 - kNearPlane / std::max(p.z, kNearPlane)};
+    out.texel[i] = {(p.x / view.aspect + 0.5f) * side, (p.y + 0.5f) * side,
+                    1 - view.nearPlane / std::max(p.z, view.nearPlane)};
   }
   out.nearest.clear();
   for (std::size_t k = 0; k < out.index.size(); k += 3) {

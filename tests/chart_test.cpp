@@ -114,6 +114,20 @@ TEST_F(ChartCommand, SmallerStepsComeNearerAndTooLargeOnesFail) {
   EXPECT_NE(script.find("title 'skin'"), std::string::npos);
 }
 
+TEST_F(ChartCommand, StepsOfTheirOwnAreThoseOfReplays) {
+  const ProgramResult r = chart({"--steps", "auto", "--methods", "full,skin"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  const auto rows = rowsOf(folder / "out/chart.csv");
+  ASSERT_EQ(rows.size(), 3u);
+  for (const std::string method : {"full", "skin"}) {
+    const ProgramResult replay = runProgram({"replay", folder / "case.xml", "--set", "body.pear.surface=" + method});
+    const std::size_t at = replay.out.find("\nsubsteps ");
+    ASSERT_NE(at, std::string::npos) << replay.out;
+    const double substeps = 0.4 / std::stod(rows[method == "full" ? 1 : 2][2]);
+    EXPECT_NEAR(std::stod(replay.out.substr(at + 10)), substeps, 1e-3 * substeps) << method;
+  }
+}
+
 // The case's own result as its reference: the finer the step, the nearer; the errors are those at the end alone.
 TEST_F(ChartCommand, ReferenceOfTheSceneIsWhatErrorsAreAgainst) {
   const std::string scene = folder / "case.xml", shape = folder / "end.obj";

@@ -109,6 +109,13 @@ TEST_F(OwnGolden, OneMomentIsUpdatedAloneAndAnotherPictureFails) {
   EXPECT_NE(r.out.find("organ_10 ok: equal"), std::string::npos) << r.out;
 }
 
+TEST_F(OwnGolden, AFolderThatCannotBeMadeIsSaidBeforeAnyPicture) {
+  const ProgramResult r = golden({"--dir", "pictures", "--failures", "own/organ.xml/in_a_file"});
+  EXPECT_EQ(r.exitCode, 1);
+  EXPECT_EQ(r.out, "");
+  EXPECT_NE(r.err.find("in_a_file: cannot be made: "), std::string::npos) << r.err;
+}
+
 TEST_F(OwnGolden, WhatCannotBeComparedIsSaid) {
   expectRefused(golden({"--dir", "own"}), "own: no golden image here names its scene");
   expectRefused(golden({"--dir", "pictures", "--update", "organ_11"}), "organ.xml has no such moment");

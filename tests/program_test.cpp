@@ -350,6 +350,9 @@ TEST(ProgramRefuses, WrongUsageWithCodeTwo) {
   expectRefusal(runProgram({"render", kScene, "--show", "spheres"}), 2, {"--view model"});
   expectRefusal(runProgram({"replay", kScene, "--set", "nonsense"}), 2, {"--set"});
   expectRefusal(runProgram({"replay", kScene, "--surface-at", "soon", "/tmp/x.obj"}), 2, {"soon"});
+  expectRefusal(runProgram({"replay", kScene, "--surface-at", "end", "/tmp/x.stl"}), 2, {".obj"});
+  expectRefusal(runProgram({"replay", kScene, "--record", "/tmp/x.csv", "--record", "/tmp/y.csv"}), 2,
+                {"--record", "one file per tool"});
   for (const char* embree : {"isa=mmx", "threads=0", "threads=two", "avx2", "isa=sse2,,"})
     expectRefusal(runProgram({"replay", kScene, "--embree", embree}), 2, {"--embree", "avx2"});
 }
@@ -407,8 +410,8 @@ TEST(ProgramRefuses, OutputsThatCannotBeWritten) {
 
 TEST(ProgramRefuses, OneFileForTwoPurposes) {
   const TemporaryFolder folder;
-  const std::string csv = folder / "x.csv", video = folder / "v.mp4";
-  expectRefusal(runProgram(command({"replay", kScene, "--log", csv, "--surface-at", "end", csv})), 1, {"x.csv", "two"});
+  const std::string csv = folder / "x.csv", obj = folder / "x.obj", video = folder / "v.mp4";
+  expectRefusal(runProgram(command({"replay", kScene, "--log", obj, "--surface-at", "end", obj})), 1, {"x.obj", "two"});
   expectRefusal(runProgram(command({"render", kScene, "-o", video, "-o", video})), 1, {"v.mp4", "two"});
   expectRefusal(runProgram(command({"replay", kScene, "--log", csv, "--record", csv})), 1, {"x.csv", "two"});
   folder.write("r.xml", "<recording file='r.csv'><columns rate='30' position='1 2 3'/></recording>");
@@ -419,6 +422,13 @@ TEST(ProgramRefuses, OneFileForTwoPurposes) {
   folder.write("m.obj", readFile(std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj"));
   expectRefusal(runProgram({"build", folder / "m.obj", "-o", folder / "m.obj"}), 1, {"m.obj", "input"});
   EXPECT_EQ(folder.contents().size(), 4u);
+}
+
+TEST(ProgramRefuses, ASceneThatIsMissingBeforeAnyFilm) {
+  const TemporaryFolder folder;
+  expectRefusal(runProgram({"render", kScene, folder / "none.xml", "-o", folder / "{scene}.gif", "--frames", "0:1"}), 1,
+                {"none.xml"});
+  EXPECT_TRUE(folder.contents().empty());
 }
 
 TEST(ProgramRefuses, NumbersThatAreNone) {

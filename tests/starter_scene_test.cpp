@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,6 +23,9 @@ TEST(StarterScene, IsCheckedAndItsToolPressesAndHoldsTheBody) {
   ASSERT_EQ(made.exitCode, 0) << made.err;
   const std::string scene = folder / "mine/gallbladder.xml";
   EXPECT_NE(made.out.find("scene " + scene), std::string::npos) << made.out;
+  const std::string text = readFile(scene);  // editors refuse two hyphens within a comment
+  for (std::size_t at = text.find("<!--"); at != std::string::npos; at = text.find("<!--", at + 4))
+    EXPECT_EQ(text.find("--", at + 4), text.find("-->", at + 4));
   const ProgramResult checked = runProgram({"check", scene});
   EXPECT_EQ(checked.exitCode, 0) << checked.err;
   EXPECT_EQ(checked.out, "valid yes\n");
@@ -92,6 +96,32 @@ TEST(StarterScene, LeavesNothingBehindWhereTheMeshIsRefused) {
   EXPECT_EQ(made.exitCode, 1);
   EXPECT_EQ(complaints(made).size(), 1) << made.err;
   EXPECT_FALSE(std::filesystem::exists(folder / "mine"));
+}
+
+static std::string boxObj(double x, double y, double z, double at) {
+  std::string out;
+  for (int v = 0; v < 8; ++v) out += fmt::format("v {} {} {}\n", at + (v & 1 ? x : 0), v & 2 ? y : 0, v & 4 ? z : 0);
+  for (const char* face : {"1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"})
+    out += fmt::format("f {}\n", face);
+  return out;
+}
+
+TEST(StarterScene, WhatNoToolReachesIsRefused) {
+  const TemporaryFolder folder;
+  folder.write("far.obj", boxObj(0.1, 0.06, 0.05, 1000));
+  const ProgramResult made = makeStarter(folder, folder / "far.obj");
+  EXPECT_EQ(made.exitCode, 1);
+  ASSERT_EQ(complaints(made).size(), 1) << made.err;
+  EXPECT_NE(made.err.find("reaches 1e+03 m from the origin"), std::string::npos) << made.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "mine"));
+}
+
+TEST(StarterScene, SpheresThatDoNotFillTheBodyAreNoted) {
+  const TemporaryFolder folder;
+  folder.write("slab.obj", boxObj(0.15, 0.15, 0.01, 0));
+  const ProgramResult made = makeStarter(folder, folder / "slab.obj");
+  EXPECT_EQ(made.exitCode, 0) << made.err;
+  EXPECT_NE(made.err.find("note: the spheres cover"), std::string::npos) << made.err;
 }
 
 TEST(Check, NamesFileAndLineOfWhatCannotRun) {

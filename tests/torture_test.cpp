@@ -125,6 +125,11 @@ TEST(StabilityCommand, AnInterruptedRunIsTakenUpAgain) {
   EXPECT_FALSE(std::filesystem::exists(folder / "out/map.csv"));
   // A process that is killed may leave part of a row.
   const std::string kept = readFile(journal);
+  // Another choice of trials in between harms none of it.
+  std::vector<std::string> other = words("out");
+  other[7] = "20";
+  ASSERT_EQ(runProgram(other).exitCode, 0);
+  EXPECT_EQ(readFile(journal).size(), kept.size());
   folder.write("out/trials.part", kept + "implicit,poi");
   const ProgramResult second = runProgram(words("out")), whole = runProgram(words("whole"));
   ASSERT_EQ(second.exitCode, 0) << second.err;

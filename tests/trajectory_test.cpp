@@ -39,6 +39,13 @@ TEST(TrajectoryFile, ReadsRowsCommentsAndForeignLineEnds) {
   EXPECT_NEAR(trajectory.samples[1].worldFromTool.w(), 1, 1e-15);
 }
 
+// As spreadsheets write it.
+TEST(TrajectoryFile, AMarkBeforeTheFirstLineIsNoPartOfIt) {
+  const TemporaryFolder folder;
+  folder.write("marked.csv", "\xef\xbb\xbf" + header + "0,0.1,0,0,1,0,0,0,0\n");
+  EXPECT_EQ(readTrajectory(folder / "marked.csv").samples.size(), 1U);
+}
+
 TEST(TrajectoryFile, ReadsMeasuredForces) {
   const Trajectory trajectory = parseTrajectory(
       "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,fx[N],fy[N],fz[N]\n"

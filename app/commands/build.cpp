@@ -67,6 +67,15 @@ void warnOfSize(const std::string& path, const TriangleMesh& mesh) {
     fmt::print(stderr, "{}: note: the mesh is {:.3g} m across; is --unit right?\n", path, size);
 }
 
+// A scene of it would move as bags of skin do, or turn inside out.
+void warnOfCover(const std::string& path, const BuildReport& report) {
+  constexpr double kLeast = 40;  // %; the scenes' leanest model, of limbs, has 58
+  if (report.cover < kLeast)
+    fmt::print(stderr,
+               "{}: note: the spheres cover {:.2g} % of the volume; do more of them (--spheres) fit it better?\n", path,
+               report.cover);
+}
+
 // All that was repaired and found in one line.
 void tellRepairs(const std::string& path, const std::vector<std::string>& notes) {
   if (notes.empty()) return;
@@ -239,6 +248,7 @@ int runBuild(const BuildOptions& options) {
     for (BuildJob& job : jobs) job.model.settings = repeatingCommand(job, options);
     const std::vector<Result> results = resultsOf(jobs);
     for (const BuildJob& job : jobs) writeModel(job.modelPath, job.model);
+    for (const BuildJob& job : jobs) warnOfCover(job.meshPath, job.report);
     if (!options.reportPath.empty()) writeReport(options.reportPath, results);
     printResults(results);
   } catch (...) {

@@ -96,20 +96,25 @@ void requireSameMeshes(const LoadedScene& a, const LoadedScene& b) {
                                            b.scene.bodies[k].modelPath, a.scene.bodies[k].modelPath));
 }
 
+int chosenSubsteps(RunOptions options) {
+  options.overrides.push_back({"dynamics.substeps", "0"});
+  const LoadedScene loaded = loadRun(options);
+  return Simulation(loaded).world().substepsPerFrame();
+}
+
 // Every run of the chart. Where the scene names no reference there is one more, the reference, last: the first method
 // on the most spheres, at half of the smallest step.
 std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& base) {
   std::vector<std::vector<SceneOverride>> models;
   for (const std::string& model : options.models) models.push_back({modelOverride(model, base.scene)});
   if (models.empty()) models.push_back({});
-  std::set<int> substeps;
-  for (const double step : options.steps)
-    substeps.insert(std::max(1, static_cast<int>(std::lround(1 / (step * base.scene.dynamicsRate)))));
   std::vector<ChartRun> runs;
+  int most = 0;  // substeps
   ChartRun reference;
   const auto add = [&](ChartRun run, int count) {
     run.options.overrides.push_back({"dynamics.substeps", fmt::format("{}", count)});
     run.step = 1 / (base.scene.dynamicsRate * count);
+    most = std::max(most, count);
     runs.push_back(std::move(run));
   };
   for (std::size_t number = 0; number < options.methods.size(); ++number) {
@@ -125,10 +130,14 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
       run.spheres = spheresOf(loaded);
       if (models.size() > 1) run.curve += fmt::format("_{}_spheres", run.spheres);
       if (name == options.methods[0] && run.spheres > reference.spheres) reference = run;
+      std::set<int> substeps;
+      for (const double step : options.steps)
+        substeps.insert(step > 0 ? std::max(1, static_cast<int>(std::lround(1 / (step * base.scene.dynamicsRate))))
+                                 : chosenSubsteps(run.options));
       for (const int count : substeps) add(run, count);
     }
   }
-  if (!namesReference(base)) add(reference, 2 * *substeps.rbegin());
+  if (!namesReference(base)) add(reference, 2 * most);
   return runs;
 }
 

@@ -185,10 +185,16 @@ std::string repeatingCommand(const std::string& path, const GoldenOptions& optio
   return command + " --failures " + options.failures;
 }
 
+void makeFolder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", path, error.message()));
+}
+
 void updateScene(const std::string& path, const GoldenOptions& options) {
   std::string renderedWith;
   const std::string folder = folderOf(path, options);
-  fs::create_directories(folder);
+  makeFolder(folder);
   const std::string scene = fs::proximate(fs::absolute(path), fs::absolute(folder)).string();
   const bool whole = std::any_of(options.update.begin(), options.update.end(),
                                  [&](const std::string& name) { return namesScene(name, path); });
@@ -228,7 +234,6 @@ bool compareScene(const std::string& path, const GoldenOptions& options, std::ve
     r.scene = path;
     fmt::print("{} {}: {}\n", r.name, r.passed ? "ok" : "failed", r.verdict);
     if (!r.passed && !m.image.pixels.empty()) {
-      fs::create_directories(options.failures);
       writePng(fmt::format("{}/{}_actual.png", options.failures, m.name), m.image);
       if (!r.expected.pixels.empty())
         writePng(fmt::format("{}/{}_difference.png", options.failures, m.name),
@@ -247,11 +252,11 @@ int runGolden(const GoldenOptions& options) {
   const std::vector<std::string> scenes = scenesOf(options);
   requireDistinctNames(scenes, options);
   if (!options.update.empty()) return update(scenes, options);
+  makeFolder(options.failures);
   bool allPass = true;
   std::string renderedWith;
   std::vector<GoldenResult> results;
   for (const std::string& path : scenes) allPass = compareScene(path, options, results, renderedWith) && allPass;
-  fs::create_directories(options.failures);
   const std::string report = options.failures + "/report.html";
   writeGoldenReport(report, results, {renderedWith, processorName()});
   fmt::print("report {}\n", report);

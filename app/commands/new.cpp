@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <string_view>
 
 #include "app/commands/commands.h"
 #include "app/files/model_file.h"
 #include "app/files/output_file.h"
 #include "app/starter_scene.h"
+#include "haptics/tool_input.h"
 
 namespace medulla {
 
@@ -20,6 +22,28 @@ static std::string nameFrom(const std::string& meshPath) {
       name.begin(), name.end(), [](unsigned char c) { return !((c < 128 && std::isalnum(c)) || c == '_' || c == '-'); },
       '_');
   return name;
+}
+
+// Quoted where a shell would take it for several words or more.
+static std::string shellWord(const std::string& path) {
+  const bool plain = std::all_of(path.begin(), path.end(), [](unsigned char c) {
+    return (c < 128 && std::isalnum(c)) || std::string_view("/._-+,@%").find(static_cast<char>(c)) != std::string::npos;
+  });
+  if (plain) return path;
+  std::string out = "'";
+  for (const char c : path) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+// A tool starts outside of the body, not farther away than the body is large.
+static void requireWithinReach(const SoftBodyModel& model, const std::string& mesh) {
+  const double reach = toolReach / 3;
+  for (const Eigen::Vector3d& x : model.restNodes)
+    if (x.lpNorm<Eigen::Infinity>() > reach)
+      throw std::runtime_error(
+          fmt::format("{}: reaches {:.3g} m from the origin, expected at most {:.3g} m, which a tool "
+                      "can work in; is --unit right?",
+                      mesh, x.lpNorm<Eigen::Infinity>(), reach));
 }
 
 int runNew(const NewOptions& options) {
@@ -36,15 +60,18 @@ int runNew(const NewOptions& options) {
   build.output = modelPath;
   try {
     runBuild(build);
+    const SoftBodyModel model = readModel(modelPath);
+    requireWithinReach(model, options.build.meshes[0]);
+    const StarterScene starter = starterScene(name, model);
+    writeText(trajectoryPath, starter.trajectory);
+    writeText(scenePath, starter.scene);
   } catch (...) {
+    for (const std::string& path : {trajectoryPath, modelPath}) fs::remove(path, error);
     if (made) fs::remove(folder, error);  // empty again
     throw;
   }
-  const StarterScene starter = starterScene(name, readModel(modelPath));
-  writeText(trajectoryPath, starter.trajectory);
-  writeText(scenePath, starter.scene);
   fmt::print("scene {}\n", scenePath);
-  fmt::print(stderr, "next: medulla render {}\n", scenePath);
+  fmt::print(stderr, "next: medulla render {}\n", shellWord(scenePath));
   return 0;
 }
 

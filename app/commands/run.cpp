@@ -347,6 +347,11 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   motions.commit();
   frameTimes.commit();
   surfaces.write(simulation);
+  if (simulation.totals().volumeRatioMin <= 0)
+    fmt::print(stderr,
+               "note: a body was turned inside out (volume_ratio_min {:.3g}): its model is too coarse, its tissue too "
+               "soft for what acts on it, or a step too long\n",
+               simulation.totals().volumeRatioMin);
   return forceResults(loaded, forces);
 }
 

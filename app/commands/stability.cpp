@@ -211,7 +211,8 @@ int runStability(const StabilityOptions& options) {
     const StabilityTables tables = runTrials(options, body, methods, journal);
     writeTables(folder, loaded.scene.name, tables);
     printResults(resultsOf(methods, tables.map, tables.trials));
-    journal.remove();
+    journal.forget(tables.map);
+    journal.forget(tables.trials);
   } catch (...) {
     if (made) fs::remove(folder, error);  // if it is empty again
     throw;

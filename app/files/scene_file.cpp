@@ -14,6 +14,7 @@
 #include "app/files/scene_rules.h"
 #include "app/files/xml_element.h"
 #include "app/scene.h"
+#include "physics/model/rotation_between.h"
 
 namespace medulla {
 
@@ -283,8 +284,7 @@ void readShape(const XmlElement& e, StaticShape& shape) {
   if (plane) {
     const Eigen::Vector3d normal = readVector(e, "normal", Eigen::Vector3d::UnitY());
     if (!(normal.norm() > 0)) refuse(e, "normal", "expected a direction");
-    shape.worldFromShape.linear() =
-        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), normal).toRotationMatrix();
+    shape.worldFromShape.linear() = rotationBetween(Eigen::Vector3d::UnitY(), normal).toRotationMatrix();
   }
   const std::vector<double> size = readNumbers(e, "size", 3, positive);
   if (box) shape.size = {size[0], size[1], size[2]};

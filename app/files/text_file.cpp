@@ -5,6 +5,7 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <string_view>
 
 #include "app/files/input_error.h"
 
@@ -20,6 +21,8 @@ std::string readTextFile(const std::string& path) {
   char block[1 << 16];
   while (const std::size_t count = std::fread(block, 1, sizeof(block), file.get())) text.append(block, count);
   if (std::ferror(file.get())) throw inputError(path, 0, std::string("cannot be read: ") + std::strerror(errno));
+  constexpr std::string_view mark = "\xef\xbb\xbf";  // before UTF-8, as spreadsheets write it
+  if (text.starts_with(mark)) text.erase(0, mark.size());
   return text;
 }
 

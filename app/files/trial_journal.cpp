@@ -38,26 +38,21 @@ StabilityPoint pointOf(const CsvRows& row) {
 
 }  // namespace
 
-TrialJournal::TrialJournal(std::string path, std::uint64_t run) : path_(std::move(path)) {
-  const std::string head = fmt::format("# medulla stability {:016x}\n", run);
-  if (std::filesystem::exists(path_)) read(head);
-  // Written anew: without a row's beginning, and without trials of another run.
-  std::string text = head;
-  for (const auto& [key, point] : known_) text += stabilityRow(point);
-  writeText(path_, text);
-  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
-  if (descriptor_ < 0) throw inputError(path_, 0, std::string("cannot be written: ") + std::strerror(errno));
+TrialJournal::TrialJournal(std::string path, std::uint64_t run)
+    : path_(std::move(path)), head_(fmt::format("# medulla stability {:016x}\n", run)) {
+  if (std::filesystem::exists(path_)) read();
+  writeAnew();  // without a row's beginning, and without trials of another run
 }
 
 TrialJournal::~TrialJournal() {
-  if (known_.empty()) remove();
+  if (known_.empty()) ::unlink(path_.c_str());
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-void TrialJournal::read(const std::string& head) {
+void TrialJournal::read() {
   std::string text = readTextFile(path_);
   text.erase(text.rfind('\n') + 1);  // all of it where there is none
-  if (!text.starts_with(head)) return;
+  if (!text.starts_with(head_)) return;
   CsvRows rows(text, path_);
   while (rows.next()) {
     const StabilityPoint point = pointOf(rows);
@@ -85,8 +80,18 @@ void TrialJournal::append(const std::string& text) {
   }
 }
 
-void TrialJournal::remove() {
-  ::unlink(path_.c_str());
+void TrialJournal::forget(const std::vector<StabilityPoint>& done) {
+  for (const StabilityPoint& point : done) known_.erase(trialKey(point));
+  writeAnew();
+}
+
+void TrialJournal::writeAnew() {
+  std::string text = head_;
+  for (const auto& [key, point] : known_) text += stabilityRow(point);
+  writeText(path_, text);
+  if (descriptor_ >= 0) ::close(descriptor_);
+  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (descriptor_ < 0) throw inputError(path_, 0, std::string("cannot be written: ") + std::strerror(errno));
 }
 
 }  // namespace medulla

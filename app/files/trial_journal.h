@@ -3,13 +3,14 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "app/files/stability_file.h"
 
 namespace medulla {
 
 // Trials as they end, a row each, for runs of hours: what an ended run of the same trials left is not run again. The
-// file has a name that looks unfinished; whoever has all trials writes the tables and calls remove(). A row is in the
+// file has a name that looks unfinished; whoever has all trials writes the tables and calls forget(). A row is in the
 // file when add() returns; one that a killed run left half written is dropped.
 class TrialJournal {
  public:
@@ -23,15 +24,16 @@ class TrialJournal {
   // Fills in how `point`'s trial ended. False where it is not known.
   bool find(StabilityPoint& point) const;
   void add(const StabilityPoint& point);
-  void remove();
+  void forget(const std::vector<StabilityPoint>& done);  // those of a longer run that was interrupted stay
   std::size_t size() const { return known_.size(); }
   const std::string& path() const { return path_; }
 
  private:
-  void read(const std::string& head);
+  void read();
+  void writeAnew();
   void append(const std::string& text);
 
-  std::string path_;
+  std::string path_, head_;
   int descriptor_ = -1;
   std::map<std::string, StabilityPoint> known_;
 };

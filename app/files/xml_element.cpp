@@ -50,6 +50,8 @@ const char* describe(tinyxml2::XMLError error) {
       return "the file is empty";
     case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED:
       return "elements are nested too deeply";
+    case tinyxml2::XML_ERROR_PARSING:
+      return "an element that nothing closes";
     default:
       return tinyxml2::XMLDocument::ErrorIDToName(error);
   }
