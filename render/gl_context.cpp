@@ -3,6 +3,7 @@
 #include <sched.h>
 
 #include <charconv>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -30,9 +31,16 @@ constexpr ContextKind kKinds[] = {
 #endif
 };
 
+// Mesa keeps compiled shaders on disk by keys that leave out how wide its vectors are: where another width was asked for
+// before, it would run code for buffers of another size (22.3.6 overruns the heap).
+void keepNoShadersOfOtherWidths() {
+  if (std::getenv("LP_NATIVE_VECTOR_WIDTH")) setenv("MESA_SHADER_CACHE_DISABLE", "true", 1);
+}
+
 }  // namespace
 
 std::unique_ptr<GlContext> makeGlContext(const std::string& name) {
+  keepNoShadersOfOtherWidths();
   std::string reasons;
   for (const ContextKind& kind : kKinds) {
     if (name != "auto" && name != kind.name) continue;

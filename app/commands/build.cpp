@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
 #include "app/commands/commands.h"
 #include "app/files/fix_text.h"
@@ -231,30 +232,21 @@ std::vector<Result> resultsOf(const std::vector<BuildJob>& jobs) {
 int runBuild(const BuildOptions& options) {
   const double scale = metresPerUnit(options.unit);
   std::vector<BuildJob> jobs = jobsOf(options);
-  bool made = false;
-  std::error_code error;
-  if (jobs.size() > 1) {
-    made = fs::create_directory(options.output, error);
-    if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", options.output, error.message()));
-  }
-  try {
-    requireDistinct(options, jobs);
-    readMeshes(scale, jobs);
-    readHeldRegions(options, jobs[0]);  // --fix asks for --identify, and that for a single mesh
-    const bool shared = jobs.size() > 1 && options.settings.method == BuildMethod::cover && options.settings.gap == 0;
-    if (shared) divideSpheres(jobs);
-    buildAll(jobs);
-    if (options.identify) identifyModel(options, jobs[0]);
-    for (BuildJob& job : jobs) job.model.settings = repeatingCommand(job, options);
-    const std::vector<Result> results = resultsOf(jobs);
-    for (const BuildJob& job : jobs) writeModel(job.modelPath, job.model);
-    for (const BuildJob& job : jobs) warnOfCover(job.meshPath, job.report);
-    if (!options.reportPath.empty()) writeReport(options.reportPath, results);
-    printResults(results);
-  } catch (...) {
-    if (made) fs::remove(options.output, error);  // if it is empty again
-    throw;
-  }
+  std::optional<OutputFolder> folder;
+  if (jobs.size() > 1) folder.emplace(options.output);
+  requireDistinct(options, jobs);
+  readMeshes(scale, jobs);
+  readHeldRegions(options, jobs[0]);  // --fix asks for --identify, and that for a single mesh
+  const bool shared = jobs.size() > 1 && options.settings.method == BuildMethod::cover && options.settings.gap == 0;
+  if (shared) divideSpheres(jobs);
+  buildAll(jobs);
+  if (options.identify) identifyModel(options, jobs[0]);
+  for (BuildJob& job : jobs) job.model.settings = repeatingCommand(job, options);
+  const std::vector<Result> results = resultsOf(jobs);
+  for (const BuildJob& job : jobs) writeModel(job.modelPath, job.model);
+  for (const BuildJob& job : jobs) warnOfCover(job.meshPath, job.report);
+  if (!options.reportPath.empty()) writeReport(options.reportPath, results);
+  printResults(results);
   return 0;
 }
 

@@ -96,9 +96,8 @@ void requireSameMeshes(const LoadedScene& a, const LoadedScene& b) {
                                            b.scene.bodies[k].modelPath, a.scene.bodies[k].modelPath));
 }
 
-int chosenSubsteps(RunOptions options) {
-  options.overrides.push_back({"dynamics.substeps", "0"});
-  const LoadedScene loaded = loadRun(options);
+int chosenSubsteps(LoadedScene loaded) {
+  loaded.scene.substeps = 0;
   return Simulation(loaded).world().substepsPerFrame();
 }
 
@@ -133,7 +132,7 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
       std::set<int> substeps;
       for (const double step : options.steps)
         substeps.insert(step > 0 ? std::max(1, static_cast<int>(std::lround(1 / (step * base.scene.dynamicsRate))))
-                                 : chosenSubsteps(run.options));
+                                 : chosenSubsteps(loaded));
       for (const int count : substeps) add(run, count);
     }
   }
@@ -314,29 +313,22 @@ int runChart(const ChartOptions& options) {
   const LoadedScene base = loadRun(options.run);
   const std::string chart = (fs::path(options.folder) / "chart").string(),
                     spheres = (fs::path(options.folder) / "spheres").string();
-  std::error_code error;
-  const bool made = fs::create_directories(options.folder, error);
-  if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", options.folder, error.message()));
-  try {
-    std::vector<std::string> outputs;
-    for (const std::string& stem : {chart, spheres})
-      for (const char* ending : {".csv", ".gnuplot", ".svg"}) outputs.push_back(stem + ending);
-    requireDistinctOutputs(base, options.run, outputs);
-    ChartTruth truth;
-    const std::vector<ChartRun> runs = planRuns(options, base);
-    const std::vector<ChartPoint> points = executeAll(runs, base, truth);
-    writeChart(chart + ".csv", points, truth.cost);
-    draw(chart, chartScript(base.scene.name, points, truth.cost));
-    if (options.models.size() > 1) {
-      const std::vector<SphereChartRow> rows = sphereRows(options, base, runs, points);
-      writeSphereChart(spheres + ".csv", rows, truth.cost);
-      draw(spheres, sphereChartScript(base.scene.name, rows, truth.cost));
-    }
-    printResults(chartResults(points, truth));
-  } catch (...) {
-    if (made) fs::remove(options.folder, error);  // if it is empty again
-    throw;
+  const OutputFolder folder(options.folder);
+  std::vector<std::string> outputs;
+  for (const std::string& stem : {chart, spheres})
+    for (const char* ending : {".csv", ".gnuplot", ".svg"}) outputs.push_back(stem + ending);
+  requireDistinctOutputs(base, options.run, outputs);
+  ChartTruth truth;
+  const std::vector<ChartRun> runs = planRuns(options, base);
+  const std::vector<ChartPoint> points = executeAll(runs, base, truth);
+  writeChart(chart + ".csv", points, truth.cost);
+  draw(chart, chartScript(base.scene.name, points, truth.cost));
+  if (options.models.size() > 1) {
+    const std::vector<SphereChartRow> rows = sphereRows(options, base, runs, points);
+    writeSphereChart(spheres + ".csv", rows, truth.cost);
+    draw(spheres, sphereChartScript(base.scene.name, rows, truth.cost));
   }
+  printResults(chartResults(points, truth));
   return 0;
 }
 

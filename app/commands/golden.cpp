@@ -8,6 +8,7 @@
 
 #include "app/commands/commands.h"
 #include "app/files/golden_report.h"
+#include "app/files/output_file.h"
 #include "app/interrupt.h"
 #include "render/flip.h"
 
@@ -185,16 +186,10 @@ std::string repeatingCommand(const std::string& path, const GoldenOptions& optio
   return command + " --failures " + options.failures;
 }
 
-void makeFolder(const std::string& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", path, error.message()));
-}
-
 void updateScene(const std::string& path, const GoldenOptions& options) {
   std::string renderedWith;
   const std::string folder = folderOf(path, options);
-  makeFolder(folder);
+  const OutputFolder made(folder);
   const std::string scene = fs::proximate(fs::absolute(path), fs::absolute(folder)).string();
   const bool whole = std::any_of(options.update.begin(), options.update.end(),
                                  [&](const std::string& name) { return namesScene(name, path); });
@@ -252,7 +247,7 @@ int runGolden(const GoldenOptions& options) {
   const std::vector<std::string> scenes = scenesOf(options);
   requireDistinctNames(scenes, options);
   if (!options.update.empty()) return update(scenes, options);
-  makeFolder(options.failures);
+  const OutputFolder made(options.failures);
   bool allPass = true;
   std::string renderedWith;
   std::vector<GoldenResult> results;

@@ -53,9 +53,7 @@ int runNew(const NewOptions& options) {
   const std::string scenePath = file(".xml"), trajectoryPath = file(".csv"), modelPath = file(".model.xml");
   for (const std::string& path : {scenePath, trajectoryPath, modelPath})
     if (fs::exists(path)) throw std::runtime_error(path + ": exists already; nothing was written");
-  std::error_code error;
-  const bool made = fs::create_directories(folder, error);
-  if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", options.folder, error.message()));
+  const OutputFolder made(options.folder);
   BuildOptions build = options.build;
   build.output = modelPath;
   try {
@@ -66,8 +64,8 @@ int runNew(const NewOptions& options) {
     writeText(trajectoryPath, starter.trajectory);
     writeText(scenePath, starter.scene);
   } catch (...) {
-    for (const std::string& path : {trajectoryPath, modelPath}) fs::remove(path, error);
-    if (made) fs::remove(folder, error);  // empty again
+    std::error_code missing;
+    for (const std::string& path : {trajectoryPath, modelPath}) fs::remove(path, missing);
     throw;
   }
   fmt::print("scene {}\n", scenePath);

@@ -203,20 +203,13 @@ int runStability(const StabilityOptions& options) {
   const BodyDescription body = bodyOf(loaded);
   const std::vector<TortureMethod> methods = methodsOf(options);
   const fs::path folder = options.folder;
-  std::error_code error;
-  const bool made = fs::create_directories(folder, error);
-  if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", options.folder, error.message()));
-  try {
-    TrialJournal journal((folder / "trials.part").string(), runHash(loaded, false));
-    const StabilityTables tables = runTrials(options, body, methods, journal);
-    writeTables(folder, loaded.scene.name, tables);
-    printResults(resultsOf(methods, tables.map, tables.trials));
-    journal.forget(tables.map);
-    journal.forget(tables.trials);
-  } catch (...) {
-    if (made) fs::remove(folder, error);  // if it is empty again
-    throw;
-  }
+  const OutputFolder made(options.folder);
+  TrialJournal journal((folder / "trials.part").string(), runHash(loaded, false));
+  const StabilityTables tables = runTrials(options, body, methods, journal);
+  writeTables(folder, loaded.scene.name, tables);
+  printResults(resultsOf(methods, tables.map, tables.trials));
+  journal.forget(tables.map);
+  journal.forget(tables.trials);
   return 0;
 }
 

@@ -6,6 +6,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <fmt/core.h>
+
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -93,6 +95,17 @@ void requireDistinctFiles(const std::vector<std::string>& outputs, const std::ve
     for (std::size_t e = 0; e < k; ++e)
       if (place(outputs[e]) == place(outputs[k])) throw std::runtime_error(outputs[k] + ": named for two outputs");
   }
+}
+
+OutputFolder::OutputFolder(const std::string& path) : path_(path) {
+  std::error_code error;
+  isMade_ = std::filesystem::create_directories(path, error);
+  if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", path, error.message()));
+}
+
+OutputFolder::~OutputFolder() {
+  std::error_code filled;
+  if (isMade_) std::filesystem::remove(path_, filled);
 }
 
 }  // namespace medulla

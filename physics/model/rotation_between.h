@@ -9,7 +9,7 @@ namespace medulla {
 // same; for opposite directions it takes a singular value decomposition, which g++ takes 5 s per file to compile.
 inline Eigen::Quaterniond rotationBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Eigen::Vector3d a = from.normalized(), b = to.normalized();
-  const double twice = std::sqrt(2 * (1 + a.dot(b)));  // cosine of half the angle
+  const double twice = std::sqrt(2 * (1 + a.dot(b)));  // the cosine of half the angle, times two
   const Eigen::Vector3d axis = a.cross(b);
   if (!(twice > 1e-6)) {
     const Eigen::Vector3d aside = a.unitOrthogonal();
