@@ -1,7 +1,5 @@
 #include "app/live_servo.h"
 
-#include <time.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -10,6 +8,7 @@
 #include <thread>
 
 #include "haptics/triple_buffer.h"
+#include "render/stage_times.h"
 
 namespace medulla {
 
@@ -60,12 +59,6 @@ struct LiveServo::Data {
 
 static Clock::duration toDuration(double seconds) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-}
-
-static double threadCpuSeconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 // All that a frame can bring: the servo's thread allocates nothing.

@@ -93,7 +93,7 @@ Motion motionOfSpheres(const WorldData& d) {
   return out;
 }
 
-double largest(const std::vector<Vector3d>& a) {
+double largestOf(const std::vector<Vector3d>& a) {
   double most = 0;
   for (const Vector3d& v : a) most = std::max(most, v.norm());
   return most;
@@ -117,7 +117,7 @@ TEST_P(BentAnchors, VelocitiesOfASkinAreThePlacesDifferences) {
   placeCarriedNodes(d);
   for (const BodyRange& range : d.ranges)
     for (const int i : range.node)
-      EXPECT_LT((vectorAt(d.nodes.velocity, i) - expected[i]).norm(), 1e-7 * largest(expected)) << "node " << i;
+      EXPECT_LT((vectorAt(d.nodes.velocity, i) - expected[i]).norm(), 1e-7 * largestOf(expected)) << "node " << i;
 }
 
 TEST_P(BentAnchors, OneNodeMovesAsTheWholeSurfaceDoesAndLoadsReturnTheSamePower) {
@@ -172,7 +172,7 @@ TEST_P(BentAnchors, TheImplicitStepsMapIsTheAnchorsDerivativeAndReturnsItsTransp
   });
   for (const BodyRange& range : d.ranges)
     for (const int i : range.node)
-      EXPECT_LT((vectorOf(carried[i]) + falling[i]).norm(), 1e-7 * largest(falling)) << "node " << i;
+      EXPECT_LT((vectorOf(carried[i]) + falling[i]).norm(), 1e-7 * largestOf(falling)) << "node " << i;
 }
 
 INSTANTIATE_TEST_SUITE_P(All, BentAnchors, testing::Values(0.2, 0.9, 1.3));

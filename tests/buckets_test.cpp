@@ -105,7 +105,7 @@ static SurfaceHit bruteForce(const BlendedSurface& surface, const Vector3d& star
 
 TEST(Buckets, SweepsEqualBruteForceBitForBitForAnyNumberOfBuckets) {
   TestRandom random;
-  const Motion wave = [](const Vector3d& x, double t) {
+  const SurfaceMotion wave = [](const Vector3d& x, double t) {
     return Vector3d(x + 0.004 * Vector3d(std::sin(40 * x.y() + t), std::sin(35 * x.x() + t), 0));
   };
   for (const int count : {1, 7, 40}) {

@@ -19,7 +19,7 @@ using synthetic::ballModel;
 
 namespace {
 
-constexpr double kRadius = 0.01, kGravity = 9.81;
+constexpr double kBallRadius = 0.01, kGravity = 9.81;
 constexpr double kOmegaTimesStep = std::numbers::pi;  // contact_solve.cpp
 
 WorldSettings settings(ContactMode mode, double step, const Vector3d& gravity = Vector3d::Zero()) {
@@ -84,11 +84,11 @@ TriangleMesh bowlMesh(double radius) {
 // k = m omega^2 carries m g: the depth is g / omega^2, whatever the mass.
 TEST(Contact, ABallAtRestSinksInByItsWeightOverTheStiffness) {
   for (const double step : {0.001, 0.0005}) {
-    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {ball("a", kRadius, {0, 1.2 * kRadius, 0})},
+    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {ball("a", kBallRadius, {0, 1.2 * kBallRadius, 0})},
                 {plane()});
     advance(world, static_cast<int>(0.5 / step));
     const double omega = kOmegaTimesStep / step, depth = kGravity / (omega * omega);
-    EXPECT_NEAR(kRadius - positionOf(world, 0).y(), depth, 1e-6 * depth);
+    EXPECT_NEAR(kBallRadius - positionOf(world, 0).y(), depth, 1e-6 * depth);
     EXPECT_LT(velocityOf(world, 0).norm(), 1e-12);
     EXPECT_EQ(world.penetration().bodies, 0);
   }
@@ -115,14 +115,14 @@ TEST(Contact, ABallRollsOrSlidesDownAnIncline) {
   const Vector3d normal(std::sin(angle), std::cos(angle), 0), down(std::cos(angle), -std::sin(angle), 0);
   const double rollingFriction = 2.0 / 7 * std::tan(angle);  // the least that rolls without sliding
   for (const double friction : {0.5 * rollingFriction, 1.5 * rollingFriction}) {
-    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {ball("a", kRadius, kRadius * normal, friction)},
+    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {ball("a", kBallRadius, kBallRadius * normal, friction)},
                 {plane(normal, friction)});
     advance(world, static_cast<int>(duration / step));
     const bool rolls = friction > rollingFriction;
     const double acceleration =
         rolls ? 5.0 / 7 * kGravity * std::sin(angle) : kGravity * (std::sin(angle) - friction * std::cos(angle));
     const double spin =
-        rolls ? acceleration * duration / kRadius : 2.5 * friction * kGravity * std::cos(angle) * duration / kRadius;
+        rolls ? acceleration * duration / kBallRadius : 2.5 * friction * kGravity * std::cos(angle) * duration / kBallRadius;
     EXPECT_NEAR(velocityOf(world, 0).dot(down), acceleration * duration, 2e-3 * acceleration * duration);
     EXPECT_NEAR(-vectorOf(world.data().spheres.angularVelocity[0]).z(), spin, 4e-3 * spin);
   }
@@ -132,11 +132,11 @@ TEST(Contact, ABallRollsOrSlidesDownAnIncline) {
 TEST(Contact, ATripodSticksBelowTheFrictionAngleAndSlidesAbove) {
   const double friction = 0.4, step = 0.0005, duration = 0.5;
   const auto tripod =
-      ballModel({{{0.02, 0, 0}, kRadius}, {{-0.01, 0, 0.0175}, kRadius}, {{-0.01, 0, -0.0175}, kRadius}},
+      ballModel({{{0.02, 0, 0}, kBallRadius}, {{-0.01, 0, 0.0175}, kBallRadius}, {{-0.01, 0, -0.0175}, kBallRadius}},
                 {{0, 1}, {1, 2}, {2, 0}});
   for (const double angle : {0.8 * std::atan(friction), 1.3 * std::atan(friction)}) {
     const Vector3d normal(std::sin(angle), std::cos(angle), 0), down(std::cos(angle), -std::sin(angle), 0);
-    BodyDescription body = ballBody("a", tripod, kRadius * normal, friction);
+    BodyDescription body = ballBody("a", tripod, kBallRadius * normal, friction);
     body.worldFromModel.linear() = plane(normal).worldFromShape.linear();
     body.tissue.damping = 1;
     World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {body}, {plane(normal, friction)});
@@ -164,12 +164,12 @@ TEST(Contact, ATripodSticksBelowTheFrictionAngleAndSlidesAbove) {
 TEST(Contact, TwoBallsCollideAsTheRecursionSays) {
   const double step = 0.001;
   World world(settings(ContactMode::balls, step),
-              {ball("a", kRadius, {-0.0153, 0, 0}), ball("b", 0.5 * kRadius, {0.01, 0, 0})});
+              {ball("a", kBallRadius, {-0.0153, 0, 0}), ball("b", 0.5 * kBallRadius, {0.01, 0, 0})});
   const double m0 = sphereMass(world.data(), 0), m1 = sphereMass(world.data(), 1);
   throwBody(world, 0, {0.6, 0, 0});
   throwBody(world, 1, {-0.4, 0, 0});
   const double common = (0.6 * m0 - 0.4 * m1) / (m0 + m1);
-  double v = -1, gap = 0.0253 - 1.5 * kRadius, deepest = 0;
+  double v = -1, gap = 0.0253 - 1.5 * kBallRadius, deepest = 0;
   const double w2 = kOmegaTimesStep * kOmegaTimesStep / (step * step), c = 2 * kOmegaTimesStep / step;
   for (int i = 0; i < 40; ++i) {
     world.advance({});
@@ -224,7 +224,7 @@ TEST(Contact, MomentaStayWhileBodiesCollide) {
 
 TEST(Contact, OverlapAtTheStartIsReportedAndPushedOutSlowly) {
   World world(settings(ContactMode::balls, 0.001),
-              {ball("a", kRadius, {0, 0, 0}), ball("b", kRadius, {0.013, 0, 0}), ball("c", kRadius, {0, 0.05, 0})});
+              {ball("a", kBallRadius, {0, 0, 0}), ball("b", kBallRadius, {0.013, 0, 0}), ball("c", kBallRadius, {0, 0.05, 0})});
   ASSERT_EQ(world.startOverlaps().size(), 1u);
   EXPECT_EQ(world.startOverlaps()[0].body0, 0);
   EXPECT_EQ(world.startOverlaps()[0].body1, 1);
@@ -235,7 +235,7 @@ TEST(Contact, OverlapAtTheStartIsReportedAndPushedOutSlowly) {
     fastest = std::max(fastest, (velocityOf(world, 0) - velocityOf(world, 1)).norm());
   }
   EXPECT_LT(fastest, 0.2 + 1e-9);
-  EXPECT_GT((positionOf(world, 1) - positionOf(world, 0)).norm(), 2 * kRadius - 1e-6);
+  EXPECT_GT((positionOf(world, 1) - positionOf(world, 0)).norm(), 2 * kBallRadius - 1e-6);
   EXPECT_NEAR(world.penetration().bodies, 70, 1e-9);
 }
 
@@ -254,7 +254,7 @@ TEST(Contact, WhatOverlapsAtRestNeverMeets) {
 // Two far ends of one body, thrown at each other.
 TEST(Contact, ABodyMeetsItself) {
   const auto arch = ballModel(
-      {{{-0.03, 0, 0}, kRadius}, {{-0.03, 0.03, 0}, kRadius}, {{0.03, 0.03, 0}, kRadius}, {{0.03, 0, 0}, kRadius}},
+      {{{-0.03, 0, 0}, kBallRadius}, {{-0.03, 0.03, 0}, kBallRadius}, {{0.03, 0.03, 0}, kBallRadius}, {{0.03, 0, 0}, kBallRadius}},
       {{0, 1}, {1, 2}, {2, 3}});
   for (const ContactMode mode : {ContactMode::none, ContactMode::balls, ContactMode::swept}) {
     BodyDescription body = ballBody("a", arch, Vector3d::Zero());
@@ -268,17 +268,17 @@ TEST(Contact, ABodyMeetsItself) {
       least = std::min(least, (positionOf(world, 0) - positionOf(world, 3)).norm());
     }
     if (mode == ContactMode::none) {
-      EXPECT_LT(least, 1.5 * kRadius);
+      EXPECT_LT(least, 1.5 * kBallRadius);
     } else {
-      EXPECT_GT(least, 1.95 * kRadius);
+      EXPECT_GT(least, 1.95 * kBallRadius);
     }
   }
 }
 
 TEST(Contact, NeighboursLimitWhoMeets) {
   const auto meet = [](std::optional<std::vector<int>> of0, std::optional<std::vector<int>> of1) {
-    std::vector<BodyDescription> bodies{ball("a", kRadius, {0, 0, 0}), ball("b", kRadius, {0.03, 0, 0}),
-                                        ball("c", kRadius, {0, 1, 0})};
+    std::vector<BodyDescription> bodies{ball("a", kBallRadius, {0, 0, 0}), ball("b", kBallRadius, {0.03, 0, 0}),
+                                        ball("c", kBallRadius, {0, 1, 0})};
     bodies[0].neighbours = std::move(of0);
     bodies[1].neighbours = std::move(of1);
     World world(settings(ContactMode::balls, 0.001), bodies);
@@ -366,7 +366,7 @@ TEST(Contact, TheSameRunTwiceHasTheSameHashAndImpulsesAreInIt) {
   std::uint64_t hash[2];
   for (std::uint64_t& h : hash) {
     World world(settings(ContactMode::swept, 0.001, {0, -kGravity, 0}),
-                {ball("a", kRadius, {0, 0.011, 0}, 0.3), ball("b", kRadius, {0.004, 0.032, 0.001}, 0.3)}, {plane()});
+                {ball("a", kBallRadius, {0, 0.011, 0}, 0.3), ball("b", kBallRadius, {0.004, 0.032, 0.001}, 0.3)}, {plane()});
     advance(world, 400);
     h = world.stateHash();
     ASSERT_FALSE(world.data().contact.carried.empty());

@@ -17,13 +17,6 @@ static BodyDescription freeTube(double damping, SurfaceMode surface = SurfaceMod
   return b;
 }
 
-static WorldSettings weightless(int substeps = 0) {
-  WorldSettings s;
-  s.gravity.setZero();
-  s.substeps = substeps;
-  return s;
-}
-
 TEST(Conservation, MomentaOfAFreeBodyStayWhileItIsDamped) {
   for (SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
     World world(weightless(), {freeTube(0.1, surface)});

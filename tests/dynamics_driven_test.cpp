@@ -18,12 +18,6 @@ static BodyDescription tube(SurfaceMode surface) {
   return b;
 }
 
-static WorldSettings weightless() {
-  WorldSettings s;
-  s.gravity.setZero();
-  return s;
-}
-
 TEST(DrivenSphere, IsOnItsPathAtEveryFrame) {
   for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
     BodyDescription b = tube(surface);

@@ -51,6 +51,13 @@ void shake(WorldData& d, std::uint64_t seed, double angle, double shift, double 
   runStage(d, evaluateLinks);
 }
 
+WorldSettings weightless(int substeps) {
+  WorldSettings s;
+  s.gravity.setZero();
+  s.substeps = substeps;
+  return s;
+}
+
 Momentum momentum(const WorldData& d) {
   Momentum m;
   const auto add = [&m](const Vector3d& x, const Vector3d& p, const Vector3d& spin) {

@@ -41,6 +41,8 @@ double sphereMass(const WorldData& d, int i);
 // thrown.
 void shake(WorldData& d, std::uint64_t seed, double angle, double shift, double speed);
 
+WorldSettings weightless(int substeps = 0);
+
 struct Momentum {
   Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero();
   double linearScale = 0, angularScale = 0;  // sums of magnitudes: what rounding is relative to

@@ -67,7 +67,7 @@ TEST(Grab, ClosingWhileItPressesAtSpeedHasNoForceStep) {
 TEST(Grab, TissueIsFeltWhereItIsByNowWhileItAccelerates) {
   constexpr double kFrame = 0.02, kTick = 1e-3, kStart = 0.1, kAcceleration = 2;  // s, m/s2
   const auto way = [](double t) { return 0.5 * kAcceleration * std::pow(std::max(0.0, t - kStart), 2); };
-  const Motion motion = [&](const Vector3d& x, double t) { return Vector3d(x + way(t) * Vector3d::UnitX()); };
+  const SurfaceMotion motion = [&](const Vector3d& x, double t) { return Vector3d(x + way(t) * Vector3d::UnitX()); };
   const TouchShape shape = plate(10, 0.03, 0.01, 5);
   ToolSettings tool;
   tool.damping = 0;

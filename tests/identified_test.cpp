@@ -38,13 +38,6 @@ BodyDescription chain(SurfaceMode surface, bool held, double damping = 0, double
   return out;
 }
 
-WorldSettings weightless(int substeps = 0) {
-  WorldSettings s;
-  s.gravity.setZero();
-  s.substeps = substeps;
-  return s;
-}
-
 // Of one sphere against the next, rad, either way round.
 double turnAgainstNext(const WorldData& d, int i) {
   const Quaterniond q = orientation(d, i).conjugate() * orientation(d, i + 1);

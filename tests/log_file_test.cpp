@@ -53,7 +53,7 @@ TEST(LogFile, OfARunThatFailedNothingRemains) {
 }
 
 // A triangle whose file had six vertices: the second was welded to the first, the third dropped, and the node 2 is new.
-std::shared_ptr<SoftBodyModel> repairedModel() {
+std::shared_ptr<SoftBodyModel> mendedModel() {
   auto model = std::make_shared<SoftBodyModel>();
   model->restNodes.resize(3);
   model->nodeOfInputVertex = {-1, 1, 1, -1, 0};
@@ -66,7 +66,7 @@ TEST(SurfaceFile, KeepsTheVertexOrderOfTheMeshFile) {
   std::vector<BodyDescription> bodies(2);
   bodies[0].name = "first";
   bodies[1].name = "second";
-  bodies[0].model = bodies[1].model = repairedModel();
+  bodies[0].model = bodies[1].model = mendedModel();
   DynamicsFrame frame;
   frame.bodies.resize(2);
   frame.bodies[0].nodes = {{0, 0, 0}, {0.1, 0, 0}, {0, 1. / 3, 0}};

@@ -13,7 +13,7 @@
 namespace medulla {
 namespace {
 
-const std::string kScene = std::string(MEDULLA_SOURCE_DIR) + "/scenes/gallbladder.xml";
+const std::string kShown = std::string(MEDULLA_SOURCE_DIR) + "/scenes/gallbladder.xml";
 
 // The gallbladder of a moment with everything that belongs to it.
 struct Moment {
@@ -22,7 +22,7 @@ struct Moment {
 
   explicit Moment(const std::string& links)
       : loaded(loadScene(
-            readScene(kScene, {{"clock.duration", "3"}, {"output.golden", "0"}, {"body.gallbladder.links", links}}))) {
+            readScene(kShown, {{"clock.duration", "3"}, {"output.golden", "0"}, {"body.gallbladder.links", links}}))) {
     Simulation simulation(loaded);
     while (!simulation.finished()) simulation.advanceFrame();
     stateAt(simulation.record(), simulation.record().start, state);
@@ -133,7 +133,7 @@ TEST(ModelDrawing, AnUnknownPartIsRefusedWithTheNearest) {
 TEST(SplitView, PanelsAreThePicturesOfTheirSize) {
   const TemporaryFolder folder;
   const auto render = [&](const std::string& name, const std::string& view, const std::string& size) {
-    const ProgramResult r = runProgram({"render", kScene, "--still", "0.1", "-o", folder / name, "--quality",
+    const ProgramResult r = runProgram({"render", kShown, "--still", "0.1", "-o", folder / name, "--quality",
                                         "standard", "--view", view, "--size", size, "--show", "proxy"});
     EXPECT_EQ(r.exitCode, 0) << r.err;
     return readPng(folder / name);
@@ -147,7 +147,7 @@ TEST(SplitView, PanelsAreThePicturesOfTheirSize) {
     EXPECT_EQ(split.pixels, expected.pixels);
   }
   const ProgramResult narrow = runProgram(
-      {"render", kScene, "--still", "0", "-o", folder / "n.png", "--view", "tissue,model", "--size", "30x48"});
+      {"render", kShown, "--still", "0", "-o", folder / "n.png", "--view", "tissue,model", "--size", "30x48"});
   EXPECT_EQ(narrow.exitCode, 1);
   EXPECT_NE(narrow.err.find("expected a width of 32 at least"), std::string::npos) << narrow.err;
 }

@@ -21,7 +21,7 @@ struct ProxyRun {
 
   TouchShape shape;
   std::function<Eigen::Vector3d(double time)> device;
-  Motion motion;  // empty: the surface rests
+  SurfaceMotion motion;  // empty: the surface rests
   ToolSettings tool;
   double duration = 1;
   int ticksPerFrame = 20;

@@ -15,7 +15,7 @@ using synthetic::ball;
 
 namespace {
 
-constexpr double kRadius = 0.01, kGravity = 9.81;
+constexpr double kBallRadius = 0.01, kGravity = 9.81;
 
 WorldSettings settings(double sleepAfter = 0.5) {
   WorldSettings s;
@@ -88,7 +88,7 @@ TEST(Sleep, WhatHasComeToRestIsLeftAlone) {
   EXPECT_EQ(bodiesAwake(sleepless), 3);
   EXPECT_EQ(world.energies().kinetic, 0);
   EXPECT_NEAR(world.energies().elastic, sleepless.energies().elastic, 0.02 * sleepless.energies().elastic);
-  EXPECT_LT(farthestApart(world, sleepless), 0.02 * kRadius);
+  EXPECT_LT(farthestApart(world, sleepless), 0.02 * kBallRadius);
   DynamicsFrame before, after;
   world.readFrame(before);
   run(world, 0.1);
@@ -116,7 +116,7 @@ TEST(Sleep, AToolFeelsNothingOfIt) {
     const Vector3d felt = world.advance(loads).toolImpulse.at(0), expected = sleepless.advance(same).toolImpulse.at(0);
     EXPECT_LT((felt - expected).norm(), 0.01 * expected.norm()) << "frame " << k;
   }
-  EXPECT_LT(farthestApart(world, sleepless), 0.03 * kRadius);
+  EXPECT_LT(farthestApart(world, sleepless), 0.03 * kBallRadius);
 }
 
 // Contacts go on with the impulses that they had: nothing sinks in or jumps.
@@ -132,14 +132,14 @@ TEST(Sleep, WakingMovesNothing) {
   world.readFrame(after);
   for (std::size_t b = 0; b < 2; ++b)
     for (std::size_t i = 0; i < before.bodies[b].nodes.size(); ++i)
-      EXPECT_LT((before.bodies[b].nodes[i] - after.bodies[b].nodes[i]).norm(), 0.01 * kRadius);
+      EXPECT_LT((before.bodies[b].nodes[i] - after.bodies[b].nodes[i]).norm(), 0.01 * kBallRadius);
 }
 
 TEST(Sleep, WhatFallsOnASleeperWakesIt) {
   for (const double sleepAfter : {0.5, 0.0}) {
-    World world(settings(sleepAfter), {ball("low", kRadius, {0, kRadius, 0}), ball("high", kRadius, {0.004, 4, 0})},
+    World world(settings(sleepAfter), {ball("low", kBallRadius, {0, kBallRadius, 0}), ball("high", kBallRadius, {0.004, 4, 0})},
                 floorAtZero());
-    const double contactAt = std::sqrt(2 * (4 - 3 * kRadius) / kGravity);
+    const double contactAt = std::sqrt(2 * (4 - 3 * kBallRadius) / kGravity);
     run(world, contactAt - 0.05);
     EXPECT_EQ(world.data().rest[0].asleep, sleepAfter > 0);
     run(world, 0.1);
@@ -172,7 +172,7 @@ TEST(Sleep, WhatMovesOrIsDrivenStaysAwake) {
 TEST(Sleep, ASpinningBallIsNotAtRest) {
   WorldSettings s = settings();
   s.gravity.setZero();
-  World world(s, {ball("spinning", kRadius, {0, 1, 0})});
+  World world(s, {ball("spinning", kBallRadius, {0, 1, 0})});
   setAngularVelocity(world.data(), 0, {0, 0.5, 0});
   run(world, 2);
   EXPECT_FALSE(world.data().rest[0].asleep);

@@ -13,10 +13,10 @@ using namespace states;
 
 namespace {
 
-constexpr double kRadius = 0.012;
+constexpr double kTubeRadius = 0.012;
 
 BodyDescription tube(SurfaceMode surface, bool held) {
-  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(8, 0.16, kRadius, 24, 12)), 5e3);
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(8, 0.16, kTubeRadius, 24, 12)), 5e3);
   b.name = "tube";
   b.surface = surface;
   b.tissue.damping = 0.5;
@@ -113,7 +113,7 @@ TEST(SurfaceParts, PartsLeaveAgainOnceWhatTheyWereAskedForIsOver) {
       farthest = std::max(farthest, (frame.bodies[0].nodes[i] - expected.bodies[0].nodes[i]).norm());
   }
   EXPECT_EQ(part.dynamicNodes(0), 0);
-  EXPECT_LT(farthest, 0.02 * kRadius);
+  EXPECT_LT(farthest, 0.02 * kTubeRadius);
 }
 
 // Weight presses on a host whose patch of surface is open, so that nodes do not hang still where their weight alone

@@ -94,9 +94,9 @@ inline TouchShape shapeOf(std::vector<Eigen::Vector3d> nodes, std::vector<std::a
   return model;
 }
 
-using Motion = std::function<Eigen::Vector3d(const Eigen::Vector3d& rest, double time)>;
+using SurfaceMotion = std::function<Eigen::Vector3d(const Eigen::Vector3d& rest, double time)>;
 
-inline DynamicsFrame frameAt(const SoftBodyModel& model, double time, const Motion& motion = {}) {
+inline DynamicsFrame frameAt(const SoftBodyModel& model, double time, const SurfaceMotion& motion = {}) {
   DynamicsFrame frame;
   frame.time = time;
   frame.bodies.resize(1);

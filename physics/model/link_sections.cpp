@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "physics/model/plane_section.h"
 #include "physics/model/symmetric_eigen.h"
@@ -12,7 +13,7 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-static constexpr double pi = 3.141592653589793;
+using std::numbers::pi;
 
 static double torsionConstant(const SectionMoments& s) {
   const double squared = s.area * s.area;

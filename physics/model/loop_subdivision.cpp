@@ -4,10 +4,11 @@
 #include <cassert>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 namespace medulla {
 
-static constexpr double pi = 3.141592653589793;
+using std::numbers::pi;
 
 namespace {
 

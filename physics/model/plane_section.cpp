@@ -14,7 +14,7 @@ namespace {
 
 constexpr int scanLines = 48;  // second moments of a disc to 0.1 %
 
-struct Interval {
+struct Span {
   double low, high;
 };
 using Outline = std::vector<std::array<Vector2d, 2>>;
@@ -43,12 +43,12 @@ Outline cut(const TriangleMesh& mesh, const Plane& plane) {
 
 // The part of a scan line in the cell of `site`: power differences are linear along a line, each rival cuts one side.
 // Beyond the cell's reach there is none of it.
-Interval cellInterval(const PowerSites& sites, int site, const Vector3d& start, const Vector3d& along) {
+Span cellSpan(const PowerSites& sites, int site, const Vector3d& start, const Vector3d& along) {
   const Vector3d& a = sites.centres[site];
   const double middle = (a - start).dot(along), reach = sites.reaches[site];
   const double chord = reach * reach - (start + middle * along - a).squaredNorm();
   if (chord <= 0) return {0, 0};
-  Interval part{middle - std::sqrt(chord), middle + std::sqrt(chord)};
+  Span part{middle - std::sqrt(chord), middle + std::sqrt(chord)};
   for (std::size_t k = 0; k < sites.centres.size(); ++k) {
     if (static_cast<int>(k) == site) continue;
     // power(a) - power(k) = at + slope t along the line
@@ -117,14 +117,14 @@ SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const 
   Integrals sum;
   for (int line = 0; line < scanLines; ++line) {
     const double b = low + (line + 0.5) * step;
-    std::array<Interval, 2> parts = {{{-1e30, 1e30}, {0, 0}}};
+    std::array<Span, 2> parts = {{{-1e30, 1e30}, {0, 0}}};
     if (sites != nullptr) {
       const Vector3d start = plane.origin + b * plane.v;
-      parts = {cellInterval(*sites, pair.first, start, plane.u), cellInterval(*sites, pair.second, start, plane.u)};
+      parts = {cellSpan(*sites, pair.first, start, plane.u), cellSpan(*sites, pair.second, start, plane.u)};
     }
     const std::vector<double> crossings = crossingsOf(outline, b);
     for (std::size_t k = 0; k + 1 < crossings.size(); k += 2) {
-      for (const Interval& part : parts) {
+      for (const Span& part : parts) {
         sum.add(std::max(crossings[k], part.low), std::min(crossings[k + 1], part.high), b, step);
       }
     }

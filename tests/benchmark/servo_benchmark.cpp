@@ -24,7 +24,7 @@ static void strokes(benchmark::State& state, const TouchShape& shape) {
   Eigen::AlignedBox3d box;
   for (const Vector3d& x : shape->restNodes) box.extend(x);
   const Vector3d middle = box.center(), half = 0.5 * box.sizes();
-  const Motion breathing = [&](const Vector3d& x, double t) {
+  const SurfaceMotion breathing = [&](const Vector3d& x, double t) {
     return Vector3d(x + 0.03 * std::sin(6 * t) * (x - middle));
   };
   std::vector<DynamicsFrame> frames;
