@@ -7,7 +7,8 @@ usage() {
 usage: test.sh [--sanitize | --lint]
 
 Installs the Debian packages that are missing, builds what has changed into build/ and runs every test.
-  --sanitize  the same with address and undefined-behaviour sanitizers, in build-sanitize/
+  --sanitize  the same, but for the figures of accuracy, with address and undefined-behaviour sanitizers, in
+              build-sanitize/
   --lint      no tests: warnings of g++ and clang++ as errors, clang-format, clang-tidy
 One test after a build: build/medulla_tests --gtest_filter='Proxy.*'
 END

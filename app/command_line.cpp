@@ -11,6 +11,7 @@
 #include "app/files/joined.h"
 #include "app/files/number_text.h"
 #include "app/files/output_file.h"
+#include "app/files/xml_element.h"
 #include "app/interrupt.h"
 #include "app/verbs.h"
 #include "render/video_writer.h"
@@ -355,6 +356,16 @@ Verb addInfo(CLI::App& app) {
   return {c, [path] { return runInfo(*path); }};
 }
 
+// CLI11 would say that all words were not expected, the first of them last.
+void requireCommand(const CLI::App& app, const std::string& word) {
+  std::vector<std::string> known;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    known.push_back(command->get_name());
+  if (word.starts_with('-') || std::find(known.begin(), known.end(), word) != known.end()) return;
+  throw CLI::ParseError("there is no command \"" + word + "\"; did you mean " + nearestName(word, known) + "?",
+                        CLI::ExitCodes::ExtrasError);
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App app(kIntroduction, "medulla");
   app.footer(kExitCodes);
@@ -367,6 +378,7 @@ int dispatch(int argc, char** argv) {
                          addChart, addStability})
     verbs.push_back(add(app));
   try {
+    if (argc > 1) requireCommand(app, argv[1]);
     app.parse(argc, argv);
     if (version) return printVersion();
     for (const Verb& verb : verbs)

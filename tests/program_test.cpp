@@ -342,7 +342,7 @@ TEST(Program, HelpAndVersion) {
 
 TEST(ProgramRefuses, WrongUsageWithCodeTwo) {
   expectRefusal(runProgram({"replay"}), 2, {"SCENE"});
-  expectRefusal(runProgram({"rneder", kScene}), 2, {"rneder"});
+  expectRefusal(runProgram({"rneder", kScene}), 2, {"rneder", "did you mean render?"});
   expectRefusal(runProgram({"render", kScene, "--size", "10x"}), 2, {"--size"});
   expectRefusal(runProgram({"render", kScene, "--view", "skin"}), 2, {"skin"});
   expectRefusal(runProgram({"render", kScene, "--view", "tissue,skin"}), 2, {"skin"});

@@ -103,11 +103,19 @@ TEST(RenderSurface, OffsetReachesTheFineShape) {
   for (const Vector3d& p : draw(s, coarse.vertices).points) EXPECT_NEAR(p.norm(), 1, 2e-3);
 }
 
-TEST(RenderSurface, AFineShapeOutOfReachIsLeftAlone) {
-  const TriangleMesh coarse = ellipsoidMesh(1, {1, 1, 1}), fine = ellipsoidMesh(2, {9, 9, 9});
-  for (const auto& o : makeRenderSurface(coarse, 1, &fine).offset) {
-    EXPECT_EQ(o, (std::array<float, 3>{0, 0, 0}));
-  }
+TEST(RenderSurface, AFineShapeThatLiesElsewhereIsRefused) {
+  const TriangleMesh coarse = ellipsoidMesh(2, {1, 1, 1});
+  TriangleMesh fine = ellipsoidMesh(3, {9, 9, 9});
+  EXPECT_THROW(makeRenderSurface(coarse, 1, &fine), std::runtime_error);
+  // A third of it is: there the surface stays where it is.
+  fine = ellipsoidMesh(3, {1, 1, 1});
+  for (Vector3d& x : fine.vertices)
+    if (x.z() > 0.3) x.z() += 9;
+  const RenderSurface s = makeRenderSurface(coarse, 1, &fine);
+  int still = 0;
+  for (const auto& o : s.offset) still += o == std::array<float, 3>{0, 0, 0} ? 1 : 0;
+  EXPECT_GT(still, 0);
+  EXPECT_LT(2 * still, static_cast<int>(s.offset.size()));
 }
 
 }  // namespace medulla

@@ -332,6 +332,7 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
 
 TEST_F(SceneFile, FilesThatAreNoScenes) {
   EXPECT_EQ(complaint(""), "x.xml: broken XML: the file is empty");
+  EXPECT_EQ(complaint("t[s],x[m]\n"), "x.xml: is no XML: expected a file that begins with <");
   EXPECT_EQ(complaint("<model version='1'/>"), "x.xml:1: the root element is <model>, expected <scene>");
   EXPECT_EQ(complaint("\n<scene name='a'>\n<clock duration=1/></scene>"),
             "x.xml:3: broken XML: an attribute is not of the form name=\"value\", or stands twice");

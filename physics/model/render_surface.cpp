@@ -1,8 +1,12 @@
 #include "physics/model/render_surface.h"
 
+#include <fmt/core.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <stdexcept>
 
 #include "physics/model/loop_subdivision.h"
 #include "physics/model/surface_queries.h"
@@ -70,13 +74,14 @@ double meanEdge(const TriangleMesh& mesh) {
   return sum / (3. * static_cast<double>(mesh.triangles.size()));
 }
 
-Vector3d offsetToFine(const SurfaceTree& fine, const LimitPoint& point, double bound) {
+std::optional<Vector3d> offsetToFine(const SurfaceTree& fine, const LimitPoint& point, double bound) {
   const Vector3d normal = point.frame.col(2);
   const double outward = firstHit(fine, point.position, normal, bound);
   const double inward = firstHit(fine, point.position, -normal, bound);
   if (std::isfinite(std::min(outward, inward))) return (outward <= inward ? outward : -inward) * normal;
   const SurfacePoint nearest = closestPoint(fine, point.position, bound);
-  return std::isfinite(nearest.distance) ? (nearest.point - point.position).eval() : Vector3d::Zero();
+  if (!std::isfinite(nearest.distance)) return std::nullopt;
+  return nearest.point - point.position;
 }
 
 std::array<float, 3> toFloat(const Vector3d& v) {
@@ -104,12 +109,20 @@ RenderSurface makeRenderSurface(const TriangleMesh& mesh, int levels, const Tria
 
   const SurfaceTree fineTree = fine != nullptr ? makeSurfaceTree(*fine) : SurfaceTree{};
   const double bound = 1.5 * meanEdge(mesh);
+  std::size_t apart = 0;
   for (std::size_t v = 0; v < limit.position.size(); ++v) {
     const LimitPoint point = evaluate(surface, v, mesh.vertices);
-    const Vector3d offset = fine != nullptr ? offsetToFine(fineTree, point, bound) : Vector3d::Zero();
+    const std::optional<Vector3d> found = fine != nullptr ? offsetToFine(fineTree, point, bound) : Vector3d::Zero();
+    const Vector3d offset = found.value_or(Vector3d::Zero());
+    apart += found ? 0 : 1;
     surface.offset.push_back(toFloat(point.frame.transpose() * offset));
     surface.restPosition.push_back(toFloat(point.position + offset));
   }
+  if (2 * apart > limit.position.size())
+    throw std::runtime_error(
+        fmt::format("the fine shape lies elsewhere: {} of {} points of the surface have none of it within {:.2g} m; "
+                    "expected the same body, unit and place",
+                    apart, limit.position.size(), bound));
   return surface;
 }
 
