@@ -31,8 +31,8 @@ constexpr ContextKind kKinds[] = {
 #endif
 };
 
-// Mesa keeps compiled shaders on disk by keys that leave out how wide its vectors are: where another width was asked for
-// before, it would run code for buffers of another size (22.3.6 overruns the heap).
+// Mesa keeps compiled shaders on disk by keys that leave out how wide its vectors are: where another width was asked
+// for before, it would run code for buffers of another size (22.3.6 overruns the heap).
 void keepNoShadersOfOtherWidths() {
   if (std::getenv("LP_NATIVE_VECTOR_WIDTH")) setenv("MESA_SHADER_CACHE_DISABLE", "true", 1);
 }

@@ -84,8 +84,8 @@ TriangleMesh bowlMesh(double radius) {
 // k = m omega^2 carries m g: the depth is g / omega^2, whatever the mass.
 TEST(Contact, ABallAtRestSinksInByItsWeightOverTheStiffness) {
   for (const double step : {0.001, 0.0005}) {
-    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {ball("a", kBallRadius, {0, 1.2 * kBallRadius, 0})},
-                {plane()});
+    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}),
+                {ball("a", kBallRadius, {0, 1.2 * kBallRadius, 0})}, {plane()});
     advance(world, static_cast<int>(0.5 / step));
     const double omega = kOmegaTimesStep / step, depth = kGravity / (omega * omega);
     EXPECT_NEAR(kBallRadius - positionOf(world, 0).y(), depth, 1e-6 * depth);
@@ -115,14 +115,14 @@ TEST(Contact, ABallRollsOrSlidesDownAnIncline) {
   const Vector3d normal(std::sin(angle), std::cos(angle), 0), down(std::cos(angle), -std::sin(angle), 0);
   const double rollingFriction = 2.0 / 7 * std::tan(angle);  // the least that rolls without sliding
   for (const double friction : {0.5 * rollingFriction, 1.5 * rollingFriction}) {
-    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}), {ball("a", kBallRadius, kBallRadius * normal, friction)},
-                {plane(normal, friction)});
+    World world(settings(ContactMode::balls, step, {0, -kGravity, 0}),
+                {ball("a", kBallRadius, kBallRadius * normal, friction)}, {plane(normal, friction)});
     advance(world, static_cast<int>(duration / step));
     const bool rolls = friction > rollingFriction;
     const double acceleration =
         rolls ? 5.0 / 7 * kGravity * std::sin(angle) : kGravity * (std::sin(angle) - friction * std::cos(angle));
-    const double spin =
-        rolls ? acceleration * duration / kBallRadius : 2.5 * friction * kGravity * std::cos(angle) * duration / kBallRadius;
+    const double spin = rolls ? acceleration * duration / kBallRadius
+                              : 2.5 * friction * kGravity * std::cos(angle) * duration / kBallRadius;
     EXPECT_NEAR(velocityOf(world, 0).dot(down), acceleration * duration, 2e-3 * acceleration * duration);
     EXPECT_NEAR(-vectorOf(world.data().spheres.angularVelocity[0]).z(), spin, 4e-3 * spin);
   }
@@ -223,8 +223,9 @@ TEST(Contact, MomentaStayWhileBodiesCollide) {
 }
 
 TEST(Contact, OverlapAtTheStartIsReportedAndPushedOutSlowly) {
-  World world(settings(ContactMode::balls, 0.001),
-              {ball("a", kBallRadius, {0, 0, 0}), ball("b", kBallRadius, {0.013, 0, 0}), ball("c", kBallRadius, {0, 0.05, 0})});
+  World world(
+      settings(ContactMode::balls, 0.001),
+      {ball("a", kBallRadius, {0, 0, 0}), ball("b", kBallRadius, {0.013, 0, 0}), ball("c", kBallRadius, {0, 0.05, 0})});
   ASSERT_EQ(world.startOverlaps().size(), 1u);
   EXPECT_EQ(world.startOverlaps()[0].body0, 0);
   EXPECT_EQ(world.startOverlaps()[0].body1, 1);
@@ -253,9 +254,11 @@ TEST(Contact, WhatOverlapsAtRestNeverMeets) {
 
 // Two far ends of one body, thrown at each other.
 TEST(Contact, ABodyMeetsItself) {
-  const auto arch = ballModel(
-      {{{-0.03, 0, 0}, kBallRadius}, {{-0.03, 0.03, 0}, kBallRadius}, {{0.03, 0.03, 0}, kBallRadius}, {{0.03, 0, 0}, kBallRadius}},
-      {{0, 1}, {1, 2}, {2, 3}});
+  const auto arch = ballModel({{{-0.03, 0, 0}, kBallRadius},
+                               {{-0.03, 0.03, 0}, kBallRadius},
+                               {{0.03, 0.03, 0}, kBallRadius},
+                               {{0.03, 0, 0}, kBallRadius}},
+                              {{0, 1}, {1, 2}, {2, 3}});
   for (const ContactMode mode : {ContactMode::none, ContactMode::balls, ContactMode::swept}) {
     BodyDescription body = ballBody("a", arch, Vector3d::Zero());
     body.tissue.young = 200;
@@ -366,7 +369,8 @@ TEST(Contact, TheSameRunTwiceHasTheSameHashAndImpulsesAreInIt) {
   std::uint64_t hash[2];
   for (std::uint64_t& h : hash) {
     World world(settings(ContactMode::swept, 0.001, {0, -kGravity, 0}),
-                {ball("a", kBallRadius, {0, 0.011, 0}, 0.3), ball("b", kBallRadius, {0.004, 0.032, 0.001}, 0.3)}, {plane()});
+                {ball("a", kBallRadius, {0, 0.011, 0}, 0.3), ball("b", kBallRadius, {0.004, 0.032, 0.001}, 0.3)},
+                {plane()});
     advance(world, 400);
     h = world.stateHash();
     ASSERT_FALSE(world.data().contact.carried.empty());

@@ -137,7 +137,8 @@ TEST(Sleep, WakingMovesNothing) {
 
 TEST(Sleep, WhatFallsOnASleeperWakesIt) {
   for (const double sleepAfter : {0.5, 0.0}) {
-    World world(settings(sleepAfter), {ball("low", kBallRadius, {0, kBallRadius, 0}), ball("high", kBallRadius, {0.004, 4, 0})},
+    World world(settings(sleepAfter),
+                {ball("low", kBallRadius, {0, kBallRadius, 0}), ball("high", kBallRadius, {0.004, 4, 0})},
                 floorAtZero());
     const double contactAt = std::sqrt(2 * (4 - 3 * kBallRadius) / kGravity);
     run(world, contactAt - 0.05);

@@ -16,7 +16,8 @@ namespace {
 constexpr double kTubeRadius = 0.012;
 
 BodyDescription tube(SurfaceMode surface, bool held) {
-  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(8, 0.16, kTubeRadius, 24, 12)), 5e3);
+  BodyDescription b =
+      synthetic::body(synthetic::chainModel(synthetic::straightTube(8, 0.16, kTubeRadius, 24, 12)), 5e3);
   b.name = "tube";
   b.surface = surface;
   b.tissue.damping = 0.5;
