@@ -34,9 +34,9 @@ class OutputFile {
 // A whole OutputFile in one call.
 void writeText(const std::string& path, const std::string& text);
 
-// A folder for outputs, made where it is missing, with those above it. One that was made here and is empty at the end,
-// since what was to fill it failed, goes again. Throws std::runtime_error with path and reason where the system
-// refuses.
+// A folder for outputs, made where it is missing, with those above it, which stay. One that was made here and is empty
+// at the end, since what was to fill it failed, goes again. Throws std::runtime_error with path and reason where the
+// system refuses.
 class OutputFolder {
  public:
   explicit OutputFolder(const std::string& path);
