@@ -17,10 +17,19 @@
 
 namespace medulla {
 
-// A missing file is the scene's mistake: said at the line that names it.
-static void requireFile(const Scene& scene, int line, const std::string& what, const std::string& path) {
+// Of a value that turns out to be wrong only now: said where it stands, in the file or on the command line.
+static std::runtime_error valueError(const Scene& scene, int line, const std::string& attribute,
+                                     const std::string& message) {
+  for (const OverriddenAttribute& o : scene.overridden)
+    if (o.line == line && o.attribute == attribute) return inputError("--set " + o.path, 0, message);
+  return inputError(scene.path, line, message);
+}
+
+// A missing file is the scene's mistake.
+static void requireFile(const Scene& scene, int line, const std::string& attribute, const std::string& what,
+                        const std::string& path) {
   if (!std::filesystem::exists(path))
-    throw inputError(scene.path, line, fmt::format("{} \"{}\" does not exist", what, path));
+    throw valueError(scene, line, attribute, fmt::format("{} \"{}\" does not exist", what, path));
 }
 
 // As the build's command line says it.
@@ -50,7 +59,7 @@ static std::string identifyingCommand(const SoftBodyModel& model, const SceneBod
 static std::vector<int> findNodes(const Scene& scene, int line, const NodeChoice& choice, const SceneBody& body,
                                   const SoftBodyModel& model) {
   if (!choice.verticesPath.empty()) {
-    requireFile(scene, line, "list of vertices", choice.verticesPath);
+    requireFile(scene, line, "vertices", "list of vertices", choice.verticesPath);
     return readVertices(choice.verticesPath, model);
   }
   std::vector<int> nodes = nodesInRegion(model, choice.region);
@@ -122,7 +131,7 @@ static void resolveFixes(const Scene& scene, const SoftBodyModel& model, SceneBo
 
 static void resolveLoads(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
   for (const SceneLoad& load : body.loads) {
-    if (!load.forcesPath.empty()) requireFile(scene, load.line, "file of forces", load.forcesPath);
+    if (!load.forcesPath.empty()) requireFile(scene, load.line, "file", "file of forces", load.forcesPath);
     const std::vector<DeadLoad> loads =
         load.forcesPath.empty() ? spreadLoad(model, findNodes(scene, load.line, load.nodes, body, model), load.whole)
                                 : readVertexForces(load.forcesPath, model, load.whole);
@@ -132,7 +141,7 @@ static void resolveLoads(const Scene& scene, const SoftBodyModel& model, SceneBo
 
 static Reference loadReference(const Scene& scene, const SceneBody& body, const SoftBodyModel& model) {
   if (body.referencePath.empty()) return {};
-  requireFile(scene, body.line, "reference", body.referencePath);
+  requireFile(scene, body.line, "reference", "reference", body.referencePath);
   return readReference(body.referencePath, model);
 }
 
@@ -144,7 +153,7 @@ static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene&
     for (std::size_t e = 0; e < b && !model; ++e)
       if (scene.bodies[e].modelPath == body.modelPath) model = models[e];
     if (!model) {
-      requireFile(scene, body.line, fmt::format("model of body \"{}\"", body.name), body.modelPath);
+      requireFile(scene, body.line, "model", fmt::format("model of body \"{}\"", body.name), body.modelPath);
       model = std::make_shared<const SoftBodyModel>(readModel(body.modelPath));
     }
     const int spheres = static_cast<int>(model->spheres.size());
@@ -167,12 +176,13 @@ static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene&
 static void requireLook(const Scene& scene, int line, const std::string& look) {
   const std::vector<std::string> known = lookNames();
   if (std::find(known.begin(), known.end(), look) != known.end()) return;
-  throw inputError(scene.path, line, fmt::format("unknown look \"{}\": expected {}", look, joined(known, ", ")));
+  throw valueError(scene, line, "look", fmt::format("unknown look \"{}\": expected {}", look, joined(known, ", ")));
 }
 
 static Trajectory loadTrajectory(const Scene& scene, SceneTool& tool) {
   if (tool.line > 0)
-    requireFile(scene, tool.line, fmt::format("trajectory of tool \"{}\"", tool.name), tool.trajectoryPath);
+    requireFile(scene, tool.line, "trajectory", fmt::format("trajectory of tool \"{}\"", tool.name),
+                tool.trajectoryPath);
   if (!isRecording(tool.trajectoryPath)) return readTrajectory(tool.trajectoryPath);
   const RecordingMap map = readRecordingMap(tool.trajectoryPath);
   tool.recordingPath = map.recordingPath;
@@ -196,7 +206,7 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
   }
   for (const SceneStatic& item : scene.statics) {
     if (!item.look.empty()) requireLook(scene, item.line, item.look);
-    if (!item.meshPath.empty()) requireFile(scene, item.line, "mesh", item.meshPath);
+    if (!item.meshPath.empty()) requireFile(scene, item.line, "mesh", "mesh", item.meshPath);
     loaded.statics.push_back(item.meshPath.empty() ? shapeMesh(item.shape)
                                                    : readMesh(item.meshPath, metresPerUnit(item.unit)));
   }

@@ -80,6 +80,12 @@ struct SceneCaption {
   std::string text;
 };
 
+// What an override put into the place of what the file says, for errors found later.
+struct OverriddenAttribute {
+  int line = 0;  // of its element
+  std::string attribute, path;
+};
+
 struct Scene {
   std::string path, name;
   double servoRate = 1200, dynamicsRate = 50;  // Hz, up to 20000 and 20 to 1200; the first a multiple of the second
@@ -110,6 +116,7 @@ struct Scene {
   // Of what the file and its overrides say, however it is laid out; files that they name are not looked into.
   std::uint64_t contentHash = 0;  // of everything
   std::uint64_t motionHash = 0;   // without camera, light, output and looks: the same motion, however it is drawn
+  std::vector<OverriddenAttribute> overridden;
 };
 
 // `--set PATH=VALUE`: replaces one attribute before the scene is interpreted, e.g. body.gallbladder.surface=skin,

@@ -431,11 +431,11 @@ std::uint64_t hashOf(const XmlElement& e, bool motionOnly, std::uint64_t hash) {
 }  // namespace
 
 Scene readScene(const std::string& path, const std::vector<SceneOverride>& overrides) {
-  const XmlElement root =
-      readXml(path, sceneRules(), [&](XmlElement& editable) { applyOverrides(editable, overrides); });
+  Scene scene;
+  const XmlElement root = readXml(
+      path, sceneRules(), [&](XmlElement& editable) { scene.overridden = applyOverrides(editable, overrides); });
   const bool durationOverridden = std::any_of(overrides.begin(), overrides.end(),
                                               [](const SceneOverride& o) { return o.path == "clock.duration"; });
-  Scene scene;
   scene.path = path;
   scene.name = readName(root);
   readClock(onlyChild(root, "clock"), scene);

@@ -49,7 +49,7 @@ void addOptionalSingles(XmlElement& element) {
   }
 }
 
-void applyOverride(XmlElement& root, const SceneOverride& override) {
+OverriddenAttribute applyOverride(XmlElement& root, const SceneOverride& override) {
   const std::string where = "--set " + override.path;
   std::vector<Target> targets;
   listTargets(root, "", targets);
@@ -69,13 +69,17 @@ void applyOverride(XmlElement& root, const SceneOverride& override) {
   XmlElement& element = *found->element;
   std::erase_if(element.attributes, [&](const XmlAttribute& a) { return a.name == found->attribute; });
   element.attributes.push_back({found->attribute, override.value, where});
+  return {element.line, found->attribute, override.path};
 }
 
 }  // namespace
 
-void applyOverrides(XmlElement& root, const std::vector<SceneOverride>& overrides) {
+std::vector<OverriddenAttribute> applyOverrides(XmlElement& root, const std::vector<SceneOverride>& overrides) {
   if (!overrides.empty()) addOptionalSingles(root);
-  for (const SceneOverride& override : overrides) applyOverride(root, override);
+  std::vector<OverriddenAttribute> out;
+  out.reserve(overrides.size());
+  for (const SceneOverride& override : overrides) out.push_back(applyOverride(root, override));
+  return out;
 }
 
 }  // namespace medulla

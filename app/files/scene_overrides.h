@@ -8,7 +8,7 @@
 namespace medulla {
 
 // Replaces attributes in the tree of a scene file before it is held against the rules. Throws std::runtime_error
-// "--set PATH: ..." where nothing, or more than one element, answers to the path.
-void applyOverrides(XmlElement& root, const std::vector<SceneOverride>& overrides);
+// "--set PATH: ..." where nothing, or more than one element, answers to the path. Returns what they replaced.
+std::vector<OverriddenAttribute> applyOverrides(XmlElement& root, const std::vector<SceneOverride>& overrides);
 
 }  // namespace medulla
