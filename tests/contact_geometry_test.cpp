@@ -103,7 +103,7 @@ TEST(BroadPhase, FindsEveryPairOnceInOrder) {
       for (int j = i + 1; j < count; ++j) {
         bool overlap = true;
         for (int a = 0; a < 3; ++a)
-          overlap = overlap && boxes[i].low[a] <= boxes[j].high[a] && boxes[j].low[a] <= boxes[i].high[a];
+          overlap = overlap && boxes[i].low.v[a] <= boxes[j].high.v[a] && boxes[j].low.v[a] <= boxes[i].high.v[a];
         if (!overlap) continue;
         ASSERT_LT(at, phase.pairs.size());
         ASSERT_EQ(phase.pairs[at].first, static_cast<std::uint32_t>(i));

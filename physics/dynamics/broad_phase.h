@@ -4,12 +4,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "physics/dynamics/simd.h"
+
 // Which boxes overlap, in time proportional to their number: a uniform grid, hashed where it would be mostly
 // empty.
 namespace medulla {
 
 struct AxisBox {
-  std::array<double, 3> low, high;  // m
+  Quad low, high;  // m; the fourth numbers are 0
 };
 
 struct BoxPair {
@@ -23,7 +25,7 @@ struct BroadPhase {
     Cell low, high;
   };
   struct Entry {
-    std::uint32_t box;
+    std::uint32_t box, firstOf;  // firstOf: bit a where the cell is the lowest of the box's along axis a
     Cell cell;
   };
   std::vector<CellRange> ranges;     // per box

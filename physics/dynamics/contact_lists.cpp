@@ -51,8 +51,8 @@ static void placeBoxes(ContactData& c) {
   for (std::size_t i = 0; i < c.colliders.size(); ++i) {
     const Quad &b0 = c.ball[c.colliders[i].sphere0], &b1 = c.ball[c.colliders[i].sphere1];
     for (int a = 0; a < 3; ++a) {
-      c.boxes[i].low[a] = std::min(b0.v[a] - b0.v[3], b1.v[a] - b1.v[3]) - margin;
-      c.boxes[i].high[a] = std::max(b0.v[a] + b0.v[3], b1.v[a] + b1.v[3]) + margin;
+      c.boxes[i].low.v[a] = std::min(b0.v[a] - b0.v[3], b1.v[a] - b1.v[3]) - margin;
+      c.boxes[i].high.v[a] = std::max(b0.v[a] + b0.v[3], b1.v[a] + b1.v[3]) + margin;
     }
   }
 }
