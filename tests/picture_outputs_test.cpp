@@ -182,12 +182,6 @@ TEST_F(Outputs, TimingsGoToStandardError) {
   EXPECT_EQ(r.out.find("stage"), std::string::npos);
 }
 
-TEST_F(Outputs, SizesAndFramesThatNoSceneHasAreWrongUsage) {
-  expectRefused(render({"--frames", "5:2"}), "--frames 5:2: expected A:B, whole numbers, 0 <= A < B", 2);
-  for (const char* size : {"63x64", "8x64", "64x9000"})
-    expectRefused(render({"--size", size}), "expected WIDTHxHEIGHT, even numbers from 16 to 8192", 2);
-}
-
 TEST_F(Outputs, WhatCannotBeResumedIsWrongUsage) {
   expectRefused(render({"--resume"}), "--resume", 2);
   expectRefused(render({"--resume", "-o", "a.mp4"}), "a.mp4", 2);

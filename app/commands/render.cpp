@@ -15,7 +15,13 @@ namespace medulla {
 namespace {
 
 void applyOverrides(const RenderOptions& options, Scene& scene) {
-  if (options.size) std::tie(scene.width, scene.height) = *options.size;
+  if (options.size) {
+    std::tie(scene.width, scene.height) = *options.size;
+    const auto valid = [](int n) { return n >= 16 && n <= 8192 && n % 2 == 0; };
+    if (!valid(scene.width) || !valid(scene.height))
+      throw std::runtime_error(fmt::format(
+          "--size {}x{}: expected even numbers from 16 to 8192 (video needs them even)", scene.width, scene.height));
+  }
   if (options.fps) scene.fps = *options.fps;
 }
 
@@ -35,9 +41,9 @@ Wanted wantedOf(const RenderOptions& options, const Scene& scene) {
   }
   const int count = pictureCount(scene);
   const auto [first, last] = options.frames.value_or(std::make_pair(0, count));
-  if (last > count)
+  if (first < 0 || first >= last || last > count)
     throw std::runtime_error(
-        fmt::format("--frames {}:{}: expected no more than {}, the scene's number of pictures", first, last, count));
+        fmt::format("--frames {}:{}: expected 0 <= A < B <= {}, the scene's number of pictures", first, last, count));
   return {pictureTimes(scene, first, last), first};
 }
 
