@@ -11,6 +11,7 @@
 #include "physics/dynamics/world.h"
 #include "physics/model/build.h"
 #include "physics/model/identify/identify.h"
+#include "physics/model/node_volumes.h"
 #include "tests/accuracy_reference.h"
 #include "tests/test_shapes.h"
 
@@ -46,6 +47,7 @@ std::shared_ptr<const SoftBodyModel> identifiedModelOf(const Result& result, int
   settings.poisson = result.number("poisson");
   const HeldRegion held = parseHeldRegion(region, *own);
   own->identified = std::make_shared<IdentifiedNetwork>(identifyNetwork(*own, {held}, settings).network);
+  shareOutMassByLayer(own->identified->layer, BuildSettings().surfaceMassFraction, *own);
   return model = own;
 }
 

@@ -140,6 +140,43 @@ static void expectSound(const SoftBodyModel& model, const BuildReport& report) {
   }
 }
 
+// A layer of one stiffness per area and no edges: nodes of a cell weigh by their areas, and the body as before.
+TEST(NodeVolumes, SharedByTheLayerTheBodyStaysItself) {
+  BuildReport report;
+  BuildSettings settings;
+  settings.renderLevels = 0;
+  const SoftBodyModel before = build(assetMesh("gallbladder/gallbladder.obj"), settings, report);
+  SoftBodyModel model = before;
+  shareOutMassByLayer({100, 50, 0}, settings.surfaceMassFraction, model);
+  std::vector<double> least(model.spheres.size(), 1e9), most(model.spheres.size(), 0);
+  for (std::size_t n = 0; n < model.attachments.size(); ++n) {
+    const Attachment &a = model.attachments[n], &old = before.attachments[n];
+    EXPECT_EQ(a.massSphere, old.massSphere);
+    EXPECT_EQ(a.host, old.host);
+    EXPECT_NEAR(a.along, old.along, 1e-12);
+    least[a.massSphere] = std::min(least[a.massSphere], a.volume / a.area);
+    most[a.massSphere] = std::max(most[a.massSphere], a.volume / a.area);
+    EXPECT_LT((restAnchor(a, model.spheres, model.links) + a.restOffset - model.restNodes[n]).norm(), 1e-15);
+  }
+  for (std::size_t i = 0; i < model.spheres.size(); ++i) {
+    EXPECT_GT(least[i], 0);
+    EXPECT_NEAR(most[i] / least[i], 1, 1e-12);
+    EXPECT_EQ(model.spheres[i].restLinkEnd, before.spheres[i].restLinkEnd);
+    EXPECT_GT((model.spheres[i].restFrame - before.spheres[i].restFrame).norm(), 0);
+  }
+  const std::vector<MassProperties> spheres = remainingSpheres(model.restNodes, model.spheres, model.attachments);
+  for (const MassProperties& s : spheres) EXPECT_GT(symmetricEigen(s.secondMoment).values[0], 0);
+  const MassProperties total = totalOf(spheres, model.restNodes, model.attachments),
+                       exact = massProperties({model.restNodes, model.triangles});
+  EXPECT_NEAR(total.volume / exact.volume, 1, 1e-9);
+  EXPECT_LT((total.centroid - exact.centroid).norm(), 1e-9);
+  EXPECT_LT((total.secondMoment - exact.secondMoment).norm(), 1e-6 * exact.secondMoment.norm());
+  const SoftBodyModel once = model;
+  shareOutMassByLayer({100, 50, 0}, settings.surfaceMassFraction, model);
+  for (std::size_t n = 0; n < model.attachments.size(); ++n)
+    EXPECT_NEAR(model.attachments[n].volume / once.attachments[n].volume, 1, 1e-9);
+}
+
 TEST(ModelBuild, GallbladderOfSevenSpheres) {
   BuildReport report;
   const SoftBodyModel model = build(assetMesh("gallbladder/gallbladder.obj"), {}, report);

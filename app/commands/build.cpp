@@ -17,6 +17,7 @@
 #include "physics/model/ball_choice.h"
 #include "physics/model/identify/check_loads.h"
 #include "physics/model/mesh_topology.h"
+#include "physics/model/node_volumes.h"
 
 namespace medulla {
 
@@ -205,6 +206,7 @@ void identifyModel(const BuildOptions& options, BuildJob& job) {
     const Identification found = identifyNetwork(job.model, job.held, options.identification, tick);
     auto network = std::make_shared<IdentifiedNetwork>(found.network);
     chooseFormulasIfBetter(job, *network, found);
+    if (!network->usesFormulas) shareOutMassByLayer(network->layer, job.settings.surfaceMassFraction, job.model);
     return network;
   });
 }

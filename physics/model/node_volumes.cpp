@@ -17,7 +17,7 @@ namespace {
 
 struct CellNodes {  // of one cell
   std::vector<int> nodes;
-  double stiffness = 0;  // m, sum over the nodes of area / depth: their attachments' stiffness over Young's modulus
+  double stiffness = 0;           // m, sum over the nodes
   double volumePerStiffness = 0;  // m2, what the cell can give at most
 };
 
@@ -73,25 +73,23 @@ double momentLoss(const MassProperties& cell, const Moments& taken, double c) {
   return 1 - eigenvaluesOf(remainder, cell.secondMoment)[0];
 }
 
-double mostVolumePerStiffness(const MassProperties& cell, const Moments& taken) {
-  constexpr double kVolumeLoss = 0.5, kMomentLoss = 0.7, kStep = 0.95;
+double mostVolumePerStiffness(const MassProperties& cell, const Moments& taken, double mostMomentLoss) {
+  constexpr double kVolumeLoss = 0.5, kStep = 0.95;
   if (!(taken.volume > 0)) return 0;
   double c = kVolumeLoss * cell.volume / taken.volume;
-  while (momentLoss(cell, taken, c) > kMomentLoss) c *= kStep;
+  while (momentLoss(cell, taken, c) > mostMomentLoss) c *= kStep;
   return c;
 }
 
-std::vector<CellNodes> nodesOfCells(const std::vector<Vector3d>& nodes, const PowerCells& cells,
-                                    const std::vector<double>& stiffness, std::vector<Attachment>& attachments) {
-  std::vector<CellNodes> out(cells.cells.size());
-  for (std::size_t n = 0; n < nodes.size(); ++n) {
-    attachments[n].massSphere = cellOf(cells, nodes[n]);
-    out[attachments[n].massSphere].nodes.push_back(static_cast<int>(n));
-  }
+std::vector<CellNodes> nodesOfCells(const std::vector<Vector3d>& nodes, const std::vector<MassProperties>& cells,
+                                    const std::vector<double>& stiffness, double mostMomentLoss,
+                                    const std::vector<Attachment>& attachments) {
+  std::vector<CellNodes> out(cells.size());
+  for (std::size_t n = 0; n < nodes.size(); ++n) out[attachments[n].massSphere].nodes.push_back(static_cast<int>(n));
   for (std::size_t i = 0; i < out.size(); ++i) {
-    const Moments m = momentsOf(out[i], cells.cells[i].centroid, nodes, stiffness);
+    const Moments m = momentsOf(out[i], cells[i].centroid, nodes, stiffness);
     out[i].stiffness = m.volume;
-    out[i].volumePerStiffness = mostVolumePerStiffness(cells.cells[i], m);
+    out[i].volumePerStiffness = mostVolumePerStiffness(cells[i], m, mostMomentLoss);
   }
   return out;
 }
@@ -115,29 +113,16 @@ double commonVolumePerStiffness(const std::vector<CellNodes>& cells, double want
   return high;
 }
 
-std::vector<MassProperties> withoutNodes(std::vector<MassProperties> about, const std::vector<Vector3d>& nodes,
-                                         const std::vector<Attachment>& attachments) {
-  for (std::size_t n = 0; n < attachments.size(); ++n) {
-    MassProperties& sphere = about[attachments[n].massSphere];
-    const Vector3d r = nodes[n] - sphere.centroid;
-    sphere.volume -= attachments[n].volume;
-    sphere.secondMoment -= attachments[n].volume * r * r.transpose();
-  }
-  return about;
-}
-
-}  // namespace
-
-void shareOutMass(const TriangleMesh& mesh, const PowerCells& cells, double fraction,
-                  std::vector<Attachment>& attachments, std::vector<FillingSphere>& spheres) {
-  const std::vector<Vector3d>& nodes = mesh.vertices;
-  const std::vector<double> stiffness = stiffnesses(attachments, vertexNormals(mesh), spheres);
-  const std::vector<CellNodes> groups = nodesOfCells(nodes, cells, stiffness, attachments);
+// Sets the nodes' volumes, and restFrame, volume and secondMoment of every sphere.
+void shareOut(const std::vector<Vector3d>& nodes, const std::vector<MassProperties>& cells,
+              const std::vector<double>& stiffness, double fraction, double mostMomentLoss,
+              std::vector<Attachment>& attachments, std::vector<FillingSphere>& spheres) {
+  const std::vector<CellNodes> groups = nodesOfCells(nodes, cells, stiffness, mostMomentLoss, attachments);
   double volume = 0;
-  for (const MassProperties& cell : cells.cells) volume += cell.volume;
+  for (const MassProperties& cell : cells) volume += cell.volume;
   const double common = commonVolumePerStiffness(groups, fraction * volume);
   for (std::size_t i = 0; i < groups.size(); ++i) {
-    const MassProperties& cell = cells.cells[i];
+    const MassProperties& cell = cells[i];
     const double c = std::min(common, groups[i].volumePerStiffness);
     Vector3d first = Vector3d::Zero();
     double taken = 0;
@@ -153,13 +138,70 @@ void shareOutMass(const TriangleMesh& mesh, const PowerCells& cells, double frac
   }
 }
 
+// What shareOut made `spheres` of.
+std::vector<MassProperties> cellsOf(const SoftBodyModel& model) {
+  std::vector<Vector3d> first(model.spheres.size(), Vector3d::Zero());  // about restFrame, where the remainder has none
+  for (std::size_t n = 0; n < model.attachments.size(); ++n) {
+    const Attachment& a = model.attachments[n];
+    first[a.massSphere] += a.volume * (model.restNodes[n] - model.spheres[a.massSphere].restFrame);
+  }
+  std::vector<MassProperties> out;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const FillingSphere& s = model.spheres[i];
+    const Vector3d way = first[i] / s.volume;
+    out.push_back({s.volume, s.restFrame + way, s.secondMoment - s.volume * way * way.transpose()});
+  }
+  return out;
+}
+
+// Of the nodes' springs to their frames along the normal and of their edges, over Young's modulus.
+std::vector<double> stiffnessesOfLayer(const SoftBodyModel& model, const IdentifiedLayer& layer) {
+  std::vector<double> out;
+  out.reserve(model.attachments.size());
+  for (const Attachment& a : model.attachments) out.push_back(layer.normal * a.area);
+  for (const std::array<int, 3>& t : model.triangles) {
+    const Vector3d a = model.restNodes[t[0]], b = model.restNodes[t[1]], c = model.restNodes[t[2]];
+    const double area = 0.5 * (b - a).cross(c - a).norm();
+    for (int k = 0; k < 3; ++k) {
+      const int i = t[k], j = t[(k + 1) % 3];
+      const double edge = layer.membrane * area / (model.restNodes[i] - model.restNodes[j]).squaredNorm();
+      out[i] += edge;
+      out[j] += edge;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+void shareOutMass(const TriangleMesh& mesh, const PowerCells& cells, double fraction,
+                  std::vector<Attachment>& attachments, std::vector<FillingSphere>& spheres) {
+  constexpr double kMostMomentLoss = 0.7;
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n) attachments[n].massSphere = cellOf(cells, mesh.vertices[n]);
+  shareOut(mesh.vertices, cells.cells, stiffnesses(attachments, vertexNormals(mesh), spheres), fraction,
+           kMostMomentLoss, attachments, spheres);
+}
+
+void shareOutMassByLayer(const IdentifiedLayer& layer, double fraction, SoftBodyModel& model) {
+  constexpr double kMostMomentLoss = 0.85;
+  shareOut(model.restNodes, cellsOf(model), stiffnessesOfLayer(model, layer), fraction, kMostMomentLoss,
+           model.attachments, model.spheres);
+  reprojectAttachments({model.restNodes, model.triangles}, model.spheres, model.links, model.attachments);
+}
+
 std::vector<MassProperties> remainingSpheres(const std::vector<Vector3d>& nodes,
                                              const std::vector<FillingSphere>& spheres,
                                              const std::vector<Attachment>& attachments) {
-  std::vector<MassProperties> whole;
-  whole.reserve(spheres.size());
-  for (const FillingSphere& s : spheres) whole.push_back({s.volume, s.restFrame, s.secondMoment});
-  return withoutNodes(std::move(whole), nodes, attachments);
+  std::vector<MassProperties> out;
+  out.reserve(spheres.size());
+  for (const FillingSphere& s : spheres) out.push_back({s.volume, s.restFrame, s.secondMoment});
+  for (std::size_t n = 0; n < attachments.size(); ++n) {
+    MassProperties& sphere = out[attachments[n].massSphere];
+    const Vector3d r = nodes[n] - sphere.centroid;
+    sphere.volume -= attachments[n].volume;
+    sphere.secondMoment -= attachments[n].volume * r * r.transpose();
+  }
+  return out;
 }
 
 MassProperties totalOf(const std::vector<MassProperties>& spheres, const std::vector<Vector3d>& nodes,
