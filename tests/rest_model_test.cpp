@@ -46,7 +46,7 @@ double largestByDenseMatrices(const BodyDescription& body, const BodyMechanics& 
 }
 
 double largest(const BodyDescription& body, const BodyMechanics& mechanics) {
-  return RestModel(body, mechanics).largestEigenvalue(1, 1);
+  return RestModel(body, mechanics).largestEigenvalue(mechanics, 1, 1);
 }
 
 BodyMechanics turningLocked(BodyMechanics mechanics) {

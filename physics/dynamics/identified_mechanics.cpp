@@ -20,12 +20,6 @@ void require(bool condition, const std::string& message) {
   if (!condition) throw std::runtime_error(message);
 }
 
-// From a sphere's frame to that of its cell; 0 of what is held.
-Vector3d armOf(const SoftBodyModel& m, int frame) {
-  if (frame >= static_cast<int>(m.spheres.size())) return Vector3d::Zero();
-  return m.identified->frames[frame].restPosition - m.spheres[frame].restFrame;
-}
-
 void checkNetwork(const SoftBodyModel& m) {
   const IdentifiedNetwork& n = *m.identified;
   require(n.frames.size() == m.spheres.size() && n.skin.size() == m.restNodes.size(),
@@ -59,6 +53,11 @@ void checkNetwork(const SoftBodyModel& m) {
 }
 
 }  // namespace
+
+Vector3d armOf(const SoftBodyModel& m, int frame) {
+  if (frame >= static_cast<int>(m.spheres.size())) return Vector3d::Zero();
+  return m.identified->frames[frame].restPosition - m.spheres[frame].restFrame;
+}
 
 void checkIdentified(const BodyDescription& body) {
   const SoftBodyModel& m = *body.model;
@@ -200,17 +199,6 @@ Vector3d skinLever(const SoftBodyModel& model, const std::vector<SkinFrame>& fra
   Vector3d lever = model.restNodes[node] - mean;
   for (const SkinFrame& f : frames) lever -= f.map.leftCols<3>().trace() / 3 * (f.restPoint - mean);
   return lever;
-}
-
-std::vector<HostRate> hostRates(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node) {
-  const std::vector<SkinRow> rows = skinRows(model, frames, node);
-  std::vector<HostRate> out;
-  for (std::size_t k = 0; k < frames.size(); ++k) {
-    const int frame = frames[k].frame;
-    if (frame >= static_cast<int>(model.spheres.size())) continue;
-    out.push_back({frame, rows[k].onWay, rows[k].onTurn - rows[k].onWay * crossMatrix(armOf(model, frame))});
-  }
-  return out;
 }
 
 // t' = v1 - v0 - (omega0 + omega1) / 2 x d, w' = omega1 - omega0, with the velocities of the cells' frames.

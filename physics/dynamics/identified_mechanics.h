@@ -57,12 +57,8 @@ std::vector<SkinRow> skinRows(const SoftBodyModel& model, const std::vector<Skin
 // m: what the frames' mean turn s adds to second order is s x (s x lever) / 2. Its maps are taken for isotropic there.
 Eigen::Vector3d skinLever(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node);
 
-// The same of its spheres alone: velocity = sum linear v + angular omega.
-struct HostRate {
-  int sphere = 0;
-  Eigen::Matrix3d linear, angular;  // 1, m
-};
-std::vector<HostRate> hostRates(const SoftBodyModel& model, const std::vector<SkinFrame>& frames, int node);
+// From a sphere's frame to that of its cell, m; 0 of what is held.
+Eigen::Vector3d armOf(const SoftBodyModel& model, int frame);
 
 // The six measures' rates of link k at rest, one per row: 1 and m on frame 1's velocity less frame 0's and on the
 // angular velocities of the two spheres' frames. Row order as identifiedStiffness.

@@ -1,66 +1,70 @@
 #include "physics/dynamics/rest_measures.h"
 
 #include <Eigen/Geometry>
-#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
 
 #include "physics/dynamics/identified_mechanics.h"
+#include "physics/model/cross_matrix.h"
 #include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
 
+using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Of identified links, along the eigenvectors of each one's stiffness.
-static std::vector<MeasureRow> identifiedRows(const SoftBodyModel& m, const BodyMechanics& b) {
-  std::vector<MeasureRow> rows;
+namespace {
+
+class Entries {
+ public:
+  void add(Eigen::Index row, Eigen::Index column, double value) {
+    if (value != 0) entries_.emplace_back(static_cast<int>(row), static_cast<int>(column), value);
+  }
+  template <class Block>
+  void addBlock(Eigen::Index row, Eigen::Index column, const Block& block) {
+    for (Eigen::Index i = 0; i < block.rows(); ++i)
+      for (Eigen::Index j = 0; j < block.cols(); ++j) add(row + i, column + j, block(i, j));
+  }
+  RestRates matrix(std::size_t rows, std::size_t columns) const {
+    RestRates out(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(columns));
+    out.setFromTriplets(entries_.begin(), entries_.end());  // sums what stands in one place
+    return out;
+  }
+
+ private:
+  std::vector<Eigen::Triplet<double>> entries_;
+};
+
+// Frames from `spheres` on are held.
+void addIdentified(const SoftBodyModel& m, const BodyMechanics& b, std::size_t& rows, Entries& out) {
   const int spheres = static_cast<int>(m.spheres.size());
+  const std::size_t strains = rows + 6 * b.identifiedLinks.size();
+  rows = strains + (b.identifiedStrains.empty() ? 0 : m.spheres.size());
   for (std::size_t k = 0; k < b.identifiedLinks.size(); ++k) {
-    const IdentifiedLink& l = m.identified->links[k];
-    const RestMeasures measures = restMeasures(m, l);
-    const SymmetricEigen eigen = symmetricEigen(b.identifiedLinks[k]);
-    for (int i = 0; i < 6; ++i) {
-      if (!(eigen.values[i] > 0)) continue;
-      const Eigen::Matrix<double, 1, 6> e = eigen.vectors.col(i).transpose();
-      rows.push_back({l.frame0, l.frame1 < spheres ? l.frame1 : -1, (e * measures.line).transpose(),
-                      (e * measures.turn0).transpose(), (e * measures.turn1).transpose(), eigen.values[i]});
-    }
-  }
-  return rows;
-}
-
-static void addRate(int sphere, const Vector6d& rate, StrainRow& row) {
-  const auto found = std::find(row.spheres.begin(), row.spheres.end(), sphere);
-  if (found != row.spheres.end()) {
-    row.rates[found - row.spheres.begin()] += rate;
-    return;
-  }
-  row.spheres.push_back(sphere);
-  row.rates.push_back(rate);
-}
-
-std::vector<StrainRow> strainRows(const SoftBodyModel& m, const BodyMechanics& b) {
-  if (b.identifiedStrains.empty()) return {};
-  const int spheres = static_cast<int>(m.spheres.size());
-  std::vector<StrainRow> rows(spheres);
-  for (std::size_t k = 0; k < b.identifiedStrains.size(); ++k) {
     const IdentifiedLink& l = m.identified->links[k];
     const RestMeasures measures = restMeasures(m, l);
     Matrix6d of0, of1;
     of0 << -measures.line, measures.turn0;
     of1 << measures.line, measures.turn1;
-    const auto add = [&](int cell, const Vector6d& strain) {
-      addRate(l.frame0, of0.transpose() * strain, rows[cell]);
-      if (l.frame1 < spheres) addRate(l.frame1, of1.transpose() * strain, rows[cell]);
+    const bool held = l.frame1 >= spheres;
+    const SymmetricEigen eigen = symmetricEigen(b.identifiedLinks[k]);
+    const Matrix6d root = eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
+    const std::size_t first = strains - 6 * (b.identifiedLinks.size() - k);
+    out.addBlock(first, 6 * l.frame0, root * of0);
+    if (!held) out.addBlock(first, 6 * l.frame1, root * of1);
+    if (b.identifiedStrains.empty()) continue;
+    const auto addStrain = [&](int cell, const Vector6d& strain) {
+      out.addBlock(strains + cell, 6 * l.frame0, strain.transpose() * of0);
+      if (!held) out.addBlock(strains + cell, 6 * l.frame1, strain.transpose() * of1);
     };
-    add(l.frame0, b.identifiedStrains[k].at0);
-    if (l.frame1 < spheres) add(l.frame1, b.identifiedStrains[k].at1);
+    addStrain(l.frame0, b.identifiedStrains[k].at0);
+    if (!held) addStrain(l.frame1, b.identifiedStrains[k].at1);
   }
-  return rows;
 }
 
-std::vector<MeasureRow> measureRows(const SoftBodyModel& m, const BodyMechanics& b) {
-  if (!b.identifiedLinks.empty()) return identifiedRows(m, b);
-  std::vector<MeasureRow> rows;
+// line . (v1 - v0) + turn0 . w0 + turn1 . w1 of velocities at the link's ends, which arms carry.
+void addFormulas(const SoftBodyModel& m, const BodyMechanics& b, std::size_t& rows, Entries& out) {
   const Vector3d none = Vector3d::Zero();
   for (std::size_t k = 0; k < b.spans.size(); ++k) {
     const ElasticLink& l = m.links[k];
@@ -71,7 +75,12 @@ std::vector<MeasureRow> measureRows(const SoftBodyModel& m, const BodyMechanics&
     const LinkStiffness& s = b.links[k];
     const Vector3d t = d / length, u = s.restU, v = t.cross(u);
     const auto add = [&](const Vector3d& line, const Vector3d& turn0, const Vector3d& turn1, double stiffness) {
-      rows.push_back({l.sphere0, l.sphere1, line, turn0 - arm0.cross(line), turn1 + arm1.cross(line), stiffness});
+      const double root = std::sqrt(stiffness);
+      out.addBlock(rows, 6 * l.sphere0, -root * line.transpose());
+      out.addBlock(rows, 6 * l.sphere0 + 3, root * (turn0 - arm0.cross(line)).transpose());
+      out.addBlock(rows, 6 * l.sphere1, root * line.transpose());
+      out.addBlock(rows, 6 * l.sphere1 + 3, root * (turn1 + arm1.cross(line)).transpose());
+      ++rows;
     };
     add(t, none, none, s.elongation);
     // k0 a0^2 + 2 c a0 a1 + k1 a1^2 as squares: k0 (a0 + c/k0 a1)^2 + (k1 - c^2/k0) a1^2
@@ -84,7 +93,91 @@ std::vector<MeasureRow> measureRows(const SoftBodyModel& m, const BodyMechanics&
     addFlexion(v, u, s.flexionU);
     add(none, -t, t, s.torsion);
   }
-  return rows;
+}
+
+// Of an anchor on a link: n its direction, offset the node's way from it. It moves with the line between the link's
+// ends, v0 + along (v1 - v0), turns the offset and thins it as the link stretches. `leaning` says how the offset turns
+// with what is across n: on beams with the ends' own turns, on springs with the line.
+std::vector<HostRate> linkAnchorRates(const BodyDescription& body, const BodyMechanics& b, int node) {
+  const SoftBodyModel& m = *body.model;
+  const bool beam = body.links == LinkModel::beam;
+  const Attachment& a = b.attachments[node];
+  const ElasticLink& l = m.links[a.host];
+  const LinkSpan& span = b.spans[a.host];
+  const double length = (span.end1 - span.end0).norm();
+  const Vector3d n = (span.end1 - span.end0) / length;
+  const Matrix3d turn = -crossMatrix(a.restOffset), about = n * n.transpose(), one = Matrix3d::Identity();
+  const double bump = beam ? 0.5 * a.along * (1 - a.along) * length : 0;  // m, of the middle line (anchor.h)
+  const Matrix3d leaning = beam ? Matrix3d(one - about) : Matrix3d(Matrix3d::Zero());
+  const double share = b.twistShare[node];
+  Matrix3d way = a.along * one;
+  if (beam) way -= body.tissue.poisson / length * a.restOffset * n.transpose();
+  if (!beam) way += turn * crossMatrix(n) / length;
+  const Matrix3d turn0 = turn * ((1 - a.along) * leaning + (1 - share) * about) - bump * crossMatrix(n),
+                 turn1 = turn * (a.along * leaning + share * about) + bump * crossMatrix(n);
+  const Vector3d arm0 = span.end0 - m.spheres[l.sphere0].restFrame, arm1 = span.end1 - m.spheres[l.sphere1].restFrame;
+  return {{l.sphere0, one - way, turn0 - (one - way) * crossMatrix(arm0)},
+          {l.sphere1, way, turn1 - way * crossMatrix(arm1)}};
+}
+
+}  // namespace
+
+RestRates linkRates(const SoftBodyModel& model, const BodyMechanics& mechanics) {
+  Entries out;
+  std::size_t rows = 0;
+  addIdentified(model, mechanics, rows, out);
+  addFormulas(model, mechanics, rows, out);
+  return out.matrix(rows, 6 * model.spheres.size());
+}
+
+std::vector<HostRate> anchorRates(const BodyDescription& body, const BodyMechanics& mechanics, int node) {
+  const SoftBodyModel& m = *body.model;
+  const Attachment& a = mechanics.attachments[node];
+  if (mechanics.skin.empty()) {
+    if (a.onLink) return linkAnchorRates(body, mechanics, node);
+    return {{a.host, Matrix3d::Identity(), -crossMatrix(a.restOffset)}};
+  }
+  std::vector<HostRate> out;
+  const std::vector<SkinRow> rows = skinRows(m, mechanics.skin[node], node);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const int frame = mechanics.skin[node][k].frame;
+    if (frame >= static_cast<int>(m.spheres.size())) continue;
+    out.push_back({frame, rows[k].onWay, rows[k].onTurn - rows[k].onWay * crossMatrix(armOf(m, frame))});
+  }
+  return out;
+}
+
+RestRates layerStiffness(const SoftBodyModel& model, const BodyMechanics& mechanics) {
+  Entries out;
+  const std::size_t size = 3 * mechanics.attachments.size();
+  for (std::size_t i = 0; i < mechanics.attachments.size(); ++i) {
+    Matrix3d spring = mechanics.attachmentStiffness[i] * Matrix3d::Identity();
+    if (!mechanics.normalExcess.empty())
+      spring += mechanics.normalExcess[i] * mechanics.normal[i] * mechanics.normal[i].transpose();
+    out.addBlock(3 * i, 3 * i, spring);
+  }
+  for (std::size_t e = 0; e < model.edges.size(); ++e) {
+    const auto& [a, b] = model.edges[e];
+    const double k = mechanics.edgeStiffness[e];
+    for (int c = 0; c < 3; ++c) {
+      out.add(3 * a + c, 3 * a + c, k);
+      out.add(3 * b + c, 3 * b + c, k);
+      out.add(3 * a + c, 3 * b + c, -k);
+      out.add(3 * b + c, 3 * a + c, -k);
+    }
+  }
+  return out.matrix(size, size);
+}
+
+RestRates pressureRates(const SoftBodyModel& model, const BodyMechanics& mechanics) {
+  Entries out;
+  for (std::size_t i = 0; i < mechanics.attachments.size(); ++i) {
+    const Attachment& a = mechanics.attachments[i];
+    const double bulk = (a.onLink ? mechanics.linkBulk : mechanics.sphereBulk)[a.host];
+    const std::size_t host = (a.onLink ? 0 : model.links.size()) + a.host;
+    out.addBlock(3 * i, host, std::sqrt(bulk) * a.area * mechanics.normal[i]);
+  }
+  return out.matrix(3 * mechanics.attachments.size(), model.links.size() + model.spheres.size());
 }
 
 }  // namespace medulla

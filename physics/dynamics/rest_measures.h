@@ -1,29 +1,31 @@
 #pragma once
 
+#include <Eigen/SparseCore>
 #include <vector>
 
 #include "physics/dynamics/body_mechanics.h"
 
+// What a body's parts measure at rest per motion of its freedoms: 6 per sphere (velocity, angular velocity), 3 per
+// node.
 namespace medulla {
 
-// Freedoms: 6 per sphere (velocity, angular velocity), then 3 per node. One link measure's rate at rest:
-// line . (v1 - v0) + turn0 . w0 + turn1 . w1.
-struct MeasureRow {
-  int sphere0, sphere1;  // the second -1: held
-  Eigen::Vector3d line, turn0, turn1;
-  double stiffness;
+using RestRates = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+// R, (N/m)^1/2 and (N/m)^1/2 m on turns: the links' stiffness over the spheres' freedoms is R^T R. A row for each
+// measure of a link, identified ones along the eigenvectors of their stiffness, and for each identified cell's strain.
+RestRates linkRates(const SoftBodyModel& model, const BodyMechanics& mechanics);
+
+// How its spheres carry a node's anchor: velocity = sum linear v + angular omega.
+struct HostRate {
+  int sphere = 0;
+  Eigen::Matrix3d linear, angular;  // 1, m
 };
+std::vector<HostRate> anchorRates(const BodyDescription& body, const BodyMechanics& mechanics, int node);
 
-// Of all links of the body at rest: their stiffness is the sum of the rows' squares.
-std::vector<MeasureRow> measureRows(const SoftBodyModel& model, const BodyMechanics& mechanics);
+// 3 nodes square, N/m: of the nodes' springs to their anchors and of their edges, over displacements from the anchors.
+RestRates layerStiffness(const SoftBodyModel& model, const BodyMechanics& mechanics);
 
-// The rates at rest of one identified cell's strain, (N/m)^1/2: its own sphere and all that it is linked to.
-struct StrainRow {
-  std::vector<int> spheres;     // each once
-  std::vector<Vector6d> rates;  // per sphere, of (velocity, angular velocity)
-};
-
-// Of all cells that have one; their stiffness is the sum of the rows' squares. Empty of bodies without.
-std::vector<StrainRow> strainRows(const SoftBodyModel& model, const BodyMechanics& mechanics);
+// Q, 3 nodes x (links + spheres): the stiffness of the hosts' pressures over the same displacements is Q Q^T.
+RestRates pressureRates(const SoftBodyModel& model, const BodyMechanics& mechanics);
 
 }  // namespace medulla

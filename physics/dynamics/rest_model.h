@@ -4,13 +4,13 @@
 #include <vector>
 
 #include "physics/dynamics/body_mechanics.h"
-#include "physics/dynamics/identified_mechanics.h"
 #include "physics/dynamics/rest_measures.h"
 
 namespace medulla {
 
 // A body linearised at rest: M x'' + K x = 0, K of links and of the surface apart. Freedoms: 6 per sphere (velocity,
-// angular velocity), then 3 per node of a surface that is not a skin. SI units. Keeps references to both arguments.
+// angular velocity), then 3 per node of a surface that is not a skin. SI units. Masses, and what
+// is fixed, come with each question: those that differ share the stiffness.
 class RestModel {
  public:
   RestModel(const BodyDescription& body, const BodyMechanics& mechanics);
@@ -22,14 +22,14 @@ class RestModel {
 
   // 1/s2: the largest eigenvalue of M^-1 (links * K_links + surface * K_surface) over what is not fixed, within a
   // thousandth; throws std::runtime_error where a stiffness over a mass is not finite.
-  double largestEigenvalue(double links, double surface) const;
+  double largestEigenvalue(const BodyMechanics& masses, double links, double surface) const;
 
   // N m per rad: the stiffness that sphere i turns against while all else stands still.
   Eigen::Matrix3d turningStiffness(int i) const;
 
   // Stiffness of the links, and mass with the nodes' through their anchors' motion J: M + J^T m J. 6 spheres square.
   Eigen::MatrixXd linkStiffness() const;
-  Eigen::MatrixXd carriedMass() const;
+  Eigen::MatrixXd carriedMass(const BodyMechanics& masses) const;
 
   // Where the spheres' motions (6 spheres x loads) carry the nodes, and what forces on the nodes do to the spheres.
   Eigen::MatrixXd carried(const Eigen::MatrixXd& motions) const;
@@ -39,34 +39,12 @@ class RestModel {
   static double startValue(int i);
 
  private:
-  // An anchor on a link, at rest.
-  struct LinkAnchor {
-    int s0, s1;  // the spheres' places in the vector of freedoms
-    double along, twistShare, length, thinning;
-    Eigen::Vector3d n, arm0, arm1, offset;
-    double bump;  // m, of the centre line per turn of its ends against each other (anchor.h); 0 where it stays a chord
-  };
+  Eigen::VectorXd carriedBy(const Eigen::VectorXd& spheres) const;
+  void addOnSpheres(const Eigen::VectorXd& forces, Eigen::VectorXd& y) const;
 
-  int node(int i) const { return 6 * spheres_ + 3 * i; }
-  std::vector<int> hostsOf(int i) const;
-  LinkAnchor linkAnchor(int i) const;
-  void addLinks(const Eigen::VectorXd& x, double scale, Eigen::VectorXd& y) const;
-  void addStrains(const Eigen::VectorXd& x, double scale, Eigen::VectorXd& y) const;
-  void addSurface(const Eigen::VectorXd& x, double scale, Eigen::VectorXd& y) const;
-  Eigen::Vector3d anchorRate(int i, const Eigen::VectorXd& x) const;
-  void addAnchorLoad(int i, const Eigen::Vector3d& f, Eigen::VectorXd& y) const;
-  Eigen::VectorXd timesMass(const Eigen::VectorXd& x) const;
-  Eigen::VectorXd divideByMass(const Eigen::VectorXd& x) const;
-
-  const SoftBodyModel& model_;
-  const BodyMechanics& mechanics_;
-  std::vector<MeasureRow> rows_;
-  std::vector<StrainRow> strains_;
-  std::vector<Eigen::Matrix3d> inverseInertia_;
-  std::vector<std::vector<HostRate>> hosts_;  // per node of an identified body; empty of others
-  bool isBeam_;
-  double thinning_;  // relative, of what hangs on a link, per relative stretch
   int spheres_, nodes_;
+  RestRates links_, layer_, pressure_;          // rest_measures.h
+  std::vector<std::vector<HostRate>> anchors_;  // per node, of a skin's, too
 };
 
 }  // namespace medulla

@@ -3,11 +3,11 @@
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
 
+#include "physics/dynamics/identified_mechanics.h"
 #include "physics/dynamics/rest_model.h"
 #include "physics/model/symmetric_eigen.h"
 
@@ -64,26 +64,6 @@ MatrixXd freeRigidMotions(const SoftBodyModel& m, const std::vector<int>& freedo
   return out;
 }
 
-// `visit(i, j, value)` gets what the links' stiffness between the spheres' freedoms is the sum of.
-template <class Visit>
-void forEachStiffness(const std::vector<MeasureRow>& rows, const std::vector<StrainRow>& strains, const Visit& visit) {
-  for (const MeasureRow& r : rows) {
-    const int size = r.sphere1 < 0 ? 6 : 12;
-    std::array<int, 12> index;
-    Eigen::Matrix<double, 12, 1> row;
-    row << -r.line, r.turn0, r.line, r.turn1;
-    for (int k = 0; k < 12; ++k) index[k] = k < 6 ? 6 * r.sphere0 + k : 6 * r.sphere1 + k - 6;
-    for (int i = 0; i < size; ++i)
-      for (int j = 0; j < size; ++j) visit(index[i], index[j], r.stiffness * row[i] * row[j]);
-  }
-  for (const StrainRow& r : strains) {
-    for (std::size_t a = 0; a < r.spheres.size(); ++a)
-      for (std::size_t b = 0; b < r.spheres.size(); ++b)
-        for (int i = 0; i < 36; ++i)
-          visit(6 * r.spheres[a] + i / 6, 6 * r.spheres[b] + i % 6, r.rates[a][i / 6] * r.rates[b][i % 6]);
-  }
-}
-
 double sumOfTraces(const std::vector<Matrix3d>& matrices) {
   double sum = 0;
   for (const Matrix3d& m : matrices) sum += m.trace();
@@ -96,6 +76,22 @@ Matrix3d positivePart(const Matrix3d& symmetric) {
   return vectors * Vector3d(e.values.cwiseMax(0)).asDiagonal() * vectors.transpose();
 }
 
+// Columns: the free among `freedom`'s freedoms.
+RestRates freeOnly(const std::vector<int>& freedom, int freeCount) {
+  std::vector<Eigen::Triplet<double>> ones;
+  for (std::size_t i = 0; i < freedom.size(); ++i)
+    if (freedom[i] >= 0) ones.emplace_back(static_cast<int>(i), freedom[i], 1);
+  RestRates out(static_cast<Eigen::Index>(freedom.size()), freeCount);
+  out.setFromTriplets(ones.begin(), ones.end());
+  return out;
+}
+
+bool holdsByLinks(const BodyDescription& body, const BodyMechanics& mechanics) {
+  const auto held = [&](const IdentifiedLink& l) { return l.frame1 >= static_cast<int>(body.model->spheres.size()); };
+  return !mechanics.identifiedLinks.empty() &&
+         std::any_of(body.model->identified->links.begin(), body.model->identified->links.end(), held);
+}
+
 }  // namespace
 
 double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics) {
@@ -106,29 +102,27 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
   for (int i = 0; i < spheres; ++i)
     for (int k = 0; k < 6; ++k)
       if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) freedom[6 * i + k] = count++;
-  const std::vector<MeasureRow> rows = measureRows(m, mechanics);
-  if (count == 0 || rows.empty()) return 0;
+  const RestRates links = linkRates(m, mechanics);
+  if (count == 0 || links.rows() == 0) return 0;
 
   const CellMasses cells = cellMasses(body);
-  using Triplet = Eigen::Triplet<double>;
-  std::vector<Triplet> stiffness, mass;
-  const auto put = [&](std::vector<Triplet>& to, int i, int j, double value) {
-    if (freedom[i] >= 0 && freedom[j] >= 0) to.emplace_back(freedom[i], freedom[j], value);
+  std::vector<Eigen::Triplet<double>> mass;
+  const auto put = [&](int i, int j, double value) {
+    if (freedom[i] >= 0 && freedom[j] >= 0) mass.emplace_back(freedom[i], freedom[j], value);
   };
-  forEachStiffness(rows, strainRows(m, mechanics), [&](int i, int j, double value) { put(stiffness, i, j, value); });
   for (int i = 0; i < spheres; ++i) {
     for (int k = 0; k < 3; ++k) {
-      put(mass, 6 * i + k, 6 * i + k, cells.mass[i]);
-      for (int l = 0; l < 3; ++l) put(mass, 6 * i + 3 + k, 6 * i + 3 + l, cells.inertia[i](k, l));
+      put(6 * i + k, 6 * i + k, cells.mass[i]);
+      for (int l = 0; l < 3; ++l) put(6 * i + 3 + k, 6 * i + 3 + l, cells.inertia[i](k, l));
     }
   }
-  Eigen::SparseMatrix<double> k(count, count), mm(count, count);
-  k.setFromTriplets(stiffness.begin(), stiffness.end());
+  const RestRates rates = links * freeOnly(freedom, count);
+  const Eigen::SparseMatrix<double> k = rates.transpose() * rates;
+  Eigen::SparseMatrix<double> mm(count, count);
   mm.setFromTriplets(mass.begin(), mass.end());
 
   // Inverse iteration, rigid motions projected out; a shift far below any mode keeps the factorisation regular.
-  const bool held = std::any_of(rows.begin(), rows.end(), [](const MeasureRow& r) { return r.sphere1 < 0; });
-  MatrixXd rigid = held ? MatrixXd(count, 0) : freeRigidMotions(m, freedom, count);
+  MatrixXd rigid = holdsByLinks(body, mechanics) ? MatrixXd(count, 0) : freeRigidMotions(m, freedom, count);
   for (int i = 0; i < rigid.cols(); ++i) {
     for (int j = 0; j < i; ++j) rigid.col(i) -= rigid.col(j).dot(mm * rigid.col(i)) * rigid.col(j);
     rigid.col(i) /= std::sqrt(rigid.col(i).dot(mm * rigid.col(i)));
@@ -155,7 +149,7 @@ std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMe
     for (int k = 0; k < 6; ++k)
       if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) free.push_back(6 * i + k);
   if (free.empty()) return {};
-  const MatrixXd stiffness = rest.linkStiffness()(free, free), mass = rest.carriedMass()(free, free);
+  const MatrixXd stiffness = rest.linkStiffness()(free, free), mass = rest.carriedMass(mechanics)(free, free);
   const VectorXd modes = eigenvaluesOf(stiffness, mass);
   std::vector<double> out;
   for (const double squared : modes)
@@ -167,13 +161,13 @@ std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMe
 void raiseRotaryInertia(const BodyDescription& body, BodyMechanics& mechanics) {
   // A step that is shorter by 2.5 % is let be; moments of inertia grow by a hundredth in all at most.
   constexpr double kExcess = 1.05, kMostAdded = 0.01, kLeastShare = 0.125;
+  const RestModel rest(body, mechanics);
   BodyMechanics locked = mechanics;
   locked.turns.assign(locked.turns.size(), false);
-  const double moving = RestModel(body, locked).largestEigenvalue(1, 1);
+  const double moving = rest.largestEigenvalue(locked, 1, 1);
   if (!(moving > 0)) return;
   const double most = (1 + kMostAdded) * sumOfTraces(mechanics.sphereInertia);
-  const RestModel rest(body, mechanics);
-  double fastest = rest.largestEigenvalue(1, 1);
+  double fastest = rest.largestEigenvalue(mechanics, 1, 1);
   std::vector<Matrix3d> stiffness;
   for (int i = 0; fastest > kExcess * moving && i < static_cast<int>(mechanics.turns.size()); ++i)
     stiffness.push_back(mechanics.turns[i] ? rest.turningStiffness(i) : Matrix3d::Zero());
@@ -182,7 +176,7 @@ void raiseRotaryInertia(const BodyDescription& body, BodyMechanics& mechanics) {
     for (std::size_t i = 0; i < stiffness.size(); ++i)
       raised.sphereInertia[i] += positivePart(stiffness[i] / (share * moving) - mechanics.sphereInertia[i]);
     if (sumOfTraces(raised.sphereInertia) > most) return;
-    fastest = RestModel(body, raised).largestEigenvalue(1, 1);
+    fastest = rest.largestEigenvalue(raised, 1, 1);
     mechanics = std::move(raised);
   }
 }
@@ -202,8 +196,8 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
   constexpr double kLargestCost = 1.3;
 
   const RestModel rest(body, mechanics);
-  const double all = rest.largestEigenvalue(1, 1), links = rest.largestEigenvalue(1, 0),
-               surface = rest.largestEigenvalue(0, 1);
+  const double all = rest.largestEigenvalue(mechanics, 1, 1), links = rest.largestEigenvalue(mechanics, 1, 0),
+               surface = rest.largestEigenvalue(mechanics, 0, 1);
   double lowest = lowestFrequency(body, mechanics);
   if (!(lowest > 0)) lowest = std::sqrt(std::max(links, surface));
   const double asked = lowest > 0 ? 2 * body.tissue.damping / lowest : 0;
@@ -223,13 +217,16 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
   // Both matrices are sums of the links' and the surface's, and the modes that are stiffest are not those damped most:
   // the step is searched for where the largest eigenvalue of h^2 K + 2 h C itself reaches 4.
   const double linkBeta = mechanics.linkRelaxation, surfaceBeta = mechanics.surfaceRelaxation;
-  double stable = stableStep(all, rest.largestEigenvalue(linkBeta, surfaceBeta)), unstable = stableStep(all, 0);
-  constexpr int kBisections = 8;  // to half a per cent at most
-  for (int i = 0; i < kBisections && unstable < std::numeric_limits<double>::infinity(); ++i) {
-    const double h = 0.5 * (stable + unstable), square = h * h;
-    (rest.largestEigenvalue(square + 2 * h * linkBeta, square + 2 * h * surfaceBeta) < 4 ? stable : unstable) = h;
+  // That goes with a power of h between the first and the second, nearly the second: each round leaves a tenth of the
+  // deviation, coming from a step that is too short.
+  constexpr int kRounds = 2;
+  double step = stableStep(all, rest.largestEigenvalue(mechanics, linkBeta, surfaceBeta));
+  for (int i = 0; i < kRounds && step < std::numeric_limits<double>::infinity(); ++i) {
+    const double square = step * step;
+    step *=
+        std::sqrt(4 / rest.largestEigenvalue(mechanics, square + 2 * step * linkBeta, square + 2 * step * surfaceBeta));
   }
-  return stable;
+  return step;
 }
 
 MatrixXd skeletonResponse(const BodyDescription& body, const BodyMechanics& mechanics, const MatrixXd& forces) {
