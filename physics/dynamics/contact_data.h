@@ -99,6 +99,7 @@ struct ContactData {
   // Lists, and the balls' places when they were made. Pairs are chosen from those of overlapping boxes, which are wide
   // enough to serve several lists.
   std::vector<Quad> ballAtList, ballAtBoxes;
+  std::vector<double> boxMove;  // m, per sphere: what its ball may move before boxes are made anew
   std::vector<PairGroup> pairs;
   std::vector<StaticNeighbour> staticNeighbours;
   std::vector<TriangleDistance> nearTriangles;  // at the time of the list
