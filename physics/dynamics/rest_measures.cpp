@@ -39,7 +39,7 @@ class Entries {
 // Frames from `spheres` on are held.
 void addIdentified(const SoftBodyModel& m, const BodyMechanics& b, std::size_t& rows, Entries& out) {
   const int spheres = static_cast<int>(m.spheres.size());
-  const std::size_t strains = rows + 6 * b.identifiedLinks.size();
+  const std::size_t links = rows, strains = links + 6 * b.identifiedLinks.size();
   rows = strains + (b.identifiedStrains.empty() ? 0 : m.spheres.size());
   for (std::size_t k = 0; k < b.identifiedLinks.size(); ++k) {
     const IdentifiedLink& l = m.identified->links[k];
@@ -50,9 +50,8 @@ void addIdentified(const SoftBodyModel& m, const BodyMechanics& b, std::size_t& 
     const bool held = l.frame1 >= spheres;
     const SymmetricEigen eigen = symmetricEigen(b.identifiedLinks[k]);
     const Matrix6d root = eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
-    const std::size_t first = strains - 6 * (b.identifiedLinks.size() - k);
-    out.addBlock(first, 6 * l.frame0, root * of0);
-    if (!held) out.addBlock(first, 6 * l.frame1, root * of1);
+    out.addBlock(links + 6 * k, 6 * l.frame0, root * of0);
+    if (!held) out.addBlock(links + 6 * k, 6 * l.frame1, root * of1);
     if (b.identifiedStrains.empty()) continue;
     const auto addStrain = [&](int cell, const Vector6d& strain) {
       out.addBlock(strains + cell, 6 * l.frame0, strain.transpose() * of0);
