@@ -6,7 +6,8 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "app/files/chart_file.h"
+#include "app/files/chart_labels.h"
+#include "app/files/chart_picture.h"
 #include "app/files/mesh_file.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
@@ -34,6 +35,40 @@ TEST(Chart, TheFrontHoldsWhatNothingBeats) {
   front.reserve(points.size());
   for (const ChartPoint& p : points) front.push_back(p.onFront);
   EXPECT_EQ(front, (std::vector<bool>{false, true, true, true, false, false, false}));
+}
+
+TEST(Chart, LabelsCoverNeitherMarksNorLinesNorOneAnother) {
+  ChartLabels labels;
+  labels.addMark({0, 0});
+  labels.addLine({0, 0}, {100, 0});
+  const auto above = labels.place({0, 0}, 3), below = labels.place({0, 0}, 3);
+  ASSERT_TRUE(above && below);
+  EXPECT_GT(above->y, 8);
+  EXPECT_LT(below->y, -8);
+  const auto left = labels.place({0, 0}, 3);  // the line lies to the right
+  ASSERT_TRUE(left);
+  EXPECT_LT(left->x, -8);
+  EXPECT_FALSE(labels.place({0, 0}, 3));
+  EXPECT_TRUE(labels.place({50, 0}, 3));  // far enough from all of these
+}
+
+// What failed stands on the rim, a row per curve, and its own colour is kept for another program's curve.
+TEST(Chart, ThePictureTellsFailedRunsApartByRow) {
+  std::vector<ChartPoint> points{point("a", 1, 5), point("a", 0.1, 500), point("b", 0.1, 200), point("FEM", 50, 1)};
+  points.back().nodes = 1234;
+  const std::string script = chartScript("t", points, ChartCost::ofTheCase);
+  const auto heightIn = [&](const std::string& block) {
+    std::istringstream rows(script.substr(script.find(block) + block.size()));
+    double cpu = 0, error = 0;
+    rows >> cpu >> error;
+    return error;
+  };
+  EXPECT_EQ(heightIn("$c0 << EOD\n"), 5);
+  const double first = heightIn("$c0failed << EOD\n"), second = heightIn("$c1failed << EOD\n");
+  EXPECT_GT(first, kChartRim);
+  EXPECT_GT(second, 1.01 * first);
+  EXPECT_NE(script.find("lc '#000000' title 'FEM'"), std::string::npos);
+  EXPECT_NE(script.find("set label '1234'"), std::string::npos);
 }
 
 class ChartCommand : public testing::Test {

@@ -8,7 +8,7 @@
 
 #include "app/commands/chart_errors.h"
 #include "app/commands/commands.h"
-#include "app/files/chart_file.h"
+#include "app/files/chart_picture.h"
 #include "app/files/gnuplot.h"
 #include "app/files/output_file.h"
 #include "app/files/sphere_chart.h"

@@ -28,14 +28,14 @@ enum class ChartCost { perSimulatedSecond, ofTheCase };
 // Ticks of a logarithmic axis at 1, 2 and 5: within a decade or two gnuplot would label one or two alone.
 std::string logTicks(double low, double high);
 
+constexpr double kChartRim = 100;  // %: as wrong as if nothing had moved
+// Failed, or as wrong as that.
+bool atRim(const ChartPoint& point);
+
 // Marks the Pareto front of cost against largest error.
 void markFront(std::vector<ChartPoint>& points);
 
 // CSV, a row per run. Errors are those of OutputFile.
 void writeChart(const std::string& path, const std::vector<ChartPoint>& points, ChartCost cost);
-
-// The picture as a script for gnuplot that writes SVG to standard output: cost across, largest error upwards, both
-// logarithmic; a curve per method; what failed or is wrong by 100 % and more on the upper rim.
-std::string chartScript(const std::string& title, const std::vector<ChartPoint>& points, ChartCost cost);
 
 }  // namespace medulla

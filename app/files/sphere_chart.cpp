@@ -35,7 +35,6 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
       "set xlabel 'filling spheres'\n"
       "set ylabel '% of the diagonal, % of the largest displacement'\n";
   out += fmt::format("set title '{}'\n", title);
-  constexpr double kRim = 100;  // %: where runs that failed are shown, as in the chart of single runs
   std::string ticks, data;
   double cheapest = 0, dearest = 0;
   bool anyFailed = false;
@@ -49,7 +48,7 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
     // gnuplot leaves out what is no number, and zeros have no logarithm.
     const auto shown = [&](double value, bool any) { return any && value > 0 ? fmt::format("{:.6g}", value) : "NaN"; };
     data += fmt::format("{} {} {} {} {} {}\n", r.spheres, shown(r.gapMax, true), shown(r.errorMax, r.step > 0),
-                        shown(r.errorRms, r.step > 0), shown(r.cpu, r.step > 0), shown(kRim, r.step == 0));
+                        shown(r.errorRms, r.step > 0), shown(r.cpu, r.step > 0), shown(kChartRim, r.step == 0));
   }
   out += fmt::format("set xtics ({})\nset xrange [{:.6g}:{:.6g}]\n", ticks, 0.8 * rows.front().spheres,
                      1.25 * rows.back().spheres);
