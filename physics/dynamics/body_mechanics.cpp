@@ -162,20 +162,14 @@ void setSurfaceStiffness(const BodyDescription& body, BodyMechanics& out) {
                                               : kLayerThicknessOverDepth * depthSum /
                                                     static_cast<double>(std::max<std::size_t>(1, m.restNodes.size()));
   out.edgeStiffness.assign(m.edges.size(), 0);
-  for (const auto& t : m.triangles) {
-    const Vector3d a = m.restNodes[t[0]], b = m.restNodes[t[1]], c = m.restNodes[t[2]];
-    const double area = 0.5 * (b - a).cross(c - a).norm();
-    for (int k = 0; k < 3; ++k) {
-      const std::array<int, 2> edge{std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])};
-      const auto found = std::lower_bound(m.edges.begin(), m.edges.end(), edge);
-      require(
-          found != m.edges.end() && *found == edge,
-          fmt::format("its model lacks the edge {}-{} of a triangle, or its edges are not sorted", edge[0], edge[1]));
-      const double squaredLength = (m.restNodes[edge[1]] - m.restNodes[edge[0]]).squaredNorm();
-      if (squaredLength > 0)
-        out.edgeStiffness[found - m.edges.begin()] += body.tissue.young * thickness * area / squaredLength;
-    }
-  }
+  visitEdges(mesh, [&](int i, int j, double area, double squaredLength) {
+    const std::array<int, 2> edge{std::min(i, j), std::max(i, j)};
+    const auto found = std::lower_bound(m.edges.begin(), m.edges.end(), edge);
+    require(found != m.edges.end() && *found == edge,
+            fmt::format("its model lacks the edge {}-{} of a triangle, or its edges are not sorted", edge[0], edge[1]));
+    if (squaredLength > 0)
+      out.edgeStiffness[found - m.edges.begin()] += body.tissue.young * thickness * area / squaredLength;
+  });
 }
 
 Matrix3d inertiaOf(const Matrix3d& secondMoment) {

@@ -11,7 +11,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-struct Anchor {
+struct HostChoice {
   double distance;
   Attachment attachment;
 };
@@ -28,14 +28,14 @@ bool isInside(double along) {
 }
 
 // Every sphere, and every link whose interior holds the foot of the perpendicular, nearest first.
-std::vector<Anchor> anchorsOf(const Vector3d& node, const std::vector<FillingSphere>& spheres,
-                              const std::vector<ElasticLink>& links) {
-  std::vector<Anchor> anchors;
+std::vector<HostChoice> hostChoices(const Vector3d& node, const std::vector<FillingSphere>& spheres,
+                                    const std::vector<ElasticLink>& links) {
+  std::vector<HostChoice> choices;
   for (std::size_t i = 0; i < spheres.size(); ++i) {
     Attachment a;
     a.host = static_cast<int>(i);
     a.restOffset = node - spheres[i].restFrame;
-    anchors.push_back({a.restOffset.norm(), a});
+    choices.push_back({a.restOffset.norm(), a});
   }
   for (std::size_t i = 0; i < links.size(); ++i) {
     const double along = footOnLink(node, links[i], spheres);
@@ -45,11 +45,11 @@ std::vector<Anchor> anchorsOf(const Vector3d& node, const std::vector<FillingSph
     a.host = static_cast<int>(i);
     a.along = along;
     a.restOffset = node - restAnchor(a, spheres, links);
-    anchors.push_back({a.restOffset.norm(), a});
+    choices.push_back({a.restOffset.norm(), a});
   }
-  std::stable_sort(anchors.begin(), anchors.end(),
-                   [](const Anchor& a, const Anchor& b) { return a.distance < b.distance; });
-  return anchors;
+  std::stable_sort(choices.begin(), choices.end(),
+                   [](const HostChoice& a, const HostChoice& b) { return a.distance < b.distance; });
+  return choices;
 }
 
 }  // namespace
@@ -60,11 +60,11 @@ std::vector<Attachment> attachNodes(const TriangleMesh& mesh, const SurfaceTree&
   attachments.reserve(mesh.vertices.size());
   for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
     const Vector3d& node = mesh.vertices[n];
-    const std::vector<Anchor> anchors = anchorsOf(node, spheres, links);
-    const auto visible = std::find_if(anchors.begin(), anchors.end(), [&](const Anchor& a) {
+    const std::vector<HostChoice> choices = hostChoices(node, spheres, links);
+    const auto visible = std::find_if(choices.begin(), choices.end(), [&](const HostChoice& a) {
       return !segmentCrosses(tree, node - a.attachment.restOffset, node, static_cast<int>(n));
     });
-    attachments.push_back(visible != anchors.end() ? visible->attachment : anchors.front().attachment);
+    attachments.push_back(visible != choices.end() ? visible->attachment : choices.front().attachment);
   }
   const std::vector<double> areas = vertexAreas(mesh);
   for (std::size_t n = 0; n < attachments.size(); ++n) attachments[n].area = areas[n];

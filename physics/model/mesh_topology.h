@@ -39,6 +39,19 @@ inline Eigen::Vector3d areaVector(const TriangleMesh& mesh, const std::array<int
 // 1 at an opening, 2 on a manifold edge.
 std::vector<std::array<int, 3>> trianglesOnEdges(const TriangleMesh& mesh);
 
+// Calls visit(i, j, area, squaredLength) for the edges i to j of every triangle, with its area (m2): an edge between
+// two triangles comes twice. Springs on edges as stiff as a sheet sum area / squaredLength (Van Gelder 1998).
+template <class Visit>
+void visitEdges(const TriangleMesh& mesh, const Visit& visit) {
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    const double area = areaVector(mesh, t).norm();
+    for (int k = 0; k < 3; ++k) {
+      const int i = t[k], j = t[(k + 1) % 3];
+      visit(i, j, area, (mesh.vertices[j] - mesh.vertices[i]).squaredNorm());
+    }
+  }
+}
+
 // m2; the whole surface.
 double surfaceArea(const TriangleMesh& mesh);
 

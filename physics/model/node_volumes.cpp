@@ -159,16 +159,11 @@ std::vector<double> stiffnessesOfLayer(const SoftBodyModel& model, const Identif
   std::vector<double> out;
   out.reserve(model.attachments.size());
   for (const Attachment& a : model.attachments) out.push_back(layer.normal * a.area);
-  for (const std::array<int, 3>& t : model.triangles) {
-    const Vector3d a = model.restNodes[t[0]], b = model.restNodes[t[1]], c = model.restNodes[t[2]];
-    const double area = 0.5 * (b - a).cross(c - a).norm();
-    for (int k = 0; k < 3; ++k) {
-      const int i = t[k], j = t[(k + 1) % 3];
-      const double edge = layer.membrane * area / (model.restNodes[i] - model.restNodes[j]).squaredNorm();
-      out[i] += edge;
-      out[j] += edge;
-    }
-  }
+  visitEdges({model.restNodes, model.triangles}, [&](int i, int j, double area, double squaredLength) {
+    const double edge = layer.membrane * area / squaredLength;
+    out[i] += edge;
+    out[j] += edge;
+  });
   return out;
 }
 

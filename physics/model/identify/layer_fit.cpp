@@ -35,18 +35,13 @@ std::array<SparseMatrix, 3> layerParts(const TriangleMesh& mesh, const NodeSurfa
     put(0, n, n, surface.areas[n] * along);
     put(1, n, n, surface.areas[n] * (Matrix3d::Identity() - along));
   }
-  for (const auto& triangle : mesh.triangles) {
-    const auto& [a, b, c] = triangle;
-    const double area = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).norm() / 2;
-    for (int k = 0; k < 3; ++k) {
-      const int i = triangle[k], j = triangle[(k + 1) % 3];
-      const Matrix3d spring = area / (mesh.vertices[i] - mesh.vertices[j]).squaredNorm() * Matrix3d::Identity();
-      put(2, i, i, spring);
-      put(2, j, j, spring);
-      put(2, i, j, -spring);
-      put(2, j, i, -spring);
-    }
-  }
+  visitEdges(mesh, [&](int i, int j, double area, double squaredLength) {
+    const Matrix3d spring = area / squaredLength * Matrix3d::Identity();
+    put(2, i, i, spring);
+    put(2, j, j, spring);
+    put(2, i, j, -spring);
+    put(2, j, i, -spring);
+  });
   std::array<SparseMatrix, 3> out;
   const auto size = 3 * static_cast<Index>(mesh.vertices.size());
   for (int part = 0; part < 3; ++part) {
