@@ -74,8 +74,8 @@ static double freeLength(const FlexionStiffness& k, double youngTimesMoment) {
 // A rim of height cos(2 angle) clamps by 0.4 of it farther out in one plane, and nearer in the other: mean(cos(2a)
 // cos(a)^2) / mean(cos(a)^2) = 1/2, of which 4/5 count for the fan over the rim. Askew it bends nothing.
 TEST(Fixation, AJaggedRimClampsABeamFartherOutInOnePlane) {
-  constexpr double kRadius = 0.012, kWave = 0.002, kRimAt = 0.0075;
-  const auto flat = synthetic::chainModel(synthetic::straightTube(3, 0.06, kRadius, 12, 8));
+  constexpr double kTube = 0.012, kWave = 0.002, kRimAt = 0.0075;
+  const auto flat = synthetic::chainModel(synthetic::straightTube(3, 0.06, kTube, 12, 8));
   const Vector3d high = Vector3d(0, 0.6, 0.8);
   const auto mechanicsOf = [&](double wave, double slope) {
     auto model = std::make_shared<SoftBodyModel>(*flat);
@@ -84,7 +84,7 @@ TEST(Fixation, AJaggedRimClampsABeamFartherOutInOnePlane) {
     body.fixed.push_back({0});
     for (int i = 0; i < 17; ++i) body.fixedNodes.push_back(i);  // a pole and two rings of eight
     for (int i = 9; i < 17; ++i) {
-      const Vector3d out = Vector3d(0, model->restNodes[i].y(), model->restNodes[i].z()) / kRadius;
+      const Vector3d out = Vector3d(0, model->restNodes[i].y(), model->restNodes[i].z()) / kTube;
       const double along = high.dot(out);
       model->restNodes[i].x() += wave * (2 * along * along - 1) + slope * out.y();
     }
@@ -92,7 +92,7 @@ TEST(Fixation, AJaggedRimClampsABeamFartherOutInOnePlane) {
   };
   const Tissue tissue;
   const double ei = tissue.young * flat->links[0].sections[0].bendingMomentU;
-  const double length = 0.03 - kRimAt - tissue.poisson * tissue.poisson * kRadius / 2;
+  const double length = 0.03 - kRimAt - tissue.poisson * tissue.poisson * kTube / 2;
   for (const double slope : {0.0, 0.001}) {
     const LinkStiffness even = mechanicsOf(0, slope).links[0], wavy = mechanicsOf(kWave, slope).links[0];
     EXPECT_NEAR(freeLength(even.flexionU, ei), length, 1e-9);

@@ -196,7 +196,7 @@ def stomach():
         Case("press", "root", Load("front", (0, 0, -15)), 4),
     ]
     return Body("stomach", "assets/stomach/stomach.obj", 7e3, 1040, regions, cases,
-                grids={"root": grids(1, 2, 1, 4, 1, 6)}, kept={"root": 1}, modes=0)
+                grids={"root": grids(1, 4, 1, 6, 1, 8)}, kept={"root": 1}, modes=0)
 
 
 # The same bodies and loads on meshes that other_meshes.py makes: bending and a pull each.
