@@ -158,6 +158,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 #define KIDNEY_ROOT "vertices=" MEDULLA_SOURCE_DIR "/tests/accuracy/results/kidney_root.fix.csv"
 #define STRETCHED_ROOT "vertices=" MEDULLA_SOURCE_DIR "/tests/accuracy/results/liver_stretched_root.fix.csv"
+#define STOMACH_ROOT "vertices=" MEDULLA_SOURCE_DIR "/tests/accuracy/results/stomach_root.fix.csv"
 #define CYLINDER_ROOT "vertices=" MEDULLA_SOURCE_DIR "/tests/accuracy/results/cylinder_root.fix.csv"
 #define CYLINDER_BED "vertices=" MEDULLA_SOURCE_DIR "/tests/accuracy/results/cylinder_bed.fix.csv"
 #define PEAR_ROOT "plane=-0.4887,-0.6834,0.5423,0.024"
@@ -179,7 +180,8 @@ INSTANTIATE_TEST_SUITE_P(Identified, StaticAccuracy,
                                          StaticCase{"gallbladder_poke_large", 25, 22, 5.6, 0.35, PEAR_BED}),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
-// Meshes that the program's own shapes do not come in: the same organs stretched and remeshed, and a kidney.
+// Meshes that the program's own shapes do not come in: the same organs stretched and remeshed, and a kidney; and an
+// arch with narrow ends.
 INSTANTIATE_TEST_SUITE_P(OfOtherMeshes, StaticAccuracy,
                          testing::Values(StaticCase{"liver_stretched_tip", 20, 1.3, 0.35, 0.1, STRETCHED_ROOT},
                                          StaticCase{"liver_stretched_axial", 20, 3.7, 0.85, 0.1, STRETCHED_ROOT},
@@ -187,7 +189,8 @@ INSTANTIATE_TEST_SUITE_P(OfOtherMeshes, StaticAccuracy,
                                          StaticCase{"gallbladder_halved_pull", 7, 5.4, 1.6, 0.1, PEAR_ROOT},
                                          StaticCase{"gallbladder_doubled_tip_large", 7, 0.92, 0.3, 0.1, PEAR_ROOT},
                                          StaticCase{"gallbladder_doubled_pull", 7, 1.9, 0.8, 0.1, PEAR_ROOT},
-                                         StaticCase{"kidney_tip", 20, 3.8, 1.5, 0.1, KIDNEY_ROOT}),
+                                         StaticCase{"kidney_tip", 20, 3.8, 1.5, 0.1, KIDNEY_ROOT},
+                                         StaticCase{"stomach_pull", 25, 1.45, 0.8, 0.1, STOMACH_ROOT}),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 // Bending in both planes, torsion, second bending in both planes; then stretch. The surface swings along.

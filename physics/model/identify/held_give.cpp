@@ -45,6 +45,18 @@ Work workOfDoubled(const TriangleMesh& mesh, const SolidSettings& settings, doub
   return workUnder(solid, forces);
 }
 
+// How much of `lacking` goes as `springs`, both per load. Where cells are too coarse for the body itself, as a
+// stomach's narrow ends are for them, all loads lack a part alike besides: it counts where without it more than twice
+// as much is left unexplained, by 1.0 to 1.1 times on bodies whose cells are fine enough and 4 times on the stomach.
+double shareOfRim(const VectorXd& lacking, const VectorXd& springs) {
+  const VectorXd spread = springs.array() - springs.mean();
+  const double alone = lacking.dot(springs) / springs.squaredNorm(),
+               beside = lacking.dot(spread) / spread.squaredNorm();
+  const VectorXd leftAlone = lacking - alone * springs, left = lacking - beside * springs;
+  const double leftBeside = (left.array() - left.mean()).matrix().norm();
+  return left.mean() > 0 && leftAlone.norm() > 2 * leftBeside ? beside : alone;
+}
+
 }  // namespace
 
 // Grids differ by chance, too, by where their cells cut the surface and the rim: a few thousandths of the work, which
@@ -70,7 +82,7 @@ double giveOfHeld(const TriangleMesh& mesh, const SolidSettings& settings, const
   const auto giveBy = [&](const Work& other) {
     const VectorXd lacking = VectorXd::Ones(count) - other.ofLoads.cwiseQuotient(work);
     const double ratio = other.size / solid.grid.size;
-    return lacking.dot(springs) / springs.squaredNorm() / (std::pow(ratio, kOrder) - 1);
+    return shareOfRim(lacking, springs) / (std::pow(ratio, kOrder) - 1);
   };
   if (!(springs.squaredNorm() > 0)) return 0;
   const Work ofLarger = workUnder(larger, forces), ofDoubled = doubled.get();
