@@ -139,6 +139,7 @@ RunOptions runOptions(const RunArguments& a) {
   options.records = filesByTool("--record", a.records);
   options.logPath = a.log;
   options.logEveryTick = a.logRate == "tick";
+  if (options.logEveryTick && a.log.empty()) usageError("--log-rate", a.logRate, "--log FILE with it");
   options.frameTimesPath = a.frameTimes;
   for (const auto& request : a.surfaces) {
     SurfaceRequest r;
@@ -174,11 +175,14 @@ std::string fileOf(const std::string& scene, std::string path) {
 void readPictures(const RenderArguments& a, RenderOptions& options) {
   if (!a.size.empty()) {
     options.size = splitPair(a.size, 'x');
-    if (!options.size) usageError("--size", a.size, "WIDTHxHEIGHT, even numbers from 16 to 8192");
+    const auto valid = [](int n) { return n >= 16 && n <= 8192 && n % 2 == 0; };
+    if (!options.size || !valid(options.size->first) || !valid(options.size->second))
+      usageError("--size", a.size, "WIDTHxHEIGHT, even numbers from 16 to 8192 (video needs them even)");
   }
   if (!a.frames.empty()) {
     options.frames = splitPair(a.frames, ':');
-    if (!options.frames) usageError("--frames", a.frames, "A:B, whole numbers, B excluded");
+    if (!options.frames || options.frames->first >= options.frames->second)
+      usageError("--frames", a.frames, "A:B, whole numbers, B excluded and more than A");
   }
   if (!a.fps.empty()) {
     options.fps = parseNumber<double>(a.fps);
@@ -366,6 +370,21 @@ void requireCommand(const CLI::App& app, const std::string& word) {
                         CLI::ExitCodes::ExtrasError);
 }
 
+// CLI11 would complain of what stands behind a misspelt option, or of too many meshes where it has a value.
+void requireOptions(const CLI::App& command, const std::vector<std::string>& words) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  for (const std::string& word : words) {
+    if (word == "--") return;
+    const std::string name = word.substr(0, word.find('='));
+    if (!name.starts_with("--") || std::find(known.begin(), known.end(), name) != known.end()) continue;
+    throw CLI::ParseError(
+        "medulla " + command.get_name() + " has no option " + name + "; did you mean " + nearestName(name, known) + "?",
+        CLI::ExitCodes::ExtrasError);
+  }
+}
+
 int dispatch(int argc, char** argv) {
   CLI::App app(kIntroduction, "medulla");
   app.footer(kExitCodes);
@@ -377,8 +396,15 @@ int dispatch(int argc, char** argv) {
   for (const auto add : {addRender, addReplay, addCheck, addInfo, addBuild, addNew, addGolden, addCompare, addPlot,
                          addChart, addStability})
     verbs.push_back(add(app));
+  std::string command;  // with a space behind it
   try {
-    if (argc > 1) requireCommand(app, argv[1]);
+    const std::vector<std::string> words(argv + 1, argv + std::max(argc, 1));
+    if (!words.empty()) requireCommand(app, words[0]);
+    for (const Verb& verb : verbs) {
+      if (words.empty() || verb.command->get_name() != words[0]) continue;
+      command = words[0] + " ";
+      requireOptions(*verb.command, words);
+    }
     app.parse(argc, argv);
     if (version) return printVersion();
     for (const Verb& verb : verbs)
@@ -386,7 +412,7 @@ int dispatch(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "medulla: %s (see medulla --help)\n", error.what());
+    std::fprintf(stderr, "medulla: %s (see medulla %s--help)\n", error.what(), command.c_str());
     return 2;
   }
   std::fputs(app.help().c_str(), stderr);

@@ -7,6 +7,7 @@
 #include <exception>
 #include <thread>
 
+#include "app/interrupt.h"
 #include "haptics/triple_buffer.h"
 #include "render/stage_times.h"
 
@@ -28,13 +29,13 @@ struct TickTimes {
     count[bin].fetch_add(1, std::memory_order_relaxed);
     if (seconds > longest) longest = seconds;
   }
-  // The upper end of the bin in which that share of the times is reached.
+  // The upper end of the bin in which that share of the times is reached, but no more than the longest.
   double quantile(double share) const {
     long total = 0, sum = 0;
     for (const std::atomic<int>& c : count) total += c;
     for (int bin = 0; bin + 1 < bins; ++bin) {
       sum += count[bin];
-      if (static_cast<double>(sum) >= share * static_cast<double>(total)) return width * (bin + 1);
+      if (static_cast<double>(sum) >= share * static_cast<double>(total)) return std::min(width * (bin + 1), longest.load());
     }
     return longest;
   }
@@ -138,6 +139,7 @@ void LiveServo::advanceFrame() {
   constexpr auto pause = std::chrono::microseconds(100);  // of frames of 20 ms; a signal would cost the servo a lock
   while (!data_->handedOver.take()) {
     if (data_->failed) std::rethrow_exception(data_->failure);
+    checkInterrupt();
     std::this_thread::sleep_for(pause);
   }
   data_->simulation.advanceFrame(data_->handedOver.reading());

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "app/commands/commands.h"
+#include "app/files/mesh_file.h"
 #include "app/verbs.h"
 
 // The verbs that make models.
@@ -91,7 +92,7 @@ Verb addBuild(CLI::App& app) {
       ->check(CLI::IsMember({"cover", "skeleton"}))
       ->capture_default_str();
   c->add_option("--unit", a.options.unit, "unit of the mesh files")
-      ->check(CLI::IsMember({"m", "cm", "mm", "inch"}))
+      ->check(CLI::IsMember(lengthUnits()))
       ->capture_default_str();
   c->add_option("--fine", a.options.fine, "detailed shape that the drawn surface follows; of several meshes one each")
       ->type_name("MESH")
@@ -120,7 +121,7 @@ Verb addNew(CLI::App& app) {
       ->check(CLI::Range(1, spheresMax))
       ->capture_default_str();
   c->add_option("--unit", o.build.unit, "unit of the mesh file")
-      ->check(CLI::IsMember({"m", "cm", "mm", "inch"}))
+      ->check(CLI::IsMember(lengthUnits()))
       ->capture_default_str();
   return {c, [options] { return runNew(*options); }};
 }

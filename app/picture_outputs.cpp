@@ -48,9 +48,13 @@ PngFolder::PngFolder(const std::string& path, const Slice& slice)
       keep_(slice.resume) {
   std::error_code error;
   fs::create_directories(folder_, error);
-  if (!error) fs::create_directory(collecting_, error);
-  if (error) throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", path, error.message()));
+  const auto require = [&] {
+    if (error) throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", path, error.message()));
+  };
+  require();
   try {
+    fs::create_directory(collecting_, error);
+    require();
     lock();
     takeOver(slice);
   } catch (...) {

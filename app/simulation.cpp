@@ -73,6 +73,7 @@ void Simulation::advanceFrame() {
 
 void Simulation::advanceFrame(const ServoRecord& servo) {
   record_ = servo;
+  isAwaited_ = true;
   advanceDynamics();
 }
 
@@ -101,8 +102,8 @@ void Simulation::advanceDynamics() {
   const double stepped = wallSeconds();
   std::swap(previous_, current_);
   world_.readFrame(current_);
-  // Without tools nobody feels the surface.
-  if (!loaded_->trajectories.empty()) servo_->commit(previous_, current_, record_.tools[ticksPerFrame_]);
+  // Without tools nobody feels the surface; a servo that runs elsewhere waits for it all the same.
+  if (isAwaited_ || !loaded_->trajectories.empty()) servo_->commit(previous_, current_, record_.tools[ticksPerFrame_]);
   times_.dynamics = stepped - start;
   times_.surface = wallSeconds() - stepped;
   ++frame_;

@@ -112,6 +112,7 @@ class Simulation {
   std::vector<ToolSample> inputs_;
   std::unique_ptr<Servo> servo_;
   ServoRecord record_;
+  bool isAwaited_ = false;  // by a servo that runs elsewhere
   FrameTimes times_;
   RunTotals totals_;
   double lastMismatch_ = 0;

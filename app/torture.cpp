@@ -165,6 +165,7 @@ void scaleNetwork(IdentifiedNetwork& n, double s) {
     l.restPoint0 *= s;
     l.restPoint1 *= s;
     l.stiffness *= s;
+    for (Vector6d* strain : {&l.strain0, &l.strain1}) *strain *= std::sqrt(s);
   }
   for (std::vector<SkinFrame>& of : n.skin)
     for (SkinFrame& f : of) f.restPoint *= s;
@@ -239,7 +240,8 @@ std::shared_ptr<const SoftBodyModel> shuffledModel(const SoftBodyModel& m, BodyD
   std::sort(out->edges.begin(), out->edges.end());
   for (int& node : body.fixedNodes) node = place[node];
   changeNetwork(*out, [&](IdentifiedNetwork& n) {
-    for (std::size_t i = 0; i < order.size(); ++i) n.skin[i] = m.identified->skin[order[i]];
+    // Empty in a model that keeps the formulas.
+    for (std::size_t i = 0; i < n.skin.size(); ++i) n.skin[i] = m.identified->skin[order[i]];
     for (FixedPatch& p : n.patches) {
       for (int& node : p.nodes) node = place[node];
       std::sort(p.nodes.begin(), p.nodes.end());

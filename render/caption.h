@@ -6,8 +6,8 @@
 
 namespace medulla {
 
-// A line of text in the upper left corner of a finished picture, on dark paper. A line that is too long for the picture
-// is written smaller; where no letter could be read (less than 5 rows high) nothing is.
-void drawCaption(const std::string& text, Image& image);
+// A line of text in the upper left corner of a finished picture, on dark paper. A line that is too long for `width`
+// (pixels, at most the picture's) is written smaller; where no letter could be read (less than 5 rows high) nothing is.
+void drawCaption(const std::string& text, int width, Image& image);
 
 }  // namespace medulla

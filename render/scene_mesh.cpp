@@ -18,6 +18,7 @@ void SceneMesh::resizeVertices(std::size_t count) {
   normal.resize(count);
   tangent.resize(count);
   uv.resize(count);
+  detail.resize(count, 1.f);
   albedo.resize(count);
   openness.resize(count, 1.f);
   thinness.resize(count, 0.f);

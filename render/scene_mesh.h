@@ -23,6 +23,7 @@ struct SceneMesh {
   std::vector<glm::vec3> position, normal;
   std::vector<glm::vec3> tangent;  // unit, along the texture's u; v runs along cross(normal, tangent)
   std::vector<glm::vec2> uv;       // of the detail texture, 1 per tile; baked at rest, so that it sticks to the tissue
+  std::vector<float> detail;       // 0..1: share of that texture's colour, none where its coordinates distort it
   std::vector<glm::vec3> albedo;   // linear RGB, baked at rest
   std::vector<float> openness;     // 0..1: share of the cavity's light that arrives (ambient occlusion), baked at rest
   std::vector<float> thinness;     // 0..1: share of light that comes through from behind, baked at rest
@@ -34,8 +35,6 @@ struct SceneMesh {
 
   void resizeVertices(std::size_t count);
 };
-
-using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
 // Area-weighted vertex normals (the sum of cross products) of one part, and what else its triangles tell: area, hollow.
 void computeNormals(SceneMesh& mesh, const MeshPart& part);

@@ -255,7 +255,8 @@ out vec4 pixel;
 void main() {
   float r = dot(place, place);
   vec3 c = mix(vec3(.93, .94, .95), vec3(.66, .69, .73), clamp(.45 * r + .18 * place.y, 0., 1.));
-  pixel = vec4(c, 1);
+  float tremble = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(.06711056, .00583715)))) - .5;
+  pixel = vec4(c + tremble / 255., 1);
 }
 )";
 

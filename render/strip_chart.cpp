@@ -80,6 +80,7 @@ void writeLabels(const StripChart& chart, const Layout& layout, Ink& ink) {
 }  // namespace
 
 void drawStripChart(const StripChart& chart, Image& image) {
+  if (chart.curves.empty()) return;
   const Layout layout(image);
   Ink ink(image);
   ink.fill(layout.low, layout.high);

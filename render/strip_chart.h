@@ -22,7 +22,7 @@ struct StripChart {
   std::vector<StripCurve> curves;
 };
 
-// Over a finished picture.
+// Over a finished picture. Nothing where there are no curves.
 void drawStripChart(const StripChart& chart, Image& image);
 
 }  // namespace medulla

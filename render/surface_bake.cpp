@@ -131,6 +131,38 @@ void gatherDirection(const SceneMesh& mesh, vec3 centre, float radius, vec3 dire
   }
 }
 
+// Longest and shortest way on the texture per way on the triangle, over all directions.
+glm::vec2 stretchOf(const SceneMesh& mesh, const std::uint32_t* t) {
+  const vec3 p = mesh.position[t[1]] - mesh.position[t[0]], q = mesh.position[t[2]] - mesh.position[t[0]];
+  const glm::vec2 u = mesh.uv[t[1]] - mesh.uv[t[0]], v = mesh.uv[t[2]] - mesh.uv[t[0]];
+  // With an orthonormal frame in the triangle, p = (l, 0) and q = (m, h).
+  const float l = std::max(glm::length(p), 1e-12f), m = glm::dot(p, q) / l,
+              h = std::max(glm::length(glm::cross(p, q)) / l, 1e-12f);
+  const glm::vec2 a = u / l, b = (v - a * m) / h;
+  const float mean = 0.5f * (glm::dot(a, a) + glm::dot(b, b)), apart = 0.5f * (glm::dot(a, a) - glm::dot(b, b));
+  const float spread = std::hypot(apart, glm::dot(a, b));
+  return {std::sqrt(mean + spread), std::sqrt(std::max(mean - spread, 0.f))};
+}
+
+// Where a surface curves otherwise than a sphere of its mean radius does, and at the pole that the camera sees last,
+// unrolled coordinates stretch the texture or squeeze it; vessels would show there as blots and hairs.
+void bakeDetail(SceneMesh& mesh, const MeshPart& part) {
+  const std::size_t first = part.firstIndex, last = first + part.indexCount;
+  std::vector<float> sum(mesh.position.size(), 0.f), weight = sum;
+  for (std::size_t k = first; k < last; k += 3) {
+    const glm::vec2 stretch = stretchOf(mesh, &mesh.index[k]) / part.look->detailScale;
+    if (!std::isfinite(stretch.x) || !std::isfinite(stretch.y)) continue;  // a triangle without area
+    const float share = smoothStep(0.2f, 0.45f, stretch.y) * (1 - smoothStep(2.5f, 4.f, stretch.x));
+    for (int corner = 0; corner < 3; ++corner) {
+      sum[mesh.index[k + corner]] += share;
+      weight[mesh.index[k + corner]] += 1;
+    }
+  }
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] = weight[i] > 0 ? sum[i] / weight[i] : 1.f;
+  smoothOverEdges(mesh, first, last, 2, sum);
+  std::copy_n(sum.begin() + part.firstVertex, part.vertexCount, mesh.detail.begin() + part.firstVertex);
+}
+
 }  // namespace
 
 void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
@@ -143,6 +175,7 @@ void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
   const auto tilted = [c, s](vec3 v) { return vec3(v.x, c * v.y - s * v.z, s * v.y + c * v.z); };
   for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
     mesh.uv[i] = unroll(tilted(mesh.position[i]), tilted(glm::normalize(normal[i])), radius) * part.look->detailScale;
+  if (occludes(part)) bakeDetail(mesh, part);
 }
 
 void bakeAlbedo(SceneMesh& mesh, const MeshPart& part) {

@@ -18,6 +18,8 @@ constexpr vec3 kRimLight(0.10f, 0.045f, 0.035f), kVeil(0.085f, 0.022f, 0.016f);
 // Reflectance at normal incidence of a film of water, a little raised (Schlick 1994).
 constexpr float kFilmReflectance = 0.035f;
 
+constexpr float kHorizon = -0.05f;  // cosine to the light from which on all is dark
+
 // Everything about one picture that the vertices share.
 struct Surroundings {
   const Viewpoint& view;
@@ -38,7 +40,8 @@ struct Shading {
   float veil;       // 0..1
   float veilLight;  // of the veil, as exposure is of albedo
   vec3 veilColour;
-  float falloff;  // light's distance and cone
+  float distanceFalloff;  // of the light
+  float falloff;          // with its cone and ripples
   vec3 albedo;
   float openness, thinness;
 };
@@ -52,7 +55,7 @@ Shading shadingOf(const SceneMesh& mesh, const Look& look, std::size_t i, vec3 p
   v.toLight = s.lightView.position - mesh.position[i];
   v.lightDistance = std::max(glm::length(v.toLight), 1e-6f);
   v.toLight /= v.lightDistance;
-  v.falloff = lightFalloff(s.light, v.lightDistance);
+  v.falloff = v.distanceFalloff = lightFalloff(s.light, v.lightDistance);
   if (!s.light.position)
     v.falloff *= smoothStep(s.coneOuter, s.coneInner, -glm::dot(v.toLight, s.lightView.direction));
   else if (s.light.caustics > 0 && !look.encloses)  // backdrops are too coarse for ripples
@@ -85,6 +88,9 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
   const vec3 diffuse = glm::max((cosine + look.wrap) / (reach * reach), 0.f);
   const float crease = look.ambient > 0 ? 0.55f + 0.45f * v.openness : 1.f;
   out.direct = v.albedo * diffuse * s.lamp * (v.falloff * visible * crease);
+  // Behind the horizon the shaders know shadow alone: light that wraps fades towards it, or triangles that lie across
+  // would show as teeth. Of a lamp beside the lens the horizon is the outline, and nothing behind it is seen.
+  if (s.light.position) out.direct *= smoothStep(kHorizon, 0.25f, cosine);
   const vec3 sky = glm::mix(s.below, s.above, v.normal.y * 0.5f + 0.5f) * v.openness;
   // Light that came in elsewhere and leaves where the tissue is thin, most of it sideways.
   if (v.thinness > 0) {
@@ -96,7 +102,8 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
 }
 
 // Polished metal and the sheath's lacquer mirror the cavity: dim red below, pale tissue above, black where the port and
-// the gaps between organs are, and the lamp's wide reflector, seen beside the lens.
+// the gaps between organs are, and the lamp's wide reflector, seen beside the lens. What is mirrored lies in the lamp's
+// cone even where the shaft itself leaves it.
 void lightMetal(const Shading& v, vec3 tangent, LitVertex& out) {
   const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
   const vec3 mirrored = 2.f * v.normal * facing - v.toEye;
@@ -112,7 +119,7 @@ void lightMetal(const Shading& v, vec3 tangent, LitVertex& out) {
   const float edge = facing < 0 ? 0.f : fresnelEdge(v);
   out.direct = v.albedo * (std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 0.10f * visible);
   out.ambient = ((v.albedo * 1.15f + 0.022f + 0.10f * edge) * cavity + (0.45f * v.albedo + 0.09f) * streak) *
-                (v.openness * visible * std::min(v.falloff, 1.4f));
+                (v.openness * visible * std::min(v.distanceFalloff, 1.4f));
 }
 
 // Can the highlight be seen anywhere within the slopes of the relief? (Most pixels of tissue cannot: they go to a
@@ -184,7 +191,7 @@ Shade shadeVertex(const ShadowMap& shadow, vec3 texel, float spacing, const Shad
     out.shadowRadius = std::min(1.2f + 0.03f * std::max(gap, 0.f) / metresPerTexel, 7.f);
     out.shadowBias = 0.0007f + 1.8f * depthPerMetre * metresPerTexel * (out.shadowRadius + 0.7f) * slope;
   }
-  if (cosine < -0.05f) return Shade::dark;
+  if (cosine < kHorizon) return Shade::dark;
   return lit == tried ? Shade::lit : lit == 0 ? Shade::dark : Shade::edge;
 }
 
@@ -224,7 +231,7 @@ Shading lightVertex(const SceneMesh& mesh, const Look& look, std::size_t i, vec3
                     LitVertex& o) {
   o.position = mesh.position[i];
   o.uv = mesh.uv[i];
-  o.detail = 1 - look.blood * mesh.blanch[i] * std::max(mesh.blanch[i], 0.f);
+  o.detail = mesh.detail[i] * (1 - look.blood * mesh.blanch[i] * std::max(mesh.blanch[i], 0.f));
   const Shading v = shadingOf(mesh, look, i, picture, s);
   if (look.metal)
     lightMetal(v, mesh.tangent[i], o);

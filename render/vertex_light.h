@@ -20,7 +20,7 @@ struct LitVertex {
   glm::vec3 halfway;   // between light and eye: along tangent, bitangent, normal
   float shadowBias;    // depth
   glm::vec2 uv;
-  float detail;  // 0..1: share of the texture's colour; none where the blood is pressed out
+  float detail;  // 0..1: share of the texture's colour; none where the blood is pressed out or the texture distorted
 };
 
 // Highlight of a look: two lobes c / (1 + (a - 1) cos^2)^2 (GGX, Walter et al. 2007), the tissue's and the wet film's.

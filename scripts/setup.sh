@@ -65,14 +65,19 @@ installPackages() {
   if compgen -G '/var/lib/apt/lists/*_Packages*' > /dev/null && aptInstall; then return; fi
   say "fetching the package lists"
   "${as[@]}" apt-get update -qq >&2
-  aptInstall || { say "installing failed; apt-get said:" && tail -n 20 "$aptLog" >&2 && return 1; }
+  if aptInstall; then return; fi
+  say "installing failed; apt-get said:"
+  tail -n 20 "$aptLog" >&2
+  return 1
 }
 
 # aptInstall: the call itself; reads `as` and `missing` of its caller. What apt and dpkg say goes to $aptLog, and their
 # progress to a descriptor of its own, opened behind sudo, which closes those it is given: on the standard output of
 # packages' scripts it makes their writing fail where /dev/pts is not mounted and apt cannot give them a terminal.
 aptInstall() {
-  aptLog=$(mktemp -t medulla_apt.XXXXXX)
+  aptLog=${aptLog:-$(mktemp -t medulla_apt.XXXXXX)}
+  # shellcheck disable=SC2064
+  trap "rm -f '$aptLog'" EXIT
   # shellcheck disable=SC2016
   "${as[@]}" env DEBIAN_FRONTEND=noninteractive sh -c 'exec apt-get install -y -qq --no-install-recommends \
     -o DPkg::Lock::Timeout=300 -o APT::Status-Fd=3 "$@" 3>&1 >&2' apt-get "${missing[@]}" 2> "$aptLog" < /dev/null |

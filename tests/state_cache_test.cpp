@@ -163,6 +163,8 @@ TEST_F(CacheOfScene, OfAnotherMotionItIsRefusedOfAnotherPictureNot) {
   EXPECT_EQ(render({"--frames", "0:1", "-o", "other"}).exitCode, 0);
   expectRefused(render({"--fps", "24", "-o", "x.png", "--still", "0"}), "holds 25 pictures per second, expected 24");
   expectRefused(render({"--still", "0.3", "-o", "x.png"}), "none at 0.3 s");
+  for (const std::string drawn : {"camera.fov=50", "light.intensity=2", "output.size=64 48", "body.organ.look=gut"})
+    EXPECT_EQ(render({"--set", drawn, "-o", "drawn"}).exitCode, 0) << drawn;
   expectRefused(render({"--set", "dynamics.gravity=0 0 1", "-o", "x"}), "organ.cache: is of another scene or stale");
   write({.young = "6e3"});
   expectRefused(render({"-o", "x"}), "organ.cache: is of another scene or stale");

@@ -151,7 +151,7 @@ void Artist::takePanel() {
   desk.begun.pop_front();
   times_.start("letters");
   if (sheet->chart) drawStripChart(*sheet->chart, desk.image);
-  if (!sheet->caption.empty()) drawCaption(sheet->caption, desk.image);
+  if (!sheet->caption.empty()) drawCaption(sheet->caption, panelWidth_, desk.image);
   times_.start("hand over");
   desk.outputs.write(sheet->number, desk.image);
   ++drawn_;

@@ -29,14 +29,17 @@ struct ChartMethod {
   bool anyModel = true;  // has it
 };
 const std::vector<ChartMethod>& chartMethods() {
+  // Each says all that it is named after, so that it is that in any scene.
+  static const SceneOverride kExplicit{"dynamics.integrator", "explicit"}, kFirstOrder{"dynamics.order", "1"},
+      kImplicit{"dynamics.integrator", "implicit"};
   static const std::vector<ChartMethod> methods = {
-      {"full", {{"body.*.surface", "full"}}},
-      {"contact", {{"body.*.surface", "contact"}}},
-      {"skin", {{"body.*.surface", "skin"}}},
-      {"springs", {{"body.*.links", "springs"}}},
-      {"implicit", {{"dynamics.integrator", "implicit"}}},
-      {"implicit_2", {{"dynamics.integrator", "implicit"}, {"dynamics.order", "2"}}},
-      {"identified", {{"body.*.links", "identified"}}, false},
+      {"full", {kExplicit, kFirstOrder, {"body.*.surface", "full"}}},
+      {"contact", {kExplicit, kFirstOrder, {"body.*.surface", "contact"}}},
+      {"skin", {kExplicit, kFirstOrder, {"body.*.surface", "skin"}}},
+      {"springs", {kExplicit, kFirstOrder, {"body.*.links", "springs"}}},
+      {"implicit", {kImplicit, kFirstOrder}},
+      {"implicit_2", {kImplicit, {"dynamics.order", "2"}}},
+      {"identified", {kExplicit, kFirstOrder, {"body.*.links", "identified"}}, false},
   };
   return methods;
 }
@@ -209,20 +212,31 @@ ChartTruth runReference(std::vector<ChartRun>& runs, const LoadedScene& base,
   return truth;
 }
 
+// What a simulated second takes, in explicit steps, for the progress bar alone.
+double workPerSecond(const ChartRun& run) {
+  constexpr double kImplicit = 30;  // one of its steps, with seven to a hundred spheres: 10 to 60
+  const bool implicit = std::any_of(run.options.overrides.begin(), run.options.overrides.end(),
+                                    [](const SceneOverride& o) { return o.value == "implicit"; });
+  return (implicit ? kImplicit : 1) / run.step;
+}
+
 std::vector<ChartPoint> executeAll(std::vector<ChartRun> runs, const LoadedScene& base, ChartTruth& truth) {
-  Progress progress("chart", base.scene.duration * static_cast<double>(runs.size()), "s");
-  double done = 0;
-  const auto update = [&](double simulated) { progress.update(done + simulated); };
+  double work = 0, done = 0, perSecond = 0;  // perSecond: of the run that goes on
+  for (const ChartRun& run : runs) work += workPerSecond(run) * base.scene.duration;
+  Progress progress("chart", work, "steps");
+  const auto update = [&](double simulated) { progress.update(done + perSecond * simulated); };
   if (namesReference(base)) {
     truth = truthOfReferences(base);
   } else {
+    perSecond = workPerSecond(runs.back());
     truth = runReference(runs, base, update);
-    done += base.scene.duration;
+    done += perSecond * base.scene.duration;
   }
   std::vector<ChartPoint> points;
   for (const ChartRun& run : runs) {
+    perSecond = workPerSecond(run);
     Outcome out = executeQuickest(run, base.scene.duration, update);
-    done += base.scene.duration;
+    done += perSecond * base.scene.duration;
     if (truth.cost == ChartCost::ofTheCase) out.point.cpu *= base.scene.duration;
     if (!out.point.failedAt) measureErrors(base, truth, out.moments, out.point);
     points.push_back(out.point);
@@ -297,18 +311,6 @@ std::vector<std::string> chartMethodNames(bool ofAnyModel) {
   return out;
 }
 
-// The picture that gnuplot makes of a script, and the script itself.
-static void draw(const std::string& stem, const std::string& text) {
-  const std::string script = stem + ".gnuplot", picture = stem + ".svg";
-  writeText(script, text);
-  if (const std::optional<std::string> svg = runGnuplot(text)) {
-    writeText(picture, *svg);
-  } else {
-    fmt::print(stderr, "no {}: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {} > {}\n",
-               fs::path(picture).filename().string(), script, picture);
-  }
-}
-
 int runChart(const ChartOptions& options) {
   const LoadedScene base = loadRun(options.run);
   const std::string chart = (fs::path(options.folder) / "chart").string(),
@@ -322,11 +324,11 @@ int runChart(const ChartOptions& options) {
   const std::vector<ChartRun> runs = planRuns(options, base);
   const std::vector<ChartPoint> points = executeAll(runs, base, truth);
   writeChart(chart + ".csv", points, truth.cost);
-  draw(chart, chartScript(base.scene.name, points, truth.cost));
+  drawByGnuplot(chart, chartScript(base.scene.name, points, truth.cost));
   if (options.models.size() > 1) {
     const std::vector<SphereChartRow> rows = sphereRows(options, base, runs, points);
     writeSphereChart(spheres + ".csv", rows, truth.cost);
-    draw(spheres, sphereChartScript(base.scene.name, rows, truth.cost));
+    drawByGnuplot(spheres, sphereChartScript(base.scene.name, rows, truth.cost));
   }
   printResults(chartResults(points, truth));
   return 0;

@@ -54,13 +54,17 @@ std::vector<Result> modelResults(const SoftBodyModel& model) {
   return results;
 }
 
+std::size_t linkCount(const SceneBody& body, const SoftBodyModel& model) {
+  return body.links == LinkModel::identified ? model.identified->links.size() : model.links.size();
+}
+
 void addBody(const SceneBody& body, const SoftBodyModel& model, std::vector<Result>& results) {
   const auto add = [&](const char* name, const std::string& value, const char* unit) {
     results.push_back({fmt::format("body.{}.{}", body.name, name), value, unit});
   };
   const double volume = enclosedVolume({model.restNodes, model.triangles});
   add("spheres", text(model.spheres.size()), "");
-  add("links", text(body.links == LinkModel::identified ? model.identified->links.size() : model.links.size()), "");
+  add("links", text(linkCount(body, model)), "");
   add("nodes", text(model.restNodes.size()), "");
   add("triangles", text(model.triangles.size()), "");
   add("mass", text(volume * body.tissue.density), "kg");
@@ -92,10 +96,11 @@ std::vector<Result> sceneResults(const LoadedScene& loaded) {
   const Simulation simulation(loaded);
   const World& world = simulation.world();
   std::size_t spheres = 0, links = 0, nodes = 0;
-  for (const auto& model : loaded.models) {
-    spheres += model->spheres.size();
-    links += model->links.size();
-    nodes += model->restNodes.size();
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const SoftBodyModel& model = *loaded.models[b];
+    spheres += model.spheres.size();
+    links += linkCount(scene.bodies[b], model);
+    nodes += model.restNodes.size();
   }
   std::vector<Result> results = {{"kind", "scene", ""},
                                  {"name", scene.name, ""},

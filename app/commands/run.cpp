@@ -333,10 +333,13 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
     if (options.untilRest) rest.afterFrame(simulation);
     if (options.untilRest && !rest.atRest() && simulation.finished()) rest.fail(simulation.time());
     last = simulation.finished() || rest.atRest();
-    log.afterFrame(simulation);
-    motions.afterFrame(simulation);
+    // A servo that runs elsewhere hands over its rest first, a frame before the motion begins.
+    if (simulation.record().start >= 0) {
+      log.afterFrame(simulation);
+      motions.afterFrame(simulation);
+      forces.afterFrame(simulation);
+    }
     frameTimes.afterFrame(simulation);
-    forces.afterFrame(simulation);
     surfaces.afterFrame(simulation, last);
     cache.afterFrame(simulation);
     afterFrame();

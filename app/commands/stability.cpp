@@ -183,17 +183,9 @@ StabilityTables runTrials(const StabilityOptions& options, const BodyDescription
 }
 
 void writeTables(const fs::path& folder, const std::string& title, const StabilityTables& tables) {
-  const std::string script = (folder / "stability.gnuplot").string();
   writeStability((folder / "map.csv").string(), tables.map);
   writeStability((folder / "trials.csv").string(), tables.trials);
-  const std::string text = stabilityScript(title, tables.map, tables.trials, tables.limit);
-  writeText(script, text);
-  if (const std::optional<std::string> svg = runGnuplot(text)) {
-    writeText((folder / "stability.svg").string(), *svg);
-  } else {
-    fmt::print(stderr, "no stability.svg: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {}\n",
-               script);
-  }
+  drawByGnuplot((folder / "stability").string(), stabilityScript(title, tables.map, tables.trials, tables.limit));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "app/files/gnuplot.h"
 
+#include <fmt/format.h>
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -7,7 +8,10 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
+
+#include "app/files/output_file.h"
 
 extern char** environ;
 
@@ -68,6 +72,17 @@ std::optional<std::string> runGnuplot(const std::string& script) {
   while (!complaint.empty() && (complaint.back() == '\n' || complaint.back() == ' ')) complaint.pop_back();
   complaint.erase(0, complaint.rfind('\n') + 1);
   throw std::runtime_error("gnuplot failed: " + (complaint.empty() ? "it gave no reason" : complaint));
+}
+
+void drawByGnuplot(const std::string& stem, const std::string& script) {
+  const std::string source = stem + ".gnuplot", picture = stem + ".svg";
+  writeText(source, script);
+  if (const std::optional<std::string> svg = runGnuplot(script)) {
+    writeText(picture, *svg);
+  } else {
+    fmt::print(stderr, "no {}: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {} > {}\n",
+               std::filesystem::path(picture).filename().string(), source, picture);
+  }
 }
 
 }  // namespace medulla

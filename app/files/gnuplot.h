@@ -9,4 +9,8 @@ namespace medulla {
 // with gnuplot's complaint.
 std::optional<std::string> runGnuplot(const std::string& script);
 
+// The script into STEM.gnuplot and what gnuplot makes of it into STEM.svg; without gnuplot a line on standard error
+// says how to draw it.
+void drawByGnuplot(const std::string& stem, const std::string& script);
+
 }  // namespace medulla

@@ -33,12 +33,15 @@ void requireMeshFile(const std::string& path) {
 
 }  // namespace
 
+const std::vector<std::string>& lengthUnits() {
+  static const std::vector<std::string> units = {"m", "cm", "mm", "micron", "inch"};
+  return units;
+}
+
 double metresPerUnit(const std::string& unit) {
-  if (unit == "m") return 1;
-  if (unit == "cm") return 0.01;
-  if (unit == "mm") return 0.001;
-  if (unit == "micron") return 1e-6;
-  if (unit == "inch") return 0.0254;
+  constexpr double metres[] = {1, 0.01, 0.001, 1e-6, 0.0254};
+  for (std::size_t k = 0; k < lengthUnits().size(); ++k)
+    if (unit == lengthUnits()[k]) return metres[k];
   throw std::runtime_error("unknown unit '" + unit + "', expected m, cm, mm, micron or inch");
 }
 

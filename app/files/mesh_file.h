@@ -1,12 +1,15 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "physics/model/triangle_mesh.h"
 
 namespace medulla {
 
-// Metres per unit of a file: m, cm, mm, micron or inch. Throws std::runtime_error naming the known units.
+const std::vector<std::string>& lengthUnits();  // m, cm, mm, micron, inch
+
+// Metres per unit of a file. Throws std::runtime_error naming the known units.
 double metresPerUnit(const std::string& unit);
 
 // Reads a triangle mesh. OBJ and OFF by a reader of our own (vertex order kept, double precision, indices checked,

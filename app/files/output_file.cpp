@@ -27,6 +27,7 @@ static std::string resolveTarget(const std::string& path) {
   std::error_code error;
   const bool link = std::filesystem::is_symlink(path, error);
   std::string target = link ? std::filesystem::weakly_canonical(path, error).string() : path;
+  if (target.empty()) target = path;  // a link to a pipe, or to itself
   struct stat status {};
   if (::stat(target.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) throw inputError(path, 0, "is a folder, expected the name of a file to write");

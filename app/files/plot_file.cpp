@@ -40,10 +40,10 @@ constexpr const char *kContactShade = "#dcebf7", *kHeldShade = "#fde3c4";
 
 // ---- What the log holds ----------------------------------------------------------------------------------
 
-Series column(const LogTable& log, const std::string& name) {
+Series column(const LogTable& log, const std::string& name, const char* expected = "a log of a run (--log)") {
   const auto found = std::find(log.columns.begin(), log.columns.end(), name);
   if (found == log.columns.end())
-    throw inputError(log.path, 0, fmt::format("column {} is missing, expected a log of a run (--log)", name));
+    throw inputError(log.path, 0, fmt::format("column {} is missing, expected {}", name, expected));
   Series out;
   out.reserve(log.value.size());
   for (const auto& row : log.value) out.push_back(row[static_cast<std::size_t>(found - log.columns.begin())]);
@@ -155,10 +155,11 @@ std::vector<Panel> panelsOf(const LogTable& log, const Series& time) {
 Panel panelOfFrameTimes(const LogTable& times) {
   Panel panel;
   panel.title = "what a dynamics frame took, ms";
-  panel.time = column(times, "t");
+  const char* expected = "the times of a run's frames (--frame-times)";
+  panel.time = column(times, "t", expected);
   panel.fromZero = true;
   for (const char* name : {"servo", "dynamics", "surface"})
-    panel.curves.push_back(line(name, panel.curves.size(), 1.3, column(times, name)));
+    panel.curves.push_back(line(name, panel.curves.size(), 1.3, column(times, name, expected)));
   return panel;
 }
 

@@ -114,9 +114,9 @@ void readLayout(const XmlElement& e, RecordingColumns& columns) {
 }
 
 void readUnits(const XmlElement& e, RecordingMap& map) {
-  const std::vector<std::string> lengths = {"m", "cm", "mm", "micron", "inch"}, times = {"s", "ms", "us", "ns"};
+  const std::vector<std::string> times = {"s", "ms", "us", "ns"};
   constexpr double seconds[] = {1, 1e-3, 1e-6, 1e-9};
-  map.metresPerUnit = metresPerUnit(lengths[readNamed(e, "length", lengths, "m")]);
+  map.metresPerUnit = metresPerUnit(lengthUnits()[readNamed(e, "length", lengthUnits(), "m")]);
   if (!e.find("time")) return;
   for (RecordingColumns& columns : map.layouts) columns.secondsPerUnit = seconds[readNamed(e, "time", times, "s")];
 }

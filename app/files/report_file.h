@@ -16,9 +16,10 @@ struct Result {
 // The quality report of a model build, in the order in which it is shown.
 std::vector<Result> buildResults(const BuildReport& report);
 
-// Sums over the bodies of one build; the cover is that of all volumes together, the gap the largest in metres.
 // `formulas`: of the beams' formulas on the bulk loads, where they were tried.
 std::vector<Result> identifiedResults(const IdentifiedNetwork& network, const std::optional<IdentifiedError>& formulas);
+
+// Sums over the bodies of one build; the cover is that of all volumes together, the gap the largest in metres.
 std::vector<Result> totalResults(const std::vector<BuildReport>& reports);
 
 // CSV with the header name,value,unit. Errors are those of OutputFile.

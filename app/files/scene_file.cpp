@@ -9,6 +9,7 @@
 
 #include "app/files/content_hash.h"
 #include "app/files/joined.h"
+#include "app/files/mesh_file.h"
 #include "app/files/placement.h"
 #include "app/files/scene_overrides.h"
 #include "app/files/scene_rules.h"
@@ -302,8 +303,7 @@ void readStatics(const XmlElement& root, Scene& scene) {
     out.contact = readChoice(*e, "contact", {"false", "true"}, mesh ? 0 : 1) == 1;
     out.look = readText(*e, "look");
     if (out.look.empty() && !out.contact) refuse(*e, "shape", "without contact and without a look it has no effect");
-    const std::vector<std::string> units = {"m", "cm", "mm", "inch"};
-    out.unit = units[readChoice(*e, "unit", units, 0)];
+    out.unit = lengthUnits()[readChoice(*e, "unit", lengthUnits(), 0)];
     scene.statics.push_back(std::move(out));
   }
 }
@@ -409,13 +409,21 @@ void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene)
   readCaptions(output, scene);
 }
 
+// An element that says nothing is as good as none: overrides leave such behind, and attributes in another order.
+bool saysSomething(const XmlElement& e) {
+  return !e.attributes.empty() || !e.children.empty() || !e.text.empty();
+}
+
 // Each name, value and text ends in a zero, each element in two: so no two trees have the same bytes.
 std::uint64_t hashOf(const XmlElement& e, bool motionOnly, std::uint64_t hash) {
   const auto add = [&hash](const std::string& word) {
     hash = contentHash(std::string_view("\0", 1), contentHash(word, hash));
   };
   add(e.name);
-  for (const XmlAttribute& a : e.attributes) {
+  std::vector<XmlAttribute> attributes = e.attributes;
+  std::sort(attributes.begin(), attributes.end(),
+            [](const XmlAttribute& a, const XmlAttribute& b) { return a.name < b.name; });
+  for (const XmlAttribute& a : attributes) {
     if (motionOnly && a.name == "look") continue;
     add(a.name);
     add(a.value);
@@ -423,7 +431,7 @@ std::uint64_t hashOf(const XmlElement& e, bool motionOnly, std::uint64_t hash) {
   add(e.text);
   for (const XmlElement& child : e.children) {
     const bool drawing = child.name == "camera" || child.name == "light" || child.name == "output";
-    if (!(motionOnly && drawing)) hash = hashOf(child, motionOnly, hash);
+    if (saysSomething(child) && !(motionOnly && drawing)) hash = hashOf(child, motionOnly, hash);
   }
   return contentHash(std::string_view("\0", 1), hash);
 }

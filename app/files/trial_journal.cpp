@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -40,13 +41,25 @@ StabilityPoint pointOf(const CsvRows& row) {
 
 TrialJournal::TrialJournal(std::string path, std::uint64_t run)
     : path_(std::move(path)), head_(fmt::format("# medulla stability {:016x}\n", run)) {
+  lock();
   if (std::filesystem::exists(path_)) read();
   writeAnew();  // without a row's beginning, and without trials of another run
 }
 
+// Of the folder: the file itself is replaced.
+void TrialJournal::lock() {
+  const std::string folder = std::filesystem::absolute(path_).parent_path().string();
+  lock_ = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (lock_ >= 0 && ::flock(lock_, LOCK_EX | LOCK_NB) == 0) return;
+  const bool taken = errno == EWOULDBLOCK;
+  if (lock_ >= 0) ::close(lock_);
+  throw inputError(path_, 0, taken ? "another run is filling it" : std::string("cannot be locked: ") + std::strerror(errno));
+}
+
 TrialJournal::~TrialJournal() {
   if (known_.empty()) ::unlink(path_.c_str());
-  if (descriptor_ >= 0) ::close(descriptor_);
+  for (const int descriptor : {descriptor_, lock_})
+    if (descriptor >= 0) ::close(descriptor);
 }
 
 void TrialJournal::read() {

@@ -15,7 +15,7 @@ namespace medulla {
 class TrialJournal {
  public:
   // `run` is all that the trials' outcomes follow from; rows of another run are dropped. Throws std::runtime_error
-  // where the file cannot be read or written.
+  // where the file cannot be read or written, or another run keeps one in the same folder.
   TrialJournal(std::string path, std::uint64_t run);
   ~TrialJournal();  // without trials there is no file
   TrialJournal(const TrialJournal&) = delete;
@@ -29,12 +29,13 @@ class TrialJournal {
   const std::string& path() const { return path_; }
 
  private:
+  void lock();
   void read();
   void writeAnew();
   void append(const std::string& text);
 
   std::string path_, head_;
-  int descriptor_ = -1;
+  int lock_ = -1, descriptor_ = -1;
   std::map<std::string, StabilityPoint> known_;
 };
 

@@ -139,7 +139,7 @@ class World {
   const std::vector<BodyOverlap>& startOverlaps() const;
   std::uint64_t stateHash() const;  // FNV-1a over every state variable's bits
 
-  WorldData& data() { return *data_; }  // for tests and benchmarks: states that no scene can reach
+  WorldData& data() { return *data_; }  // for tortures, tests and benchmarks: states that no scene can reach
   const WorldData& data() const { return *data_; }
 
  private:

@@ -66,7 +66,7 @@ constexpr double kStraightBelow = 0.75;
 
 struct LinkGroup {  // constants of four links
   std::uint32_t sphere0[4], sphere1[4];
-  Lanes3 restT, restU, restV;           // centre line and section axes at rest, in both spheres' frames
+  Lanes3 restT, restU;                  // centre line and a section axis at rest, in both spheres' frames
   Lanes restLength, inverseRestLength;  // m, 1/m
   Lanes smallestLength;                 // m; forces divide by no less
   Lanes3 restArm0, restArm1;            // m, sphere frames: from the frame to where the link ends
