@@ -175,14 +175,11 @@ std::string fileOf(const std::string& scene, std::string path) {
 void readPictures(const RenderArguments& a, RenderOptions& options) {
   if (!a.size.empty()) {
     options.size = splitPair(a.size, 'x');
-    const auto valid = [](int n) { return n >= 16 && n <= 8192 && n % 2 == 0; };
-    if (!options.size || !valid(options.size->first) || !valid(options.size->second))
-      usageError("--size", a.size, "WIDTHxHEIGHT, even numbers from 16 to 8192 (video needs them even)");
+    if (!options.size) usageError("--size", a.size, "WIDTHxHEIGHT, even numbers from 16 to 8192");
   }
   if (!a.frames.empty()) {
     options.frames = splitPair(a.frames, ':');
-    if (!options.frames || options.frames->first >= options.frames->second)
-      usageError("--frames", a.frames, "A:B, whole numbers, B excluded and more than A");
+    if (!options.frames) usageError("--frames", a.frames, "A:B, whole numbers, B excluded");
   }
   if (!a.fps.empty()) {
     options.fps = parseNumber<double>(a.fps);

@@ -35,7 +35,8 @@ struct TickTimes {
     for (const std::atomic<int>& c : count) total += c;
     for (int bin = 0; bin + 1 < bins; ++bin) {
       sum += count[bin];
-      if (static_cast<double>(sum) >= share * static_cast<double>(total)) return std::min(width * (bin + 1), longest.load());
+      if (static_cast<double>(sum) >= share * static_cast<double>(total))
+        return std::min(width * (bin + 1), longest.load());
     }
     return longest;
   }

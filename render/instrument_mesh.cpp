@@ -32,6 +32,7 @@ class Builder {
     mesh_.tangent.push_back(worldFromTool_ * glm::normalize(glm::cross(aside, n)));
     mesh_.uv.push_back(40.f * glm::vec2(p.z, p.x + p.y));
     mesh_.albedo.push_back(albedo);
+    mesh_.detail.push_back(1);
     mesh_.openness.push_back(openness);
     for (auto* none : {&mesh_.thinness, &mesh_.area, &mesh_.hollow, &mesh_.blanch}) none->push_back(0);
     return i;

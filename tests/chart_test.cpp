@@ -228,6 +228,21 @@ TEST_F(ChartCommand, GnuplotDrawsIt) {
   EXPECT_TRUE(svg.ends_with("</svg>\n\n") || svg.ends_with("</svg>\n")) << svg.substr(svg.size() - 20);
 }
 
+TEST_F(ChartCommand, MethodsAreWhatTheyAreNamedAfterInAnyScene) {
+  const ProgramResult r =
+      chart({"--steps", "1", "--methods", "full,implicit,implicit_2", "--set", "dynamics.integrator=implicit", "--set",
+             "dynamics.order=2", "--set", "clock.duration=0.1"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  const auto rows = rowsOf(folder / "out/chart.csv");
+  ASSERT_EQ(rows.size(), 4u);
+  const auto errorOf = [&](std::size_t row) {
+    const auto column = std::find(rows[0].begin(), rows[0].end(), "error_max[%]") - rows[0].begin();
+    return rows[row].at(static_cast<std::size_t>(column));
+  };
+  EXPECT_NE(errorOf(1), errorOf(2));
+  EXPECT_NE(errorOf(2), errorOf(3));
+}
+
 TEST_F(ChartCommand, WhereEveryRunFailsPicturesShowThat) {
   if (std::system("gnuplot --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "gnuplot is not installed";
   const std::string assets = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/", model = folder / "three.xml";

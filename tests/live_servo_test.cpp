@@ -5,7 +5,10 @@
 #include <array>
 #include <thread>
 
+#include "app/files/trajectory_file.h"
 #include "haptics/triple_buffer.h"
+#include "tests/program_run.h"
+#include "tests/temporary_folder.h"
 
 namespace medulla {
 
@@ -53,6 +56,7 @@ TEST(LiveServo, RunsAgainstTheClockAndFeelsContact) {
   EXPECT_GT(simulation.totals().forceMax, 0.05);
   EXPECT_GT(report.cpuMedian, 0);
   EXPECT_LE(report.cpuMedian, report.cpu999);
+  EXPECT_LE(report.cpu999, report.cpuMax);
 }
 
 TEST(LiveServo, WhatTheServoRefusesReachesTheCaller) {
@@ -68,6 +72,37 @@ TEST(LiveServo, WhatTheServoRefusesReachesTheCaller) {
         while (!simulation.finished()) live.advanceFrame();
       },
       std::runtime_error);
+}
+
+static const std::string kScenes = std::string(MEDULLA_SOURCE_DIR) + "/scenes/";
+
+TEST(RealtimeCommand, TellsTheServosTimes) {
+  const ProgramResult run =
+      runProgram({"replay", kScenes + "gallbladder.xml", "--set", "clock.duration=0.3", "--realtime"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  for (const char* name : {"servo_ticks", "servo_cpu_p50", "servo_cpu_p99.9", "servo_cpu_max", "servo_late",
+                           "servo_latest", "surface_stood", "hash"})
+    EXPECT_NE(("\n" + run.out).find(std::string("\n") + name + " "), std::string::npos) << name << " in\n" << run.out;
+}
+
+TEST(RealtimeCommand, AlsoOfASceneWithoutTools) {
+  const ProgramResult run =
+      runProgram({"replay", kScenes + "dolphin.xml", "--set", "clock.duration=0.2", "--realtime"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+}
+
+// The rest that the servo hands over before the motion begins is no part of it.
+TEST(RealtimeCommand, WhatItRecordsAndLogsBeginsWithTheMotion) {
+  const TemporaryFolder folder;
+  const std::string hand = folder / "hand.csv", log = folder / "run.csv";
+  const ProgramResult run = runProgram({"replay", kScenes + "gallbladder.xml", "--set", "clock.duration=0.3",
+                                        "--realtime", "--record", hand, "--log", log, "--log-rate", "tick"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const Trajectory recorded = readTrajectory(hand);
+  EXPECT_EQ(recorded.samples.front().time, 0);
+  EXPECT_NEAR(recorded.samples[1].time, 1 / 1200.0, 1e-9);
+  const std::string rows = readFile(log), first = rows.substr(rows.find('\n') + 1, 20);
+  EXPECT_GT(std::stod(first), 0) << first;
 }
 
 // ---- Embree ----------------------------------------------------------------------------------------------

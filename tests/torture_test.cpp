@@ -32,6 +32,17 @@ BodyDescription identifiedTube() {
   return body;
 }
 
+// Identified as one of beams: nothing but what says so.
+BodyDescription tubeThatKeepsFormulas() {
+  BodyDescription body = heldTube();
+  auto model = std::make_shared<SoftBodyModel>(*body.model);
+  auto network = std::make_shared<IdentifiedNetwork>();
+  network->usesFormulas = true;
+  model->identified = network;
+  body.model = model;
+  return body;
+}
+
 class Torture : public testing::TestWithParam<std::string> {};
 
 // The whole set at the steps where explicit methods have long failed.
@@ -72,6 +83,11 @@ TEST(TortureOfExplicitSteps, FailsBeyondTheLimitAndSaysSo) {
   EXPECT_FALSE(failed.survived);
   EXPECT_FALSE(failed.recoveredAt);
   EXPECT_GT(failed.largestEnergy, failed.startEnergy);
+}
+
+TEST(TortureOfExplicitSteps, OfAModelThatKeepsTheFormulasLikewise) {
+  for (const char* trial : {"shuffled", "scale_0.1", "scale_10"})
+    EXPECT_TRUE(torture(tubeThatKeepsFormulas(), tortureMethods()[0], trial, 1e-4).survived) << trial;
 }
 
 TEST(TortureOfExplicitSteps, UnknownTrialsAndFreeBodiesAreRefused) {

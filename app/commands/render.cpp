@@ -15,7 +15,13 @@ namespace medulla {
 namespace {
 
 void applyOverrides(const RenderOptions& options, Scene& scene) {
-  if (options.size) std::tie(scene.width, scene.height) = *options.size;
+  if (options.size) {
+    std::tie(scene.width, scene.height) = *options.size;
+    const auto valid = [](int n) { return n >= 16 && n <= 8192 && n % 2 == 0; };
+    if (!valid(scene.width) || !valid(scene.height))
+      throw std::runtime_error(fmt::format(
+          "--size {}x{}: expected even numbers from 16 to 8192 (video needs them even)", scene.width, scene.height));
+  }
   if (options.fps) scene.fps = *options.fps;
 }
 

@@ -53,7 +53,8 @@ void TrialJournal::lock() {
   if (lock_ >= 0 && ::flock(lock_, LOCK_EX | LOCK_NB) == 0) return;
   const bool taken = errno == EWOULDBLOCK;
   if (lock_ >= 0) ::close(lock_);
-  throw inputError(path_, 0, taken ? "another run is filling it" : std::string("cannot be locked: ") + std::strerror(errno));
+  throw inputError(path_, 0,
+                   taken ? "another run is filling it" : std::string("cannot be locked: ") + std::strerror(errno));
 }
 
 TrialJournal::~TrialJournal() {
