@@ -20,7 +20,7 @@ Look liver() {
   l.glow = {0.46f, 0.055f, 0.024f};
   l.glowDepth = 0.008f;
   l.blood = 0.75f;
-  l.bloodless = {0.36f, 0.185f, 0.120f};
+  l.bloodless = {0.44f, 0.168f, 0.135f};
   l.roughness = 0.40f;
   l.wetRoughness = 0.13f;
   l.mottle = 0.95f;
