@@ -41,6 +41,10 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   // reach to its far side along the shaft.
   instrument.tip = toGlm(state.proxy - tool.settings.radius * (input.worldFromTool * Eigen::Vector3d::UnitZ()));
   instrument.worldFromTool = toGlm(input.worldFromTool);
+  // Instruments are 5 mm across whatever sphere feels for them; beside bodies that are no organs they are in
+  // proportion.
+  constexpr double kThinnest = 1.5e-3, kThickest = 7e-3;  // m
+  instrument.scale = float(tool.settings.radius / std::clamp(tool.settings.radius, kThinnest, kThickest));
   // A grip of 0.5 is where the jaws meet tissue and hold it.
   constexpr double kOpenJaw = 0.38, kClosedJaw = 0.03;  // rad
   instrument.jawAngle = float(kClosedJaw + (kOpenJaw - kClosedJaw) * std::max(0.0, 1 - 2 * input.grip));

@@ -22,11 +22,14 @@ constexpr vec3 kSteel(0.50f, 0.50f, 0.52f), kSheath(0.020f, 0.020f, 0.022f);
 class Builder {
  public:
   Builder(const Instrument& instrument, SceneMesh& mesh)
-      : mesh_(mesh), worldFromTool_(glm::mat3_cast(instrument.worldFromTool)), tip_(instrument.tip) {}
+      : mesh_(mesh),
+        worldFromTool_(glm::mat3_cast(instrument.worldFromTool)),
+        tip_(instrument.tip),
+        scale_(instrument.scale) {}
 
   std::uint32_t vertex(vec3 p, vec3 n, vec3 albedo, float openness = 1) {
     const auto i = std::uint32_t(mesh_.position.size());
-    mesh_.position.push_back(tip_ + worldFromTool_ * p);
+    mesh_.position.push_back(tip_ + worldFromTool_ * (scale_ * p));
     mesh_.normal.push_back(worldFromTool_ * glm::normalize(n));
     const vec3 aside = std::abs(n.z) < 0.9f * glm::length(n) ? vec3(0, 0, 1) : vec3(1, 0, 0);
     mesh_.tangent.push_back(worldFromTool_ * glm::normalize(glm::cross(aside, n)));
@@ -54,6 +57,7 @@ class Builder {
   SceneMesh& mesh_;
   glm::mat3 worldFromTool_;
   vec3 tip_;
+  float scale_;
 };
 
 struct Ring {

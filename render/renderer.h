@@ -57,6 +57,7 @@ struct Instrument {
   glm::vec3 tip{0};
   glm::quat worldFromTool{1, 0, 0, 0};  // shaft along +z away from the tip, jaws open in its yz plane
   float jawAngle = 0.3f;                // rad, of each jaw from the axis
+  float scale = 1;                      // of one whose shaft is 5 mm across
   bool touching = false;                // tissue blanches and dimples around the tip
   bool holding = false;                 // it rises between the jaws instead
 };

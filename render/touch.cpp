@@ -19,15 +19,14 @@ void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part) {
 namespace {
 
 // x -> x + offset exp(-(x - centre)^2 / width^2), m. A normal turns to n - grad w (offset . n), up to length (inverse
-// transpose, first order). What lies next to the centre loses its blood.
-void displace(const MeshPart& part, glm::vec3 centre, glm::vec3 offset, float width, SceneMesh& mesh) {
-  constexpr float kShade = 1.8f;           // share of the cavity's light lost, per slope
-  constexpr float kBlanchWidth = 0.0050f;  // m
+// transpose, first order). What lies next to the centre loses its blood, over `blanched` metres.
+void displace(const MeshPart& part, glm::vec3 centre, glm::vec3 offset, float width, float blanched, SceneMesh& mesh) {
+  constexpr float kShade = 1.8f;  // share of the cavity's light lost, per slope
   for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
     const glm::vec3 d = mesh.position[i] - centre;
     const float q = glm::dot(d, d) / (width * width);
     if (q > 9) continue;
-    mesh.blanch[i] = glm::mix(mesh.blanch[i], 1.f, std::exp(-glm::dot(d, d) / (kBlanchWidth * kBlanchWidth)));
+    mesh.blanch[i] = glm::mix(mesh.blanch[i], 1.f, std::exp(-glm::dot(d, d) / (blanched * blanched)));
     const float w = std::exp(-q);
     const glm::vec3 gradient = d * (-2 * w / (width * width));
     const float along = glm::dot(offset, mesh.normal[i]);
@@ -62,36 +61,38 @@ Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
 
 // The simulation moves nodes a centimetre apart; this is what happens between them.
 void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
-  constexpr float kWidth = 0.0055f, kPressed = 0.0014f;  // m
+  constexpr float kWidth = 0.0055f, kPressed = 0.0014f, kBlanchWidth = 0.0050f;  // m, at scale 1, as all here
   // A smooth surface stays behind the held nodes that it hangs on, up to kReach; the jaws bite kBite of it.
   constexpr float kReach = 0.014f, kBite = 0.0035f;
-  const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, 1);
+  const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, instrument.scale);
+  const float width = instrument.scale * kWidth, blanched = instrument.scale * kBlanchWidth;
   if (instrument.holding) {
-    const Nearest held = nearestMoving(mesh, instrument.tip, kReach);
+    const Nearest held = nearestMoving(mesh, instrument.tip, instrument.scale * kReach);
     if (!held.part) return;
     const glm::vec3 offset = instrument.tip + kBite * axis - held.position;
-    displace(*held.part, held.position, offset, std::max(kWidth, 1.3f * glm::length(offset)), mesh);
+    displace(*held.part, held.position, offset, std::max(width, 1.3f * glm::length(offset)), blanched, mesh);
   } else {
     for (const MeshPart& part : mesh.parts)
-      if (!part.instrument) displace(part, instrument.tip, -kPressed * axis, kWidth, mesh);
+      if (!part.instrument) displace(part, instrument.tip, -kPressed * axis, width, blanched, mesh);
   }
 }
 
 void shadeAround(const Instrument& instrument, SceneMesh& mesh) {
-  constexpr float kLength = 0.42f, kRadius = 0.0026f, kFarthest = 0.05f;  // m
-  const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, 1), start = instrument.tip + kRadius * axis;
+  const float length = 0.42f * instrument.scale, radius = 0.0026f * instrument.scale,
+              farthest = 0.05f * instrument.scale;  // m
+  const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, 1), start = instrument.tip + radius * axis;
   for (const MeshPart& part : mesh.parts) {
     if (part.instrument) continue;
     for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
       const glm::vec3 d = mesh.position[i] - start;
-      const float along = glm::clamp(glm::dot(d, axis), 0.f, kLength);
+      const float along = glm::clamp(glm::dot(d, axis), 0.f, length);
       const glm::vec3 away = d - along * axis;
       const float q = glm::dot(away, away);
-      if (q > kFarthest * kFarthest) continue;
-      const float distance = std::max(std::sqrt(q), kRadius);
+      if (q > farthest * farthest) continue;
+      const float distance = std::max(std::sqrt(q), radius);
       const float facing = std::max(-glm::dot(mesh.normal[i], away) / distance, 0.f);
-      const float fade = 1 - q / (kFarthest * kFarthest);
-      mesh.openness[i] *= 1 - fade * facing * kRadius / distance;
+      const float fade = 1 - q / (farthest * farthest);
+      mesh.openness[i] *= 1 - fade * facing * radius / distance;
     }
   }
 }
