@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "app/scene_view.h"
+#include "physics/dynamics/identified_mechanics.h"
 
 namespace medulla {
 
@@ -32,6 +33,7 @@ struct CarriedLink {
   Vector3d end[2];
   Eigen::Matrix3d worldFromLink[2];
   Vector3d bow = Vector3d::Zero();  // m, of beams: across the chord
+  double radius = 0;                // m, of the smaller sphere
 
   // A beam is bent by the slopes of its ends, as the dynamics carries what hangs on it.
   Vector3d at(double along) const { return blendPoint(end[0], end[1], along) + 0.5 * along * (1 - along) * bow; }
@@ -51,10 +53,43 @@ CarriedLink carriedLink(const SceneBody& body, const SoftBodyModel& model, const
     out.end[k] = poses[k]->position + worldFromSphere * (spheres[k]->restLinkEnd - spheres[k]->restFrame);
     out.worldFromLink[k] = worldFromSphere * rest;
   }
+  out.radius = std::min(spheres[0]->radius, spheres[1]->radius);
   if (body.links != LinkModel::beam) return out;
   const Vector3d line = out.end[1] - out.end[0];
   const Vector3d slopes = out.worldFromLink[0].col(0) - out.worldFromLink[1].col(0);
   out.bow = line.norm() * slopes - slopes.dot(line) / line.norm() * line;
+  return out;
+}
+
+// Between the centres of two cells, or of one and where what holds it lies.
+CarriedLink carriedLink(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame,
+                        const IdentifiedLink& link) {
+  CarriedLink out;
+  out.radius = model.spheres[link.frame0].radius;
+  const int frames[] = {link.frame0, link.frame1};
+  const Vector3d* points[] = {&link.restPoint0, &link.restPoint1};
+  for (int k = 0; k < 2; ++k) {
+    Eigen::Matrix3d worldFromFrame = body.worldFromModel.rotation();
+    out.end[k] = body.worldFromModel * *points[k];
+    if (frames[k] < static_cast<int>(model.spheres.size())) {
+      const FillingSphere& sphere = model.spheres[frames[k]];
+      const SpherePose& pose = frame.spheres[frames[k]];
+      worldFromFrame = pose.worldFromSphere.toRotationMatrix();
+      out.end[k] = pose.position + worldFromFrame * (*points[k] - sphere.restFrame);
+      out.radius = std::min(out.radius, sphere.radius);
+    }
+    out.worldFromLink[k] = worldFromFrame * link.axes.transpose();
+  }
+  return out;
+}
+
+std::vector<CarriedLink> carriedLinks(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame) {
+  std::vector<CarriedLink> out;
+  if (body.links == LinkModel::identified) {
+    for (const IdentifiedLink& link : model.identified->links) out.push_back(carriedLink(body, model, frame, link));
+  } else {
+    for (const ElasticLink& link : model.links) out.push_back(carriedLink(body, model, frame, link));
+  }
   return out;
 }
 
@@ -133,17 +168,17 @@ void drawBodyModel(const SceneBody& body, const SoftBodyModel& model, const Body
   if (shown.skeleton) drawSkeleton(model, frame, height, out);
   if (shown.spheres) drawSpheres(body, model, frame, out);
   if (shown.buckets) drawBuckets(model, frame, out);
-  std::vector<CarriedLink> links;
-  for (const ElasticLink& link : model.links) {
-    links.push_back(carriedLink(body, model, frame, link));
-    const double thinner = std::min(model.spheres[link.sphere0].radius, model.spheres[link.sphere1].radius);
+  const std::vector<CarriedLink> links = carriedLinks(body, model, frame);
+  for (const CarriedLink& link : links) {
     if (shown.links)
-      drawLink(links.back(), body.links == LinkModel::beam, std::min(kLink * height, 0.2f * float(thinner)), out);
-    if (shown.frames) drawFrames(links.back(), 0.7f * float(thinner), out);
+      drawLink(link, body.links == LinkModel::beam, std::min(kLink * height, 0.2f * float(link.radius)), out);
+    if (shown.frames) drawFrames(link, 0.7f * float(link.radius), out);
   }
   if (!shown.attachments) return;
-  for (std::size_t n = 0; n < model.attachments.size(); ++n) {
-    const Attachment& a = model.attachments[n];
+  const std::vector<Attachment> attachments =
+      body.links == LinkModel::identified ? attachmentsToFrames(model, model.identified->skin) : model.attachments;
+  for (std::size_t n = 0; n < attachments.size(); ++n) {
+    const Attachment& a = attachments[n];
     const Vector3d host = a.onLink ? links[a.host].at(a.along) : frame.spheres[a.host].position;
     out.segments.push_back({toGlm(host), toGlm(frame.nodes[n]), kThin * height, kAttachmentColour});
     out.balls.push_back({toGlm(frame.nodes[n]), kNode * height, kAttachmentColour});

@@ -21,8 +21,9 @@ struct Moment {
   PictureState state;
 
   explicit Moment(const std::string& links)
-      : loaded(loadScene(
-            readScene(kShown, {{"clock.duration", "3"}, {"output.golden", "0"}, {"body.gallbladder.links", links}}))) {
+      : Moment(kShown, {{"clock.duration", "3"}, {"output.golden", "0"}, {"body.gallbladder.links", links}}) {}
+  Moment(const std::string& scene, const std::vector<SceneOverride>& overrides)
+      : loaded(loadScene(readScene(scene, overrides))) {
     Simulation simulation(loaded);
     while (!simulation.finished()) simulation.advanceFrame();
     stateAt(simulation.record(), simulation.record().start, state);
@@ -117,6 +118,25 @@ TEST(ModelDrawing, PartsStandWhereTheModelHasThem) {
     EXPECT_EQ(moment.draw({"skeleton"}).segments.size(), model.skeleton.links.size());
     EXPECT_EQ(moment.draw({"links"}).segments.size(), (std::string(links) == "beam" ? 8 : 1) * model.links.size());
   }
+}
+
+// What moves is drawn: links between cells, and to what holds them; a node hangs on one of its frames.
+TEST(ModelDrawing, IdentifiedLinksAreDrawnToWhatHoldsThem) {
+  const Moment moment(std::string(MEDULLA_SOURCE_DIR) + "/scenes/liver.xml",
+                      {{"clock.duration", "0.1"}, {"output.golden", "0"}});
+  const SoftBodyModel& model = moment.model();
+  const std::vector<IdentifiedLink>& links = model.identified->links;
+  const std::vector<Segment> drawn = moment.draw({"links"}).segments;
+  ASSERT_EQ(drawn.size(), links.size());
+  const int spheres = static_cast<int>(model.spheres.size());
+  int held = 0;
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    EXPECT_LT(distance(drawn[k].a, links[k].restPoint0), 1e-3);
+    EXPECT_LT(distance(drawn[k].b, links[k].restPoint1), links[k].frame1 < spheres ? 1e-3 : 1e-7);
+    held += links[k].frame1 >= spheres ? 1 : 0;
+  }
+  EXPECT_GT(held, 0);
+  EXPECT_EQ(moment.draw({"attachments"}).segments.size(), model.restNodes.size());
 }
 
 TEST(ModelDrawing, AnUnknownPartIsRefusedWithTheNearest) {
