@@ -90,6 +90,7 @@ struct Scene {
   std::string path, name;
   double servoRate = 1200, dynamicsRate = 50;  // Hz, up to 20000 and 20 to 1200; the first a multiple of the second
   double duration = 1;                         // s, > 0, <= 86400
+  double settle = 0;                           // s, 0 to 60: bodies alone, before the time begins
   Eigen::Vector3d gravity{0, -9.81, 0};        // m/s2
   double ambientDrag = 0;                      // 1/s, >= 0
   double sleepAfter = 0;                       // s, >= 0, of keeping still; 0: never

@@ -41,6 +41,7 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
       frameDuration_(1 / loaded.scene.dynamicsRate),
       tickDuration_(1 / loaded.scene.servoRate),
       world_(makeWorld(loaded)) {
+  world_.settle(static_cast<int>(std::lround(loaded.scene.settle * loaded.scene.dynamicsRate)));
   world_.readFrame(current_);
   previous_ = current_;
   sampleInputs(0, inputs_);

@@ -41,6 +41,41 @@ TEST(DrivenSphere, IsOnItsPathAtEveryFrame) {
   }
 }
 
+TEST(DrivenSphere, StaysWhereItIsWhileBodiesSettle) {
+  BodyDescription b = tube(SurfaceMode::full);
+  DrivenSphere drive;
+  drive.sphere = 1;
+  drive.amplitude = 0.01;
+  drive.velocity = {0.1, 0, 0};
+  b.driven = {drive};
+  World world({}, {b});
+  const Vector3d rest = vectorOf(world.data().spheres.position[1]);
+  world.settle(10);
+  EXPECT_EQ(world.time(), 0);
+  EXPECT_LT((vectorOf(world.data().spheres.position[1]) - rest).norm(), 1e-13);
+  world.advance({});
+  EXPECT_GT((vectorOf(world.data().spheres.position[1]) - rest).norm(), 1e-4);
+}
+
+// Weight acts while bodies settle, loads wait for the time to begin.
+TEST(Settle, LeavesBodiesAtRestUnderTheirWeightAlone) {
+  BodyDescription b = tube(SurfaceMode::full);
+  b.fixed = {{0, FixedFreedom::all}};
+  b.tissue.damping = 1;
+  const World before({}, {b});
+  BodyDescription loaded = b;
+  loaded.deadLoads.push_back({0, {0, 5, 0}, 0, 0.1});
+  World world({}, {b}), alike({}, {loaded});
+  world.settle(200);
+  alike.settle(200);
+  EXPECT_EQ(world.stateHash(), alike.stateHash());
+  EXPECT_LT(world.energies().kinetic, 1e-12);
+  const int last = static_cast<int>(b.model->spheres.size()) - 1;
+  EXPECT_LT(world.data().spheres.position[last].v[1], before.data().spheres.position[last].v[1] - 1e-4);
+  for (int frame = 0; frame < 20; ++frame) alike.advance({});
+  EXPECT_NE(world.data().spheres.position[last].v[1], alike.data().spheres.position[last].v[1]);
+}
+
 TEST(DrivenSphere, ASteadyDriveIsFreeMotionOfTheWholeBody) {
   BodyDescription b = tube(SurfaceMode::full);
   b.driven = {DrivenSphere{.sphere = 0, .velocity = Vector3d(0.2, 0.1, 0)}};

@@ -19,6 +19,7 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(s.servoRate, 1000);
   EXPECT_EQ(s.dynamicsRate, 40);
   EXPECT_EQ(s.duration, 12);
+  EXPECT_EQ(s.settle, 2);
   EXPECT_EQ(s.gravity, Eigen::Vector3d(0, 0, -9.5));
   EXPECT_EQ(s.ambientDrag, 0.3);
   EXPECT_EQ(s.substeps, 16);
@@ -195,7 +196,7 @@ TEST_F(SceneFile, MistakesInTheStructureNameTheLineAndWhatWasExpected) {
       {"<light ", "<lihgt ", R"(x.xml:24: <scene> has no child <lihgt>; did you mean "light"?)"},
       {"<fix spheres=\"4\"", "<body spheres=\"4\"", R"(x.xml:13: <body> has no child <body>; did you mean "load"?)"},
       {" duration=\"12\"", "", R"(x.xml:4: <clock> lacks the attribute "duration")"},
-      {"<clock servo=\"1000\" dynamics=\"40\" duration=\"12\"/>", "", "x.xml:3: <scene> lacks a <clock>"},
+      {"<clock servo=\"1000\" dynamics=\"40\" duration=\"12\" settle=\"2\"/>", "", "x.xml:3: <scene> lacks a <clock>"},
       {"<dynamics ", "<dynamics/><dynamics ", "x.xml:5: <scene> has more than 1 <dynamics>"},
       {"young=\"6e3\"", "young=\"6e3\" young=\"7e3\"",
        R"(x.xml:7: broken XML: an attribute is not of the form name="value", or stands twice)"},
@@ -304,6 +305,7 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
        R"(x.xml:17: <static> unit="km": unknown value; known: "m", "cm", "mm", "micron", "inch")"},
       {"servo=\"1000\"", "servo=\"1001\"",
        R"(x.xml:4: <clock> servo="1001": expected the servo rate to be a multiple of the dynamics rate)"},
+      {"settle=\"2\"", "settle=\"61\"", R"(x.xml:4: <clock> settle="61": expected 1 number >= 0 and <= 60)"},
       {"dynamics=\"40\"", "dynamics=\"10\"", R"(x.xml:4: <clock> dynamics="10": expected 1 number >= 20 and <= 1200)"},
       {"spheres=\"0 1\"", "spheres=\"\"", R"(x.xml:12: <fix> spheres="": expected one or more integers >= 0)"},
       {"spheres=\"0 1\"", "spheres=\"0 -1\"", R"(x.xml:12: <fix> spheres="0 -1": expected one or more integers >= 0)"},

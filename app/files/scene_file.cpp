@@ -56,6 +56,7 @@ std::string readUniqueName(const XmlElement& element, std::set<std::string>& tak
 
 void readClock(const XmlElement& clock, Scene& scene) {
   scene.duration = readNumber(clock, "duration", scene.duration, {0, 86400, true, false});
+  scene.settle = readNumber(clock, "settle", scene.settle, {0, 60});
   scene.dynamicsRate = readNumber(clock, "dynamics", scene.dynamicsRate, {20, 1200});
   scene.servoRate = readNumber(clock, "servo", scene.servoRate, {20, 20000});
   const double ratio = scene.servoRate / scene.dynamicsRate;

@@ -17,7 +17,7 @@ const XmlRules& sceneRules() {
         {"camera", 1, 1},
         {"light", 0, 1},
         {"output", 0, 1}}},
-      {"clock", {"duration"}, {"servo", "dynamics"}, {}},
+      {"clock", {"duration"}, {"servo", "dynamics", "settle"}, {}},
       {"dynamics", {}, {"integrator", "order", "gravity", "ambient_drag", "substeps", "contact", "sleep_after"}, {}},
       {"tissue", {"name"}, {"young", "poisson", "density", "damping", "friction"}, {}},
       {"body",

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "physics/dynamics/angles.h"
 #include "physics/dynamics/stages.h"
 
@@ -13,6 +15,7 @@ double sineOf(double angle) {
 }
 
 Lanes pathAt(const SphereDrive& drive, double time) {
+  time = std::max(time, 0.0);  // while bodies settle
   const double periods = time * drive.frequency, u = periods < 1 ? periods : 1;
   const double ramp = u * u * (3 - 2 * u);
   const double swing = ramp * sineOf(kTurn * periods + drive.phase);

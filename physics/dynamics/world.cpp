@@ -239,6 +239,10 @@ double World::time() const {
   return static_cast<double>(data_->frame) * data_->settings.frameDuration;
 }
 
+void World::settle(int frames) {
+  for (data_->frame = -frames; data_->frame < 0;) advance({});
+}
+
 FrameReport World::advance(const Loads& loads) {
   WorldData& d = *data_;
   checkLoads(d, loads);
