@@ -113,6 +113,7 @@ TEST(StarterScene, WhatNoToolReachesIsRefused) {
   EXPECT_EQ(made.exitCode, 1);
   ASSERT_EQ(complaints(made).size(), 1) << made.err;
   EXPECT_NE(made.err.find("reaches 1e+03 m from the origin"), std::string::npos) << made.err;
+  EXPECT_EQ(made.out, "");
   EXPECT_FALSE(std::filesystem::exists(folder / "mine"));
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "app/commands/commands.h"
+#include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/output_file.h"
 #include "app/starter_scene.h"
@@ -36,9 +37,9 @@ static std::string shellWord(const std::string& path) {
 }
 
 // A tool starts outside of the body, not farther away than the body is large.
-static void requireWithinReach(const SoftBodyModel& model, const std::string& mesh) {
+static void requireWithinReach(const std::string& mesh, double metresPerUnit) {
   const double reach = toolReach / 3;
-  for (const Eigen::Vector3d& x : model.restNodes)
+  for (const Eigen::Vector3d& x : readMesh(mesh, metresPerUnit).vertices)
     if (x.lpNorm<Eigen::Infinity>() > reach)
       throw std::runtime_error(
           fmt::format("{}: reaches {:.3g} m from the origin, expected at most {:.3g} m, which a tool "
@@ -53,13 +54,13 @@ int runNew(const NewOptions& options) {
   const std::string scenePath = file(".xml"), trajectoryPath = file(".csv"), modelPath = file(".model.xml");
   for (const std::string& path : {scenePath, trajectoryPath, modelPath})
     if (fs::exists(path)) throw std::runtime_error(path + ": exists already; nothing was written");
+  requireWithinReach(options.build.meshes[0], metresPerUnit(options.build.unit));
   const OutputFolder made(options.folder);
   BuildOptions build = options.build;
   build.output = modelPath;
   try {
     runBuild(build);
     const SoftBodyModel model = readModel(modelPath);
-    requireWithinReach(model, options.build.meshes[0]);
     const StarterScene starter = starterScene(name, model);
     writeText(trajectoryPath, starter.trajectory);
     writeText(scenePath, starter.scene);

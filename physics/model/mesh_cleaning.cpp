@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "physics/model/disjoint_sets.h"
 #include "physics/model/mesh_repair_stages.h"
 #include "physics/model/mesh_topology.h"
 
@@ -41,24 +42,18 @@ std::vector<int> lowestCoincident(const std::vector<Eigen::Vector3d>& points, do
   const Eigen::Vector3d direction = Eigen::Vector3d(0.61, 0.53, 0.59).normalized();
   std::vector<double> along(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) along[i] = direction.dot(points[i]);
-  std::vector<int> order(points.size()), parent(points.size());
+  std::vector<int> order(points.size()), lowest(points.size());
   std::iota(order.begin(), order.end(), 0);
-  std::iota(parent.begin(), parent.end(), 0);
   std::sort(order.begin(), order.end(),
             [&](int i, int j) { return along[i] != along[j] ? along[i] < along[j] : i < j; });
-  const auto root = [&parent](int i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(points.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
     for (std::size_t j = i + 1; j < order.size() && along[order[j]] - along[order[i]] <= tolerance; ++j) {
-      if ((points[order[i]] - points[order[j]]).norm() > tolerance) continue;
-      const int a = root(order[i]), b = root(order[j]);
-      parent[std::max(a, b)] = std::min(a, b);
+      if ((points[order[i]] - points[order[j]]).norm() <= tolerance) sets.join(order[i], order[j]);
     }
   }
-  for (std::size_t i = 0; i < points.size(); ++i) parent[i] = root(static_cast<int>(i));
-  return parent;
+  for (std::size_t i = 0; i < points.size(); ++i) lowest[i] = sets.of(static_cast<int>(i));
+  return lowest;
 }
 
 // Keeps the triangles for which keep(index) is true and says how many went.
