@@ -9,6 +9,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "render/behind_link.h"
 #include "render/image.h"
 
 #ifndef __clang_analyzer__  // it would report what it finds in stb
@@ -110,7 +111,7 @@ std::vector<std::uint8_t> encodePng(const Image& image, const std::vector<PngTex
 
 void writePng(const std::string& path, const Image& image, const std::vector<PngText>& texts) {
   const std::vector<std::uint8_t> bytes = encodePng(image, texts);
-  const std::string partial = path + ".partial-" + std::to_string(getpid());
+  const std::string target = behindLink(path), partial = target + ".partial-" + std::to_string(getpid());
   std::error_code ignored;
   {
     std::ofstream file(partial, std::ios::binary);
@@ -124,7 +125,7 @@ void writePng(const std::string& path, const Image& image, const std::vector<Png
     }
   }
   std::error_code error;
-  std::filesystem::rename(partial, path, error);
+  std::filesystem::rename(partial, target, error);
   if (error) {
     std::filesystem::remove(partial, ignored);
     throw std::runtime_error(path + ": cannot be written: " + error.message());

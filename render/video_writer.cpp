@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "render/behind_link.h"
 #include "render/video_encoder.h"
 #include "render/yuv.h"
 
@@ -99,7 +100,7 @@ struct VideoWriter::Data {
 
   Data(const std::string& p, int w, int h, double fps)
       : path(p),
-        partial(checkedPartialPath(p)),
+        partial(checkedPartialPath(behindLink(p))),
         width(w),
         height(h),
         encoder(openEncoder(p, partial, w, h, fps)),
@@ -198,7 +199,7 @@ void VideoWriter::finish(const std::function<void()>& goOn) {
   }
   if (!data_->failure.empty()) data_->fail(data_->failure);
   std::error_code error;
-  std::filesystem::rename(data_->partial, data_->path, error);
+  std::filesystem::rename(data_->partial, behindLink(data_->path), error);
   if (error) throw std::runtime_error(data_->path + ": cannot be written: " + error.message());
 }
 

@@ -146,6 +146,17 @@ TEST_F(Outputs, SizesThatCannotBeDrawnAreRefused) {
   EXPECT_TRUE(contents().empty());
 }
 
+TEST_F(Outputs, ALinkIsFollowedAndStays) {
+  fs::create_directory(folder / "elsewhere");
+  for (const char* name : {"still.png", "film.gif"}) {
+    fs::create_symlink(std::string("elsewhere/") + name, folder / name);
+    const bool still = std::string(name) == "still.png";
+    ASSERT_EQ(render({"--size", "64x48", still ? "--still" : "--frames", still ? "0" : "0:2", "-o", name}).exitCode, 0);
+    EXPECT_TRUE(fs::is_symlink(folder / name));
+    EXPECT_TRUE(fs::is_regular_file(folder / (std::string("elsewhere/") + name)));
+  }
+}
+
 TEST_F(Outputs, AFullDiskStopsTheRunAndLeavesNothing) {
   ProgramOptions full;
   full.fileSizeLimit = 1000;

@@ -14,6 +14,7 @@
 #include <filesystem>
 
 #include "app/files/input_error.h"
+#include "render/behind_link.h"
 
 namespace medulla {
 
@@ -21,13 +22,10 @@ static std::runtime_error systemError(const std::string& path, const std::string
   return inputError(path, 0, what + ": " + std::strerror(errno));
 }
 
-// A link is followed, so that renaming replaces the file and not the link. Renaming onto a device would replace that.
+// Renaming onto a device would replace that.
 static std::string resolveTarget(const std::string& path) {
   if (path.empty() || path.back() == '/') throw inputError(path, 0, "expected the name of a file to write");
-  std::error_code error;
-  const bool link = std::filesystem::is_symlink(path, error);
-  std::string target = link ? std::filesystem::weakly_canonical(path, error).string() : path;
-  if (target.empty()) target = path;  // a link to a pipe, or to itself
+  const std::string target = behindLink(path);
   struct stat status {};
   if (::stat(target.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) throw inputError(path, 0, "is a folder, expected the name of a file to write");
