@@ -122,8 +122,8 @@ class World {
   double stableSubstep() const;  // s, the estimate of the largest stable step
   double time() const;           // s
 
-  // Before the first frame: so many frames without loads, and time then begins. Driven spheres stay where they are. What
-  // advance() throws.
+  // Before the first frame: so many frames without loads, and time then begins. Driven spheres stay where they are.
+  // What advance() throws.
   void settle(int frames);
   // One dynamics frame: substeps under gravity and `loads`. Throws std::runtime_error naming body, time and cause when
   // the state stops being finite.
