@@ -25,7 +25,7 @@ static std::runtime_error systemError(const std::string& path, const std::string
 // Renaming onto a device would replace that.
 static std::string resolveTarget(const std::string& path) {
   if (path.empty() || path.back() == '/') throw inputError(path, 0, "expected the name of a file to write");
-  const std::string target = behindLink(path);
+  std::string target = behindLink(path);
   struct stat status {};
   if (::stat(target.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) throw inputError(path, 0, "is a folder, expected the name of a file to write");
