@@ -214,7 +214,7 @@ ChartTruth runReference(std::vector<ChartRun>& runs, const LoadedScene& base,
 
 // What a simulated second takes, in explicit steps, for the progress bar alone.
 double workPerSecond(const ChartRun& run) {
-  constexpr double kImplicit = 30;  // one of its steps, with seven to a hundred spheres: 10 to 60
+  constexpr double kImplicit = 30;  // explicit ones per implicit one: a guess, it goes with the spheres
   const bool implicit = std::any_of(run.options.overrides.begin(), run.options.overrides.end(),
                                     [](const SceneOverride& o) { return o.value == "implicit"; });
   return (implicit ? kImplicit : 1) / run.step;
