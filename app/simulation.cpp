@@ -4,27 +4,31 @@
 #include <cassert>
 #include <cmath>
 
+#include "app/interrupt.h"
 #include "render/stage_times.h"
 
 namespace medulla {
 
-static World makeWorld(const LoadedScene& loaded) {
+BodyDescription bodyDescription(const LoadedScene& loaded, std::size_t body) {
+  const SceneBody& b = loaded.scene.bodies[body];
+  return {b.name,  loaded.models[body], b.tissue, b.factors,    b.surface,  b.links, b.worldFromModel,
+          b.fixed, b.fixedNodes,        b.driven, b.neighbours, b.deadLoads};
+}
+
+World makeWorld(const LoadedScene& loaded) {
   const Scene& scene = loaded.scene;
   WorldSettings settings;
   settings.gravity = scene.gravity;
   settings.ambientDrag = scene.ambientDrag;
   settings.sleepAfter = scene.sleepAfter;
   settings.frameDuration = 1 / scene.dynamicsRate;
+  settings.settleFrames = static_cast<int>(std::lround(scene.settle * scene.dynamicsRate));
   settings.integrator = scene.integrator;
   settings.order = scene.order;
   settings.substeps = scene.substeps;
   settings.contact = scene.contact;
   std::vector<BodyDescription> bodies;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const SceneBody& body = scene.bodies[b];
-    bodies.push_back({body.name, loaded.models[b], body.tissue, body.factors, body.surface, body.links,
-                      body.worldFromModel, body.fixed, body.fixedNodes, body.driven, body.neighbours, body.deadLoads});
-  }
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) bodies.push_back(bodyDescription(loaded, b));
   std::vector<StaticShape> statics;
   for (std::size_t k = 0; k < scene.statics.size(); ++k) {
     if (!scene.statics[k].contact) continue;
@@ -41,7 +45,10 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
       frameDuration_(1 / loaded.scene.dynamicsRate),
       tickDuration_(1 / loaded.scene.servoRate),
       world_(makeWorld(loaded)) {
-  world_.settle(static_cast<int>(std::lround(loaded.scene.settle * loaded.scene.dynamicsRate)));
+  while (world_.time() < 0) {
+    checkInterrupt();
+    world_.advance({});
+  }
   world_.readFrame(current_);
   previous_ = current_;
   sampleInputs(0, inputs_);

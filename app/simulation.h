@@ -26,6 +26,13 @@ struct LoadedScene {
 // file that is missing is reported at the scene's line that names it.
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories = {});
 
+// A body as the scene wants it.
+BodyDescription bodyDescription(const LoadedScene& loaded, std::size_t body);
+
+// The scene's bodies before they settle, ahead of time 0. Throws std::runtime_error naming the body that cannot be
+// simulated.
+World makeWorld(const LoadedScene& loaded);
+
 // What the servo saw and did during one dynamics frame [start, start + duration]: the two frames that were blended
 // meanwhile (not recorded live), inputs and tools at its ticks (index 0 is the state at `start`), and what the dynamics
 // was handed at its end.
@@ -72,6 +79,7 @@ struct RunTotals {
 // same scene gives the same hash.
 class Simulation {
  public:
+  // With the bodies settled, at time 0. Throws what makeWorld() and World::advance() throw, and Interrupted.
   explicit Simulation(const LoadedScene& loaded, const EmbreeSettings& embree = {});
 
   bool finished() const { return frame_ >= frameCount_; }

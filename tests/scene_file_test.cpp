@@ -238,7 +238,7 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4\"", R"(x.xml:16: <fix> box="0 1 2 3 4": expected 6 numbers)"},
       {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4 1\"",
        R"(x.xml:16: <fix> box="0 1 2 3 4 1": expected the lower corner first: x0 y0 z0 x1 y1 z1)"},
-      {"1 2 3 0.5", "1 2 3 0", R"(x.xml:16: <fix> sphere="1 2 3 0": expected x y z and a radius > 0)"},
+      {"1 2 3 0.5", "1 2 3 0", R"(x.xml:16: <fix> sphere="1 2 3 0": expected a radius > 0: x y z r)"},
       {"<fix box=\"0 1 2 3 4 5\"/>", "<fix/>",
        "x.xml:16: <fix> says where by one attribute of spheres, box, sphere, plane, vertices"},
       {"<fix box", "<fix vertices=\"a.csv\" box",

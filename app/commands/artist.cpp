@@ -4,10 +4,10 @@
 
 #include <utility>
 
-#include "app/files/content_hash.h"
 #include "app/interrupt.h"
 #include "app/picture_sources.h"
 #include "app/progress.h"
+#include "physics/content_hash.h"
 #include "render/caption.h"
 
 namespace medulla {

@@ -101,7 +101,7 @@ void requireSameMeshes(const LoadedScene& a, const LoadedScene& b) {
 
 int chosenSubsteps(LoadedScene loaded) {
   loaded.scene.substeps = 0;
-  return Simulation(loaded).world().substepsPerFrame();
+  return makeWorld(loaded).substepsPerFrame();
 }
 
 // Every run of the chart. Where the scene names no reference there is one more, the reference, last: the first method

@@ -6,8 +6,7 @@ namespace medulla {
 
 // Everything that a run does before its first step: reading, looking up, laying out.
 int runCheck(const RunOptions& options) {
-  const LoadedScene loaded = loadRun(options);
-  const Simulation simulation(loaded);
+  makeWorld(loadRun(options));
   fmt::print("valid yes\n");
   return 0;
 }

@@ -93,8 +93,7 @@ void addFrequencies(const BodyDescription& body, std::vector<Result>& results) {
 
 std::vector<Result> sceneResults(const LoadedScene& loaded) {
   const Scene& scene = loaded.scene;
-  const Simulation simulation(loaded);
-  const World& world = simulation.world();
+  const World world = makeWorld(loaded);
   std::size_t spheres = 0, links = 0, nodes = 0;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const SoftBodyModel& model = *loaded.models[b];

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <optional>
 
-#include "app/files/content_hash.h"
 #include "app/files/log_file.h"
 #include "app/files/output_file.h"
 #include "app/files/state_cache.h"
@@ -17,6 +16,7 @@
 #include "app/force_comparison.h"
 #include "app/interrupt.h"
 #include "app/motion_sources.h"
+#include "physics/content_hash.h"
 
 namespace medulla {
 

@@ -25,17 +25,13 @@ namespace fs = std::filesystem;
 
 constexpr const char* kMapTrial = "stiffness_1";  // stretched by half and let go
 
+// The scene's first body, with nothing around it that moves it.
 BodyDescription bodyOf(const LoadedScene& loaded) {
-  const SceneBody& b = loaded.scene.bodies.at(0);
-  BodyDescription out;
-  out.name = b.name;
-  out.model = loaded.models.at(0);
-  out.tissue = b.tissue;
-  out.factors = b.factors;
-  out.surface = b.surface;
-  out.links = b.links;
-  out.fixed = b.fixed;
-  out.fixedNodes = b.fixedNodes;
+  BodyDescription out = bodyDescription(loaded, 0);
+  out.worldFromModel = Eigen::Isometry3d::Identity();
+  out.driven.clear();
+  out.neighbours.reset();
+  out.deadLoads.clear();
   return out;
 }
 

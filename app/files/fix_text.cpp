@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
@@ -14,50 +15,35 @@ namespace medulla {
 
 namespace {
 
-[[noreturn]] void refuse(const std::string& text, const char* expected) {
+[[noreturn]] void refuse(const std::string& text, const std::string& expected) {
   throw std::runtime_error(fmt::format("--fix {}: expected {}", text, expected));
 }
 
-// Numbers between commas; of another count or no numbers: refused.
-std::vector<double> numbersOf(const std::string& text, std::string_view list, std::size_t count, const char* expected) {
+// Numbers between commas; none at all where one of them is no number.
+std::vector<double> numbersOf(std::string_view list) {
   std::vector<double> out;
   for (bool more = true; more;) {
     const std::size_t comma = list.find(',');
     more = comma != std::string_view::npos;
     const std::optional<double> value = parseNumber<double>(list.substr(0, comma));
-    if (!value) refuse(text, expected);
+    if (!value) return {};
     out.push_back(*value);
     if (more) list.remove_prefix(comma + 1);
   }
-  if (out.size() != count) refuse(text, expected);
   return out;
 }
 
-Region regionOf(const std::string& text, std::string_view kind, std::string_view list) {
-  Region region;
-  if (kind == "box") {
-    constexpr const char* expected = "box=x0,y0,z0,x1,y1,z1 with the lower corner first";
-    const std::vector<double> v = numbersOf(text, list, 6, expected);
-    region.box = {Eigen::Vector3d(v[0], v[1], v[2]), Eigen::Vector3d(v[3], v[4], v[5])};
-    if (region.box.isEmpty()) refuse(text, expected);
-  } else if (kind == "sphere") {
-    constexpr const char* expected = "sphere=x,y,z,r with a radius > 0";
-    const std::vector<double> v = numbersOf(text, list, 4, expected);
-    region.shape = Region::Shape::ball;
-    region.centre = {v[0], v[1], v[2]};
-    region.radius = v[3];
-    if (!(region.radius > 0)) refuse(text, expected);
-  } else if (kind == "plane") {
-    constexpr const char* expected = "plane=nx,ny,nz,d with a direction that is not 0";
-    const std::vector<double> v = numbersOf(text, list, 4, expected);
-    region.shape = Region::Shape::halfSpace;
-    region.normal = {v[0], v[1], v[2]};
-    region.distance = v[3];
-    if (region.normal.isZero()) refuse(text, expected);
-  } else {
-    refuse(text, "box=x0,y0,z0,x1,y1,z1, sphere=x,y,z,r, plane=nx,ny,nz,d or vertices=FILE.csv");
+Region regionOf(const std::string& text, std::string_view word, std::string_view list) {
+  for (const RegionForm& form : kRegionForms) {
+    if (word != form.word) continue;
+    const std::vector<double> numbers = numbersOf(list);
+    if (numbers.size() == form.count)
+      if (const std::optional<Region> region = makeRegion(form.shape, numbers)) return *region;
+    std::string example = form.numbers;
+    std::replace(example.begin(), example.end(), ' ', ',');
+    refuse(text, fmt::format("{}={}, {}", form.word, example, form.rule));
   }
-  return region;
+  refuse(text, "box=x0,y0,z0,x1,y1,z1, sphere=x,y,z,r, plane=nx,ny,nz,d or vertices=FILE.csv");
 }
 
 }  // namespace

@@ -7,7 +7,6 @@
 #include <sstream>
 #include <string_view>
 
-#include "app/files/content_hash.h"
 #include "app/files/joined.h"
 #include "app/files/mesh_file.h"
 #include "app/files/placement.h"
@@ -15,6 +14,7 @@
 #include "app/files/scene_rules.h"
 #include "app/files/xml_element.h"
 #include "app/scene.h"
+#include "physics/content_hash.h"
 #include "physics/model/rotation_between.h"
 
 namespace medulla {
@@ -111,33 +111,22 @@ Tissue findTissue(const XmlElement& body, const std::vector<NamedTissue>& tissue
 }
 
 Region readRegion(const XmlElement& e) {
-  Region region;
-  const std::vector<double> box = readNumbers(e, "box", 6), ball = readNumbers(e, "sphere", 4),
-                            plane = readNumbers(e, "plane", 4);
-  if (!box.empty()) {
-    region.box = {Eigen::Vector3d(box[0], box[1], box[2]), Eigen::Vector3d(box[3], box[4], box[5])};
-    if (region.box.isEmpty()) refuse(e, "box", "expected the lower corner first: x0 y0 z0 x1 y1 z1");
+  for (const RegionForm& form : kRegionForms) {
+    const std::vector<double> numbers = readNumbers(e, form.word, form.count);
+    if (numbers.empty()) continue;
+    const std::optional<Region> region = makeRegion(form.shape, numbers);
+    if (!region) refuse(e, form.word, fmt::format("expected {}: {}", form.rule, form.numbers));
+    return *region;
   }
-  if (!ball.empty()) {
-    region.shape = Region::Shape::ball;
-    region.centre = {ball[0], ball[1], ball[2]};
-    region.radius = ball[3];
-    if (!(region.radius > 0)) refuse(e, "sphere", "expected x y z and a radius > 0");
-  }
-  if (!plane.empty()) {
-    region.shape = Region::Shape::halfSpace;
-    region.normal = {plane[0], plane[1], plane[2]};
-    region.distance = plane[3];
-    if (region.normal.isZero()) refuse(e, "plane", "expected a direction and a distance: nx ny nz d");
-  }
-  return region;
+  return {};
 }
 
 // The surface nodes that an element means; exactly one attribute says so, or one of `others`, which mean something
 // else.
 NodeChoice readNodeChoice(const XmlElement& e, const std::vector<std::string>& others, const std::string& scenePath) {
   std::vector<std::string> ways = others;
-  ways.insert(ways.end(), {"box", "sphere", "plane", "vertices"});
+  for (const RegionForm& form : kRegionForms) ways.push_back(form.word);
+  ways.push_back("vertices");
   const auto given = [&](const std::string& way) { return e.find(way) != nullptr; };
   if (std::count_if(ways.begin(), ways.end(), given) != 1)
     throw std::runtime_error(

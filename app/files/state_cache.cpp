@@ -12,8 +12,8 @@
 #include <string_view>
 #include <type_traits>
 
-#include "app/files/content_hash.h"
 #include "app/files/input_error.h"
+#include "physics/content_hash.h"
 
 namespace medulla {
 

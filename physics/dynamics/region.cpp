@@ -2,6 +2,32 @@
 
 namespace medulla {
 
+std::optional<Region> makeRegion(Region::Shape shape, const std::vector<double>& numbers) {
+  const auto corner = [&](std::size_t first) {
+    return Eigen::Vector3d(numbers[first], numbers[first + 1], numbers[first + 2]);
+  };
+  Region region;
+  region.shape = shape;
+  bool holds = false;
+  switch (shape) {
+    case Region::Shape::box:
+      region.box = {corner(0), corner(3)};
+      holds = !region.box.isEmpty();
+      break;
+    case Region::Shape::ball:
+      region.centre = corner(0);
+      region.radius = numbers[3];
+      holds = region.radius > 0;
+      break;
+    case Region::Shape::halfSpace:
+      region.normal = corner(0);
+      region.distance = numbers[3];
+      holds = !region.normal.isZero();
+      break;
+  }
+  return holds ? std::optional(region) : std::nullopt;
+}
+
 bool contains(const Region& region, const Eigen::Vector3d& x) {
   switch (region.shape) {
     case Region::Shape::box:

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "physics/model/soft_body_model.h"
@@ -16,6 +19,22 @@ struct Region {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitX();  // of any length but 0: points x with normal . x <= distance
   double distance = 0;
 };
+
+// How a region is written down: its word, the numbers that follow, and what they must be.
+struct RegionForm {
+  Region::Shape shape;
+  const char* word;
+  std::size_t count;
+  const char* numbers;
+  const char* rule;
+};
+inline constexpr std::array kRegionForms = {
+    RegionForm{Region::Shape::box, "box", 6, "x0 y0 z0 x1 y1 z1", "the lower corner first"},
+    RegionForm{Region::Shape::ball, "sphere", 4, "x y z r", "a radius > 0"},
+    RegionForm{Region::Shape::halfSpace, "plane", 4, "nx ny nz d", "a direction and a distance"}};
+
+// Of as many numbers as the form has; nothing where they break its rule.
+std::optional<Region> makeRegion(Region::Shape shape, const std::vector<double>& numbers);
 
 bool contains(const Region& region, const Eigen::Vector3d& x);
 

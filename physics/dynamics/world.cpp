@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cassert>
 #include <cmath>
 #include <stdexcept>
 
+#include "physics/content_hash.h"
 #include "physics/dynamics/contact_stages.h"
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"
@@ -30,6 +30,8 @@ void checkSettings(const WorldSettings& s) {
   if (!(s.frameDuration > 0) || !std::isfinite(s.frameDuration))
     throw std::runtime_error(fmt::format("the dynamics frame lasts {} s: expected more than 0", s.frameDuration));
   if (s.substeps < 0) throw std::runtime_error(fmt::format("{} substeps: expected 0 (automatic) or more", s.substeps));
+  if (s.settleFrames < 0)
+    throw std::runtime_error(fmt::format("{} settling frames: expected 0 or more", s.settleFrames));
   if (!(s.sleepAfter >= 0))
     throw std::runtime_error(fmt::format("bodies sleep after {} s: expected 0 or more", s.sleepAfter));
   if (!s.gravity.allFinite()) throw std::runtime_error("gravity is not finite");
@@ -140,24 +142,6 @@ void requireFinite(const WorldData& d, double time) {
   }
 }
 
-class Hash {  // FNV-1a
- public:
-  void add(double x) {
-    const auto bits = std::bit_cast<std::uint64_t>(x);
-    for (int k = 0; k < 8; ++k) {
-      value_ ^= (bits >> (8 * k)) & 0xff;
-      value_ *= 0x100000001b3ULL;
-    }
-  }
-  void add(const Quad& q, int count) {
-    for (int k = 0; k < count; ++k) add(q.v[k]);
-  }
-  std::uint64_t value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325ULL;
-};
-
 // Whether two bodies have the same BodyMechanics, wherever they lie and whatever loads them.
 bool alike(const BodyDescription& a, const BodyDescription& b) {
   return a.model == b.model && a.tissue == b.tissue && a.factors == b.factors && a.surface == b.surface &&
@@ -199,6 +183,7 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
   const std::vector<BodyMechanics> mechanics = mechanicsOf(bodies, settings.integrator, stable);
   data_ = layOut(settings, std::move(bodies), mechanics);
   data_->stableSubstep = stable;
+  data_->frame = -settings.settleFrames;
   for (std::size_t b = 0; b < mechanics.size(); ++b)
     data_->nodeGive.push_back(medulla::nodeGive(data_->bodies[b], mechanics[b]));
   // Below this a second of simulation takes over an hour: a wrong unit rather than a stiff tissue.
@@ -237,10 +222,6 @@ double World::stableSubstep() const {
 }
 double World::time() const {
   return static_cast<double>(data_->frame) * data_->settings.frameDuration;
-}
-
-void World::settle(int frames) {
-  for (data_->frame = -frames; data_->frame < 0;) advance({});
 }
 
 FrameReport World::advance(const Loads& loads) {
@@ -342,34 +323,37 @@ const std::vector<BodyOverlap>& World::startOverlaps() const {
 
 std::uint64_t World::stateHash() const {
   const WorldData& d = *data_;
-  Hash hash;
+  NumberHash hash;
+  const auto add = [&](const Quad& q, int count) {
+    for (int k = 0; k < count; ++k) hash.add(q.v[k]);
+  };
   hash.add(time());
   for (const BodyRange& r : d.ranges) {
     for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
-      hash.add(d.spheres.position[i], 3);
-      hash.add(d.spheres.velocity[i], 3);
-      hash.add(d.spheres.orientation[i], 4);
-      hash.add(d.spheres.angularMomentum[i], 3);
+      add(d.spheres.position[i], 3);
+      add(d.spheres.velocity[i], 3);
+      add(d.spheres.orientation[i], 4);
+      add(d.spheres.angularMomentum[i], 3);
     }
     for (int k = r.firstLink; k < r.firstLink + r.linkCount; ++k) hash.add(d.links.unwoundTwist[k / 4].v[k % 4]);
     for (int i : r.node) {
-      hash.add(quadOf(vectorAt(d.nodes.position, i)), 3);
-      hash.add(quadOf(vectorAt(d.nodes.velocity, i)), 3);
+      add(quadOf(vectorAt(d.nodes.position, i)), 3);
+      add(quadOf(vectorAt(d.nodes.velocity, i)), 3);
     }
   }
   for (const std::vector<CarriedImpulse>* impulses : {&d.contact.carried, &d.contact.resting}) {
     for (const CarriedImpulse& c : *impulses) {
-      hash.add(std::bit_cast<double>(c.key));
-      hash.add(c.impulse, 3);
+      hash.add(c.key);
+      add(c.impulse, 3);
     }
   }
   for (const SurfacePart& p : d.surface.parts)
     if (!p.always) hash.add(p.moves ? p.quietFrames : -1.0);
-  for (const Quad& q : d.surface.weight) hash.add(q, 3);
+  for (const Quad& q : d.surface.weight) add(q, 3);
   for (const Rest& r : d.rest) hash.add(r.asleep ? -1.0 : r.stillFrames);
   for (const StillPlace& place : d.stillPlace) {
-    hash.add(place.position, 3);
-    hash.add(place.orientation, 4);
+    add(place.position, 3);
+    add(place.orientation, 4);
   }
   return hash.value();
 }

@@ -89,6 +89,9 @@ struct WorldSettings {
   int order = 1;     // of the implicit integrator, 1 or 2
   int substeps = 0;  // per dynamics frame; 0: as many as the stability estimate asks for, implicit: of 5 ms at most
   ContactMode contact = ContactMode::none;
+  // Dynamics frames before time 0, in which bodies come to rest under weight and contact: dead loads wait, driven
+  // spheres stay where they are.
+  int settleFrames = 0;
   // s, >= 0: a body that has kept still for this long, within 1 % of its spheres' mean radius, sleeps, with all that it
   // touches; it wakes when a tool or a body awake touches it. 0: none ever sleeps, so that what creeps goes on to
   // creep. Without effect on the implicit integrator.
@@ -120,11 +123,7 @@ class World {
   int substepsPerFrame() const;
   double substep() const;        // s
   double stableSubstep() const;  // s, the estimate of the largest stable step
-  double time() const;           // s
-
-  // Before the first frame: so many frames without loads, and time then begins. Driven spheres stay where they are.
-  // What advance() throws.
-  void settle(int frames);
+  double time() const;           // s; below 0 until the settling frames are through
   // One dynamics frame: substeps under gravity and `loads`. Throws std::runtime_error naming body, time and cause when
   // the state stops being finite.
   FrameReport advance(const Loads& loads);

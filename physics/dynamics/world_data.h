@@ -336,7 +336,7 @@ struct WorldData {
   int substeps = 1;
   double substep = 0;        // s
   double stableSubstep = 0;  // s
-  std::int64_t frame = 0;    // dynamics frames done; time = frame * frameDuration
+  std::int64_t frame = 0;    // dynamics frames done since time 0; time = frame * frameDuration
 };
 
 }  // namespace medulla

@@ -3,11 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <stdexcept>
 
+#include "physics/content_hash.h"
 #include "physics/model/attachment.h"
 #include "physics/model/ball_choice.h"
 #include "physics/model/build_report.h"
@@ -136,17 +136,12 @@ void hangNodesAndShareMass(const BodyShape& shape, const SpheresAndLinks& s, dou
 }  // namespace
 
 std::uint64_t hashMesh(const TriangleMesh& mesh) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  const auto mix = [&](std::uint64_t bits) {
-    for (int byte = 0; byte < 8; ++byte) hash = (hash ^ (bits >> (8 * byte) & 255)) * 0x100000001b3u;
-  };
-  for (const Vector3d& v : mesh.vertices) {
-    for (int a = 0; a < 3; ++a) mix(std::bit_cast<std::uint64_t>(v[a]));
-  }
-  for (const std::array<int, 3>& t : mesh.triangles) {
-    for (const int corner : t) mix(static_cast<std::uint64_t>(corner));
-  }
-  return hash;
+  NumberHash hash;
+  for (const Vector3d& v : mesh.vertices)
+    for (int a = 0; a < 3; ++a) hash.add(v[a]);
+  for (const std::array<int, 3>& t : mesh.triangles)
+    for (const int corner : t) hash.add(static_cast<std::uint64_t>(corner));
+  return hash.value();
 }
 
 double overshootOf(const BuildSettings& s) {
