@@ -77,16 +77,6 @@ IndexLists trianglesOfVertices(const TriangleMesh& mesh) {
   return gather(static_cast<int>(mesh.vertices.size()), pairs);
 }
 
-IndexLists neighboursOfVertices(const TriangleMesh& mesh) {
-  std::vector<std::array<int, 2>> pairs;
-  for (const auto& edge : uniqueEdges(mesh)) {
-    pairs.push_back(edge);
-    pairs.push_back({edge[1], edge[0]});
-  }
-  std::sort(pairs.begin(), pairs.end());
-  return gather(static_cast<int>(mesh.vertices.size()), pairs);
-}
-
 std::vector<std::array<int, 3>> adjacentTriangles(const TriangleMesh& mesh) {
   std::vector<std::array<int, 3>> adjacent(mesh.triangles.size(), {-1, -1, -1});
   forEachEdge(sortedSides(mesh), [&adjacent](std::span<const Side> sides) {
@@ -169,12 +159,6 @@ double solidAngle(const TriangleMesh& mesh, const std::array<int, 3>& triangle, 
                         c = mesh.vertices[triangle[2]] - point;
   const double la = a.norm(), lb = b.norm(), lc = c.norm();
   return 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-}
-
-double windingNumber(const TriangleMesh& mesh, const Eigen::Vector3d& point) {
-  double sum = 0;
-  for (const auto& t : mesh.triangles) sum += solidAngle(mesh, t, point);
-  return sum / (4 * std::numbers::pi);
 }
 
 }  // namespace medulla

@@ -22,9 +22,6 @@ std::vector<std::array<int, 2>> uniqueEdges(const TriangleMesh& mesh);
 // Triangles around each vertex, ascending.
 IndexLists trianglesOfVertices(const TriangleMesh& mesh);
 
-// Vertices that share an edge with each vertex, ascending.
-IndexLists neighboursOfVertices(const TriangleMesh& mesh);
-
 // The triangle across each triangle's edges: entry k of a triangle lies across its edge (corner k, corner k + 1).
 // -1 where that edge does not belong to exactly two triangles.
 std::vector<std::array<int, 3>> adjacentTriangles(const TriangleMesh& mesh);
@@ -73,9 +70,5 @@ std::vector<int> componentOfTriangles(const TriangleMesh& mesh, int& components)
 // Solid angle under which a point sees one triangle (Van Oosterom and Strackee 1983), signed by the winding: positive
 // from behind. In steradian.
 double solidAngle(const TriangleMesh& mesh, const std::array<int, 3>& triangle, const Eigen::Vector3d& point);
-
-// Signed turns of the surface around a point: 1 inside a closed outward surface, 0 outside or in a cavity.
-// O(triangles).
-double windingNumber(const TriangleMesh& mesh, const Eigen::Vector3d& point);
 
 }  // namespace medulla
