@@ -1,16 +1,14 @@
 #include <libdeflate.h>
-#include <unistd.h>
 
 #include <cassert>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <stdexcept>
 
-#include "render/behind_link.h"
 #include "render/image.h"
+#include "render/partial_file.h"
 
 #ifndef __clang_analyzer__  // it would report what it finds in stb
 #define STB_IMAGE_IMPLEMENTATION
@@ -111,25 +109,12 @@ std::vector<std::uint8_t> encodePng(const Image& image, const std::vector<PngTex
 
 void writePng(const std::string& path, const Image& image, const std::vector<PngText>& texts) {
   const std::vector<std::uint8_t> bytes = encodePng(image, texts);
-  const std::string target = behindLink(path), partial = target + ".partial-" + std::to_string(getpid());
-  std::error_code ignored;
-  {
-    std::ofstream file(partial, std::ios::binary);
-    if (!file) throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
-    file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    file.close();
-    if (!file) {
-      const std::string reason = std::strerror(errno);
-      std::filesystem::remove(partial, ignored);
-      throw std::runtime_error(path + ": cannot be written: " + reason);
-    }
-  }
-  std::error_code error;
-  std::filesystem::rename(partial, target, error);
-  if (error) {
-    std::filesystem::remove(partial, ignored);
-    throw std::runtime_error(path + ": cannot be written: " + error.message());
-  }
+  PartialFile partial(path);
+  std::ofstream file(partial.path(), std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
+  partial.commit();
 }
 
 Image readPng(const std::string& path, std::vector<PngText>* texts) {

@@ -10,12 +10,14 @@ namespace medulla {
 void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part);
 
 // Where an instrument touches: the tissue around its tip is pressed in softly along the instrument and loses its blood.
-// What a closed grip holds comes up between its jaws instead. Changes positions, normals, openness and blanch of the surfaces.
+// What a closed grip holds comes up between its jaws instead. Changes positions, normals, openness and blanch of the
+// surfaces.
 void applyTouch(const Instrument& instrument, SceneMesh& mesh);
 
 // The instrument's contact shadow: it hides part of the cavity from the surfaces near it. The lamp beside the lens
 // throws its own shadow almost behind the instrument. Scales openness by 1 - r/d cos, what a long cylinder of radius r
-// at distance d leaves (view factor from a small patch to a cylinder; Howell's catalogue, B-32), fading out at ten diameters.
+// at distance d leaves (view factor from a small patch to a cylinder; Howell's catalogue, B-32), fading out at ten
+// diameters.
 void shadeAround(const Instrument& instrument, SceneMesh& mesh);
 
 }  // namespace medulla

@@ -1,20 +1,17 @@
 #include "render/video_writer.h"
 
 #include <pthread.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cassert>
-#include <cerrno>
 #include <condition_variable>
-#include <cstring>
 #include <deque>
 #include <filesystem>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
 
-#include "render/behind_link.h"
+#include "render/partial_file.h"
 #include "render/video_encoder.h"
 #include "render/yuv.h"
 
@@ -50,17 +47,6 @@ VideoFormat checkedFormat(const std::string& path, int width, int height, double
   return format->format;
 }
 
-std::string checkedPartialPath(const std::string& path) {
-  namespace fs = std::filesystem;
-  const fs::path folder = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
-  std::error_code error;
-  if (!fs::is_directory(folder, error)) throw std::runtime_error(path + ": cannot be written: no such folder");
-  if (fs::is_directory(path, error)) throw std::runtime_error(path + ": cannot be written: it is a folder");
-  if (access(folder.c_str(), W_OK) != 0)
-    throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
-  return path + ".partial-" + std::to_string(getpid());
-}
-
 // What the encoder complains of, if it does.
 template <class F>
 std::string reasonOf(const F& encode) {
@@ -72,13 +58,11 @@ std::string reasonOf(const F& encode) {
   return "";
 }
 
-VideoEncoder openEncoder(const std::string& path, const std::string& partial, int width, int height, double fps) {
+VideoEncoder openEncoder(const std::string& path, const PartialFile& partial, int width, int height, double fps) {
   const VideoFormat format = checkedFormat(path, width, height, fps);
   try {
-    return {format, partial, width, height, fps};
+    return {format, partial.path(), width, height, fps};
   } catch (const std::runtime_error& error) {
-    std::error_code ignored;
-    std::filesystem::remove(partial, ignored);
     throw std::runtime_error(path + ": cannot be written: " + error.what());
   }
 }
@@ -87,7 +71,8 @@ VideoEncoder openEncoder(const std::string& path, const std::string& partial, in
 
 // The caller queues pictures; one thread encodes them, so that encoding overlaps drawing.
 struct VideoWriter::Data {
-  std::string path, partial;
+  std::string path;
+  PartialFile partial;
   int width, height;
   VideoEncoder encoder;
   std::mutex mutex;
@@ -99,12 +84,7 @@ struct VideoWriter::Data {
   std::thread feeder;
 
   Data(const std::string& p, int w, int h, double fps)
-      : path(p),
-        partial(checkedPartialPath(behindLink(p))),
-        width(w),
-        height(h),
-        encoder(openEncoder(p, partial, w, h, fps)),
-        spare(kQueuedPictures) {
+      : path(p), partial(p), width(w), height(h), encoder(openEncoder(p, partial, w, h, fps)), spare(kQueuedPictures) {
     feeder = std::thread([this] { feed(); });
   }
 
@@ -114,8 +94,6 @@ struct VideoWriter::Data {
       abandoned = true;  // such a film is not encoded to its end
     }
     end();
-    std::error_code ignored;
-    std::filesystem::remove(partial, ignored);
   }
 
   void end() {
@@ -198,9 +176,7 @@ void VideoWriter::finish(const std::function<void()>& goOn) {
     data_->failure = error.what();
   }
   if (!data_->failure.empty()) data_->fail(data_->failure);
-  std::error_code error;
-  std::filesystem::rename(data_->partial, behindLink(data_->path), error);
-  if (error) throw std::runtime_error(data_->path + ": cannot be written: " + error.message());
+  data_->partial.commit();
 }
 
 }  // namespace medulla

@@ -62,7 +62,7 @@ TEST_F(Outputs, AKilledRunIsResumedToTheSameBytes) {
   EXPECT_FALSE(fs::exists(folder / "frames/00000.png"));
   // As a power cut would leave them: a name without its bytes, and a file under a temporary name.
   fs::resize_file(collecting / "00003.png", 50);
-  folder.write("frames.0-50.part/00049.png.partial-1", "x");
+  folder.write("frames.0-50.part/00049.png.1-0.part", "x");
   const auto earlier = fs::last_write_time(collecting / "00005.png");
 
   // ^C keeps them, too.

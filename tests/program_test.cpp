@@ -481,7 +481,7 @@ TEST(Program, InterruptEndsAFilmThatIsBeingFinished) {
   ProgramOptions options;
   options.interruptWhen = [&] {  // nothing is written before
     for (const std::string& entry : folder.contents())
-      if (entry.find(".gif.partial") != std::string::npos && !readFile(folder / entry).empty()) return true;
+      if (entry.starts_with("film.gif.") && !readFile(folder / entry).empty()) return true;
     return false;
   };
   const ProgramResult r = runProgram({"render", kScene, "-o", folder / "film.gif", "--set", "clock.duration=3", "--set",

@@ -259,7 +259,8 @@ TEST_F(VideoWriterTest, WhatEncodingTookIsKnown) {
 }
 
 TEST_F(VideoWriterTest, UnwritableTargetIsRefusedAtOnce) {
-  EXPECT_NE(messageOf([&] { VideoWriter(path("none/a.mp4"), 64, 32, 30); }).find("no such folder"), std::string::npos);
+  EXPECT_NE(messageOf([&] { VideoWriter(path("none/a.mp4"), 64, 32, 30); }).find("No such file or directory"),
+            std::string::npos);
   fs::create_directories(path("b.mp4"));
   EXPECT_NE(messageOf([&] { VideoWriter(path("b.mp4"), 64, 32, 30); }).find("folder"), std::string::npos);
 }

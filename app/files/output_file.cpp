@@ -3,57 +3,35 @@
 #include <stdexcept>
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <fmt/core.h>
 
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 
 #include "app/files/input_error.h"
-#include "render/behind_link.h"
 
 namespace medulla {
 
-static std::runtime_error systemError(const std::string& path, const std::string& what) {
-  return inputError(path, 0, what + ": " + std::strerror(errno));
+static std::runtime_error unwritable(const std::string& path) {
+  return inputError(path, 0, std::string("cannot be written: ") + std::strerror(errno));
 }
 
-// Renaming onto a device would replace that.
-static std::string resolveTarget(const std::string& path) {
-  if (path.empty() || path.back() == '/') throw inputError(path, 0, "expected the name of a file to write");
-  std::string target = behindLink(path);
-  struct stat status {};
-  if (::stat(target.c_str(), &status) == 0) {
-    if (S_ISDIR(status.st_mode)) throw inputError(path, 0, "is a folder, expected the name of a file to write");
-    if (!S_ISREG(status.st_mode)) throw inputError(path, 0, "is not a regular file");
-    if (::access(target.c_str(), W_OK) != 0) throw systemError(path, "cannot be written");
-  }
-  return target;
-}
-
-OutputFile::OutputFile(const std::string& path) : path_(resolveTarget(path)) {
-  const mode_t readAndWrite = 0666;  // less the user's mask
-  // Names left by killed runs are stepped over: O_EXCL never touches a file that somebody else made.
-  for (int attempt = 0; descriptor_ < 0; ++attempt) {
-    temporaryPath_ = path_ + "." + std::to_string(::getpid()) + "-" + std::to_string(attempt) + ".part";
-    descriptor_ = ::open(temporaryPath_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, readAndWrite);
-    if (descriptor_ < 0 && errno != EEXIST) throw systemError(path_, "cannot be written");
-  }
+OutputFile::OutputFile(const std::string& path)
+    : path_(path), file_(path), descriptor_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
+  if (descriptor_ < 0) throw unwritable(path_);
 }
 
 OutputFile::~OutputFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
-  if (!temporaryPath_.empty()) ::unlink(temporaryPath_.c_str());
 }
 
 void OutputFile::flush() {
   for (std::size_t done = 0; done < buffer_.size();) {
     const ssize_t count = ::write(descriptor_, buffer_.data() + done, buffer_.size() - done);
-    if (count < 0 && errno != EINTR) throw systemError(path_, "cannot be written");
+    if (count < 0 && errno != EINTR) throw unwritable(path_);
     if (count > 0) done += static_cast<std::size_t>(count);
   }
   buffer_.clear();
@@ -70,9 +48,8 @@ void OutputFile::commit() {
   const int descriptor = descriptor_;
   descriptor_ = -1;
   // Some file systems report a full disk only here.
-  if (::close(descriptor) != 0) throw systemError(path_, "cannot be written");
-  if (std::rename(temporaryPath_.c_str(), path_.c_str()) != 0) throw systemError(path_, "cannot be written");
-  temporaryPath_.clear();
+  if (::close(descriptor) != 0) throw unwritable(path_);
+  file_.commit();
 }
 
 void writeText(const std::string& path, const std::string& text) {

@@ -3,17 +3,17 @@
 #include <string>
 #include <vector>
 
+#include "render/partial_file.h"
+
 namespace medulla {
 
 // Throws std::runtime_error when a command would write one file twice, or over a file that it reads. Links and "./"
 // are seen through; empty names are skipped.
 void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
 
-// A text file that appears under its name only when whole: it is collected beside the target under a name of its own
-// (TARGET.PID-N.part) and renamed by commit(). Destroyed before that, it leaves nothing and an earlier file stays as it
-// was; ^C becomes an exception (app/interrupt.h) and so comes here too.
-// The constructor throws std::runtime_error at once where the target cannot be written (no such folder, not permitted,
-// a folder or device of that name), write() and commit() where the system fails (disk full), with path and reason.
+// A text file that appears under its name only when whole (render/partial_file.h); ^C becomes an exception
+// (app/interrupt.h), and so leaves nothing either. The constructor throws what PartialFile's throws, write() and
+// commit() std::runtime_error with path and reason where the system fails (disk full).
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path);
@@ -26,8 +26,9 @@ class OutputFile {
  private:
   void flush();
 
-  std::string path_, temporaryPath_;
-  int descriptor_ = -1;
+  std::string path_;
+  PartialFile file_;
+  int descriptor_;
   std::string buffer_;
 };
 

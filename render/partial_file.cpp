@@ -1,0 +1,63 @@
+#include "render/partial_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+
+namespace medulla {
+
+static std::runtime_error unwritable(const std::string& path) {
+  return std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
+}
+
+static std::string behindLink(const std::string& path) {
+  constexpr int kMost = 40;  // as many as Linux follows: a circle ends
+  std::filesystem::path target = path;
+  std::error_code error;
+  for (int k = 0; k < kMost && std::filesystem::is_symlink(target, error); ++k)
+    target = target.parent_path() / std::filesystem::read_symlink(target, error);
+  return target.string();
+}
+
+// Renaming onto a device would replace that.
+static std::string resolveTarget(const std::string& path) {
+  if (path.empty() || path.back() == '/') throw std::runtime_error(path + ": expected the name of a file to write");
+  std::string target = behindLink(path);
+  struct stat status {};
+  if (::stat(target.c_str(), &status) == 0) {
+    if (S_ISDIR(status.st_mode)) throw std::runtime_error(path + ": is a folder, expected the name of a file to write");
+    if (!S_ISREG(status.st_mode)) throw std::runtime_error(path + ": is not a regular file");
+    if (::access(target.c_str(), W_OK) != 0) throw unwritable(path);
+  }
+  return target;
+}
+
+PartialFile::PartialFile(const std::string& target) : target_(resolveTarget(target)) {
+  const mode_t readAndWrite = 0666;  // less the user's mask
+  // Names left by killed runs are stepped over: O_EXCL never touches a file that somebody else made.
+  for (int attempt = 0;; ++attempt) {
+    path_ = target_ + "." + std::to_string(::getpid()) + "-" + std::to_string(attempt) + ".part";
+    const int descriptor = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, readAndWrite);
+    if (descriptor < 0 && errno != EEXIST) throw unwritable(target);
+    if (descriptor < 0) continue;
+    ::close(descriptor);
+    return;
+  }
+}
+
+PartialFile::~PartialFile() {
+  if (!path_.empty()) ::unlink(path_.c_str());
+}
+
+void PartialFile::commit() {
+  if (std::rename(path_.c_str(), target_.c_str()) != 0) throw unwritable(target_);
+  path_.clear();
+}
+
+}  // namespace medulla

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+
+namespace medulla {
+
+// A file beside its target that takes the target's name only when it is whole: TARGET.PID-N.part up to commit().
+// Destroyed before that it is removed, and an earlier file of that name stays as it was. What a symbolic link stands
+// for is replaced, not the link, also where there is nothing yet.
+class PartialFile {
+ public:
+  // There at once, and empty. Throws std::runtime_error with path and reason where the target cannot be written: no
+  // such folder, not permitted, a folder or a device of that name.
+  explicit PartialFile(const std::string& target);
+  ~PartialFile();
+  PartialFile(const PartialFile&) = delete;
+  PartialFile& operator=(const PartialFile&) = delete;
+
+  const std::string& path() const { return path_; }  // where to write
+  void commit();                                     // once, last; throws likewise
+
+ private:
+  std::string target_, path_;
+};
+
+}  // namespace medulla
