@@ -108,6 +108,7 @@ void settleTool(WorldData& d, const ImplicitData& s, const PointLoad& load, cons
 }
 
 void addDeadLoads(const WorldData& d, ImplicitData& s, double time) {
+  if (d.frame < 0) return;
   for (const NodeForce& load : d.deadLoads) {
     const double size = load.force.norm();
     if (time < load.from || !(size > 0)) continue;

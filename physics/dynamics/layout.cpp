@@ -330,7 +330,8 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.node.resize(m.restNodes.size());
     r.restVolume = enclosedVolume(m);
     r.massDamping = mechanics[b].massDamping;
-    r.held = !d.bodies[b].fixed.empty() || !d.bodies[b].fixedNodes.empty();
+    const bool knowsNodes = d.bodies[b].surface != SurfaceMode::skin || d.bodies[b].links == LinkModel::identified;
+    r.held = !d.bodies[b].fixed.empty() || (knowsNodes && !d.bodies[b].fixedNodes.empty());
     d.ranges.push_back(r);
     addSpheres(d, d.bodies[b], mechanics[b]);
     if (r.linkCount > 0) addLinks(d, d.bodies[b], mechanics[b], r.firstSphere);

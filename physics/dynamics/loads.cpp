@@ -176,6 +176,7 @@ void layOutDeadLoads(WorldData& d) {
 
 // A constant force bounds no step: explicit, and by the same way to the hosts of a skin as the tools' forces.
 void applyDeadLoads(WorldData& d, double time) {
+  if (d.frame < 0) return;
   for (const NodeForce& load : d.deadLoads) {
     if (time < load.from) continue;
     const double share = time < load.to ? (time - load.from) / (load.to - load.from) : 1;

@@ -6,7 +6,7 @@
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/stages.h"
 
-// The surface (paper 2.3): point masses on the nodes, damped springs on the edges, elastic attachments to the skeleton.
+// The surface (paper 2.3): point masses on the nodes, springs on the edges, damped attachments to the skeleton.
 namespace medulla {
 
 namespace {
