@@ -10,7 +10,7 @@ namespace medulla {
 
 const std::vector<ShownPart>& shownParts() {
   static const std::vector<ShownPart> parts = {
-      {"mesh", &Shown::mesh, true, "the surface's damped springs"},
+      {"mesh", &Shown::mesh, true, "the surface's springs"},
       {"skeleton", &Shown::skeleton, true, "medial axis that the spheres were placed along"},
       {"spheres", &Shown::spheres, true, "filling spheres, grey where they are held"},
       {"buckets", &Shown::buckets, true, "their second radius, around the triangles that the proxy looks for in them"},

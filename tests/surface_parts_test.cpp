@@ -177,6 +177,27 @@ TEST(SurfaceParts, WeightHangsTheSurfaceWhereAFullOneHangs) {
   EXPECT_LT(farthestApart(part, full, rest), 1e-5);
 }
 
+// A tool that asks for parts and does nothing leaves a body that hangs at rest where it is: their nodes' weight, which
+// the spheres felt, is theirs now, not both's.
+TEST(SurfaceParts, PartsThatJoinDoNotWeighTwice) {
+  BodyDescription body = tube(SurfaceMode::contact, true);
+  body.tissue.damping = 2;
+  World world = worldOf(body, {0, -5, 0});
+  for (int k = 0; k < 400; ++k) world.advance({});
+  const int resting = world.dynamicNodes(0);
+  const std::vector<Quad> before = world.data().spheres.position;
+  Loads nothing = holding(world, kNode, Vector3d::Zero());
+  nothing.heldNodes[0].stiffness = nothing.heldNodes[0].damping = 0;
+  double moved = 0;
+  for (int k = 0; k < 5; ++k) {
+    world.advance(nothing);
+    for (int i = 0; i < world.data().spheres.count; ++i)
+      moved = std::max(moved, (vectorOf(world.data().spheres.position[i]) - vectorOf(before[i])).norm());
+  }
+  EXPECT_GT(world.dynamicNodes(0), resting);
+  EXPECT_LT(moved, 1e-9);  // 7e-6 where both feel it
+}
+
 // Weight is felt where nodes hang, and not at all by a body that falls: it goes on to turn as it was thrown.
 TEST(SurfaceParts, AFallingBodyTurnsAsAFullSurfaceDoes) {
   const auto thrown = [](SurfaceMode surface) {

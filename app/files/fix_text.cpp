@@ -33,17 +33,24 @@ std::vector<double> numbersOf(std::string_view list) {
   return out;
 }
 
+// As a user would write it: "sphere=x,y,z,r".
+std::string exampleOf(const RegionForm& form) {
+  std::string numbers = form.numbers;
+  std::replace(numbers.begin(), numbers.end(), ' ', ',');
+  return fmt::format("{}={}", form.word, numbers);
+}
+
 Region regionOf(const std::string& text, std::string_view word, std::string_view list) {
   for (const RegionForm& form : kRegionForms) {
     if (word != form.word) continue;
     const std::vector<double> numbers = numbersOf(list);
     if (numbers.size() == form.count)
       if (const std::optional<Region> region = makeRegion(form.shape, numbers)) return *region;
-    std::string example = form.numbers;
-    std::replace(example.begin(), example.end(), ' ', ',');
-    refuse(text, fmt::format("{}={}, {}", form.word, example, form.rule));
+    refuse(text, fmt::format("{}, {}", exampleOf(form), form.rule));
   }
-  refuse(text, "box=x0,y0,z0,x1,y1,z1, sphere=x,y,z,r, plane=nx,ny,nz,d or vertices=FILE.csv");
+  std::string forms;
+  for (const RegionForm& form : kRegionForms) forms += exampleOf(form) + ", ";
+  refuse(text, forms + "or vertices=FILE.csv");
 }
 
 }  // namespace

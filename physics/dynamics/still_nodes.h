@@ -8,20 +8,29 @@
 // node's normal.
 namespace medulla {
 
-// m/N, of the four nodes of group g along their normals.
-MEDULLA_INLINE Lanes giveAlongNormal(const WorldData& d, int g) {
-  const Lanes give = d.surface.give[g].perForce;
-  if (d.identified.ofNodeGroup[g] < 0) return give;
+// m/N, of the four nodes of group g along their normals, where they give `perForce` without what identified attachments
+// have more there.
+MEDULLA_INLINE Lanes giveAlongNormal(const WorldData& d, int g, Lanes perForce) {
+  if (d.identified.ofNodeGroup[g] < 0) return perForce;
   const Lanes excess = d.identified.skin[d.identified.ofNodeGroup[g]].normalExcess;  // N/m5
-  return give / fma(excess * give, dot(d.nodes.area[g], d.nodes.area[g]), splat(1));
+  return perForce / fma(excess * perForce, dot(d.nodes.area[g], d.nodes.area[g]), splat(1));
+}
+MEDULLA_INLINE Lanes giveAlongNormal(const WorldData& d, int g) {
+  return giveAlongNormal(d, g, d.surface.give[g].perForce);
+}
+
+// m, what they give of the `even` way that they would without: (1/perForce + excess a a^T) inverted by Sherman and
+// Morrison's formula.
+MEDULLA_INLINE Lanes3 yielding(const WorldData& d, int g, Lanes perForce, const Lanes3& even) {
+  if (d.identified.ofNodeGroup[g] < 0) return even;
+  const Lanes3& area = d.nodes.area[g];
+  const Lanes excess = d.identified.skin[d.identified.ofNodeGroup[g]].normalExcess;
+  return fnma(excess * dot(area, even) * giveAlongNormal(d, g, perForce), area, even);
 }
 
 // m, of the four nodes of group g under their weight, without pressure.
 MEDULLA_INLINE Lanes3 sagOf(const WorldData& d, const Lanes3& gravity, int g) {
-  const Lanes3 even = d.surface.give[g].perGravity * gravity, area = d.nodes.area[g];
-  if (d.identified.ofNodeGroup[g] < 0) return even;
-  const Lanes excess = d.identified.skin[d.identified.ofNodeGroup[g]].normalExcess;
-  return fnma(excess * dot(area, even) * giveAlongNormal(d, g), area, even);
+  return yielding(d, g, d.surface.give[g].perForce, d.surface.give[g].perGravity * gravity);
 }
 
 // m, with it.

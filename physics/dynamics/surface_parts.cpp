@@ -212,16 +212,6 @@ double measureShifts(WorldData& d, std::size_t part) {
   return longest(squared);
 }
 
-// m: what four nodes yield to a pull (N) by 1/K (m/N), and by less along the normals of those whose attachments are
-// stiffer there, K + e a a^T, inverted by Sherman and Morrison's formula.
-Lanes3 yielding(const WorldData& d, int g, Lanes perForce, const Lanes3& pull) {
-  const Lanes3 even = perForce * pull, &area = d.nodes.area[g];
-  const int skin = d.identified.ofNodeGroup[g];
-  if (skin < 0) return even;
-  const Lanes excess = d.identified.skin[skin].normalExcess * perForce;
-  return fnma(excess * dot(area, even) / fma(excess, dot(area, area), splat(1)), area, even);
-}
-
 // Shifts of the nodes of a part that is carried: to where edges and attachments hold them against their neighbours as
 // these are, one step of Jacobi's iteration per frame. The neighbours so feel what they would of nodes that move.
 // Returns the largest, m.
@@ -234,7 +224,8 @@ double balanceShifts(WorldData& d, std::size_t part) {
     const Lanes3 alone = gatherFour(d.nodes.displaced, 4 * g) - gatherFour(s.shift, 4 * g);
     const Lanes3 pull = pullOfEdges(d.springs, d.nodes.groups.data(), d.nodes.displaced.data(), alone, g);
     const Lanes moves = isLess(zero, _mm256_loadu_pd(&d.nodes.inverseMass[4 * g]));
-    const Lanes3 shift = yielding(d, g, _mm256_and_pd(moves, splat(1) / (group.stiffness + group.edges)), pull);
+    const Lanes perForce = _mm256_and_pd(moves, splat(1) / (group.stiffness + group.edges));
+    const Lanes3 shift = yielding(d, g, perForce, perForce * pull);
     storeFour(shift, s.shift, 4 * g);
     squared = larger(squared, dot(shift, shift));
   }
