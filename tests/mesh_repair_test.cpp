@@ -470,13 +470,13 @@ TEST(MeshTopology, SphereHasItsAreasVolumeAndNeighbours) {
   EXPECT_TRUE(std::is_sorted(edges.begin(), edges.end()));
   const IndexLists around = trianglesOfVertices(mesh);
   EXPECT_EQ(around.item.size(), 3 * mesh.triangles.size());
-  const std::vector<Vector3d> normals = vertexNormals(mesh);
+  const std::vector<Eigen::Vector3d> normals = vertexNormals(mesh);
   for (int v = 0; v < static_cast<int>(mesh.vertices.size()); ++v) {
     const auto touches = [v](const auto& edge) { return edge[0] == v || edge[1] == v; };
     EXPECT_EQ(std::count_if(edges.begin(), edges.end(), touches), around.first[v + 1] - around.first[v]);
     EXPECT_NEAR(normals[v].dot(mesh.vertices[v].normalized()), 1, 0.01);
   }
-  const auto seenFrom = [&](const Vector3d& point) {
+  const auto seenFrom = [&](const Eigen::Vector3d& point) {
     double angles = 0;
     for (const auto& t : mesh.triangles) angles += solidAngle(mesh, t, point);
     return angles / (4 * M_PI);
