@@ -27,7 +27,8 @@ const aiScene* import(Assimp::Importer& importer, const std::string& path) {
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, ~static_cast<int>(aiComponent_MESHES));
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   constexpr unsigned kSteps = aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_SortByPType |
-                              aiProcess_PreTransformVertices | aiProcess_JoinIdenticalVertices;
+                              aiProcess_PreTransformVertices | aiProcess_JoinIdenticalVertices |
+                              aiProcess_ValidateDataStructure;  // first: the other steps trust indices
   const aiScene* scene = nullptr;
   std::string reason;
   try {

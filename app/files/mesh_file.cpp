@@ -9,6 +9,7 @@
 #include "app/files/input_error.h"
 #include "app/files/obj_reader.h"
 #include "app/files/off_reader.h"
+#include "app/files/ply_reader.h"
 #include "app/files/text_file.h"
 
 namespace medulla {
@@ -53,6 +54,8 @@ TriangleMesh readMesh(const std::string& path, double metresPerFileUnit) {
     mesh = parseObj(readTextFile(path), path);
   } else if (extension == ".off") {
     mesh = parseOff(readTextFile(path), path);
+  } else if (extension == ".ply") {
+    mesh = parsePly(readTextFile(path), path);
   } else if (assimpReads(extension)) {
     mesh = readWithAssimp(path);
   } else {

@@ -12,7 +12,7 @@ const std::vector<std::string>& lengthUnits();  // m, cm, mm, micron, inch
 // Metres per unit of a file. Throws std::runtime_error naming the known units.
 double metresPerUnit(const std::string& unit);
 
-// Reads a triangle mesh. OBJ and OFF by a reader of our own (vertex order kept, double precision, indices checked,
+// Reads a triangle mesh. OBJ, OFF and PLY by a reader of our own (vertex order kept, double precision, indices checked,
 // polygons fanned); every other format through assimp. Vertices are scaled to metres.
 // Throws std::runtime_error "FILE:LINE: ..." on missing, unreadable or malformed files, NaN, infinity, bad indices.
 TriangleMesh readMesh(const std::string& path, double metresPerFileUnit = 1);
