@@ -10,6 +10,7 @@
 #include "app/files/recording_file.h"
 #include "app/files/trajectory_file.h"
 #include "app/files/vertex_file.h"
+#include "app/files/xml_element.h"
 #include "app/shape_mesh.h"
 #include "app/simulation.h"
 #include "physics/dynamics/fixation.h"
@@ -189,6 +190,16 @@ static Trajectory loadTrajectory(const Scene& scene, SceneTool& tool) {
   return readRecording(map);
 }
 
+// Of the mesh file's shape, which single precision draws and asks for contacts.
+static void requireNearby(const Scene& scene, const SceneStatic& item, const TriangleMesh& mesh) {
+  double most = 0;
+  for (const Eigen::Vector3d& x : mesh.vertices) most = std::max(most, x.lpNorm<Eigen::Infinity>());
+  if (most <= anyPlace.most) return;
+  throw valueError(scene, item.line, "mesh",
+                   fmt::format("{} reaches {:.3g} m from its origin, expected at most {} m; is its unit right?",
+                               item.meshPath, most, anyPlace.most));
+}
+
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories) {
   LoadedScene loaded;
   for (SceneTool& tool : scene.tools) {
@@ -209,6 +220,7 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
     if (!item.meshPath.empty()) requireFile(scene, item.line, "mesh", "mesh", item.meshPath);
     loaded.statics.push_back(item.meshPath.empty() ? shapeMesh(item.shape)
                                                    : readMesh(item.meshPath, metresPerUnit(item.unit)));
+    requireNearby(scene, item, loaded.statics.back());
   }
   for (SceneTool& tool : scene.tools) loaded.trajectories.push_back(loadTrajectory(scene, tool));
   loaded.scene = std::move(scene);

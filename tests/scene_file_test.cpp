@@ -216,6 +216,39 @@ TEST_F(SceneFile, MistakesInTheStructureNameTheLineAndWhatWasExpected) {
   for (const Mistake& m : mistakes) EXPECT_EQ(complaint(edited(m.from, m.to)), m.complaint);
 }
 
+// What single precision, or a product of two, would make infinity of.
+TEST_F(SceneFile, NumbersBeyondWhatCanBeDrawnOrSimulatedAreRefused) {
+  const Mistake mistakes[] = {
+      {"6e3", "1e300", R"(x.xml:7: <tissue> young="1e300": expected no number beyond 1e+30)"},
+      {"0.1 0.2 0.3", "0.1 0.2 -1e9", R"(x.xml:10: <body> position="0.1 0.2 -1e9": expected no number beyond 1000)"},
+      {"amplitude=\"0.1\"", "amplitude=\"1e4\"",
+       R"(x.xml:13: <drive> amplitude="1e4": expected no number beyond 1000)"},
+      {"position=\"1 0 0\"", "position=\"1e39 0 0\"",
+       R"(x.xml:17: <static> position="1e39 0 0": expected no number beyond 1000)"},
+      {"normal=\"0 0 2\"", "normal=\"0 0 1e200\"",
+       R"(x.xml:17: <static> normal="0 0 1e200": expected no number beyond 1e+30)"},
+      {"size=\"1 2 3\"", "size=\"1 2 1001\"", R"(x.xml:17: <static> size="1 2 1001": expected no number beyond 1000)"},
+      {"radius=\"4\"", "radius=\"1e39\"", R"(x.xml:17: <static> radius="1e39": expected no number beyond 1000)"},
+      {"radius=\"0.004\"", "radius=\"100\"", R"(x.xml:18: <tool> radius="100": expected no number beyond 5)"},
+      {"grip_radius=\"0.007\"", "grip_radius=\"6\"",
+       R"(x.xml:19: <tool> grip_radius="6": expected no number beyond 5)"},
+      {"position=\"0 0 0.2\"", "position=\"0 0 1e39\"",
+       R"(x.xml:20: <camera> position="0 0 1e39": expected no number beyond 1000)"},
+      {"target=\"0 0.01 0\"", "target=\"0 1e39 0\"",
+       R"(x.xml:20: <camera> target="0 1e39 0": expected no number beyond 1000)"},
+      {"target=\"0.1 0 0\"", "target=\"-2000 0 0\"",
+       R"(x.xml:22: <key> target="-2000 0 0": expected no number beyond 1000)"},
+      {"position=\"0.01 0 0.01\"", "position=\"0.01 0 1e4\"",
+       R"(x.xml:24: <light> position="0.01 0 1e4": expected no number beyond 1000)"},
+      {"reference_distance=\"0.2\"", "reference_distance=\"1e39\"",
+       R"(x.xml:24: <light> reference_distance="1e39": expected no number beyond 1000)"},
+      {"haze_distance=\"4\"", "haze_distance=\"1e39\"",
+       R"(x.xml:24: <light> haze_distance="1e39": expected no number beyond 1000)"},
+  };
+  for (const Mistake& m : mistakes) EXPECT_EQ(complaint(edited(m.from, m.to)), m.complaint);
+  EXPECT_EQ(complaint(edited("0.1 0.2 0.3", "1000 -1000 0")), "");
+}
+
 TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
   const Mistake mistakes[] = {
       {"6e3", "6e3Pa", R"(x.xml:7: <tissue> young="6e3Pa": expected 1 number > 0)"},

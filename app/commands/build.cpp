@@ -115,8 +115,8 @@ void readMeshes(double scale, std::vector<BuildJob>& jobs) {
   for (BuildJob& job : jobs) {
     const TriangleMesh input = readMesh(job.meshPath, scale);
     job.inputHash = hashMesh(input);
-    warnOfSize(job.meshPath, input);
     job.mesh = naming(job.meshPath, [&] { return repairMesh(input); });
+    warnOfSize(job.meshPath, input);  // of one that is not refused
     tellRepairs(job.meshPath, job.mesh.notes);
     if (!job.finePath.empty()) job.fine = readMesh(job.finePath, scale);
   }

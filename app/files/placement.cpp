@@ -5,8 +5,9 @@
 
 namespace medulla {
 
-Eigen::Vector3d readVector(const XmlElement& element, const std::string& attribute, const Eigen::Vector3d& fallback) {
-  const std::vector<double> v = readNumbers(element, attribute, 3);
+Eigen::Vector3d readVector(const XmlElement& element, const std::string& attribute, const Eigen::Vector3d& fallback,
+                           Range range) {
+  const std::vector<double> v = readNumbers(element, attribute, 3, range);
   return v.empty() ? fallback : Eigen::Vector3d(v[0], v[1], v[2]);
 }
 
@@ -24,7 +25,7 @@ Eigen::Quaterniond readOrientation(const XmlElement& element, const std::string&
 Eigen::Isometry3d readPlacement(const XmlElement& element) {
   Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
   if (element.find("orientation")) out.linear() = readOrientation(element, "orientation").toRotationMatrix();
-  out.translation() = readVector(element, "position", Eigen::Vector3d::Zero());
+  out.translation() = readVector(element, "position", Eigen::Vector3d::Zero(), anyPlace);
   return out;
 }
 

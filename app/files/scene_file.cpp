@@ -188,7 +188,7 @@ std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::v
     if (std::any_of(out.begin(), out.end(), isThis)) refuse(*drive, "sphere", "this sphere is driven twice");
     d.axis = readVector(*drive, "axis", d.axis);
     if (d.axis.isZero()) refuse(*drive, "axis", "expected a direction");
-    d.amplitude = readNumber(*drive, "amplitude", d.amplitude, notNegative);
+    d.amplitude = readNumber(*drive, "amplitude", d.amplitude, {.low = 0, .most = anyLength.most});
     d.frequency = readNumber(*drive, "frequency", d.frequency, positive);
     d.phase = readNumber(*drive, "phase", d.phase);
     d.velocity = readVector(*drive, "velocity", d.velocity);
@@ -277,9 +277,9 @@ void readShape(const XmlElement& e, StaticShape& shape) {
     if (!(normal.norm() > 0)) refuse(e, "normal", "expected a direction");
     shape.worldFromShape.linear() = rotationBetween(Eigen::Vector3d::UnitY(), normal).toRotationMatrix();
   }
-  const std::vector<double> size = readNumbers(e, "size", 3, positive);
+  const std::vector<double> size = readNumbers(e, "size", 3, anyLength);
   if (box) shape.size = {size[0], size[1], size[2]};
-  shape.radius = readNumber(e, "radius", shape.radius, positive);
+  shape.radius = readNumber(e, "radius", shape.radius, anyLength);
   shape.friction = readNumber(e, "friction", shape.friction, notNegative);
 }
 
@@ -299,6 +299,7 @@ void readStatics(const XmlElement& root, Scene& scene) {
 }
 
 void readTools(const XmlElement& root, Scene& scene) {
+  constexpr Range toolLength{.low = 0, .lowExcluded = true, .most = toolReach / 4};  // queries go little beyond a tool
   std::set<std::string> taken;
   for (const XmlElement* e : childrenOf(root, "tool")) {
     SceneTool tool;
@@ -306,11 +307,11 @@ void readTools(const XmlElement& root, Scene& scene) {
     tool.line = e->line;
     tool.name = readUniqueName(*e, taken);
     tool.trajectoryPath = readPath(*e, "trajectory", scene.path);
-    s.radius = readNumber(*e, "radius", s.radius, positive);
+    s.radius = readNumber(*e, "radius", s.radius, toolLength);
     s.stiffness = readNumber(*e, "stiffness", s.stiffness, positive);
     s.damping = readNumber(*e, "damping", s.damping, notNegative);
     s.forceMax = readNumber(*e, "force_max", s.forceMax, positive);
-    s.gripRadius = readNumber(*e, "grip_radius", s.gripRadius, positive);
+    s.gripRadius = readNumber(*e, "grip_radius", s.gripRadius, toolLength);
     s.gripForceMax = readNumber(*e, "grip_force_max", s.gripForceMax, positive);
     const std::vector<double> friction = readNumbers(*e, "friction", 2, notNegative);
     if (!friction.empty()) {
@@ -326,8 +327,8 @@ void readTools(const XmlElement& root, Scene& scene) {
 CameraKey readCameraKey(const XmlElement& e, CameraKey key) {
   key.line = e.line;
   key.time = readNumber(e, "t", 0, notNegative);
-  key.position = readVector(e, "position", key.position);
-  key.target = readVector(e, "target", key.target);
+  key.position = readVector(e, "position", key.position, anyPlace);
+  key.target = readVector(e, "target", key.target, anyPlace);
   key.fovDegrees = readNumber(e, "fov", key.fovDegrees, {0, 180, true, true});
   if (key.position == key.target) refuse(e, "position", "position and target are the same point");
   return key;
@@ -348,15 +349,15 @@ void readCamera(const XmlElement& camera, Scene& scene) {
 }
 
 void readLight(const XmlElement& light, Scene& scene) {
-  scene.lightOffset = readVector(light, "offset", scene.lightOffset);
+  scene.lightOffset = readVector(light, "offset", scene.lightOffset, anyPlace);
   scene.lightIntensity = readNumber(light, "intensity", scene.lightIntensity, notNegative);
-  scene.lightReferenceDistance = readNumber(light, "reference_distance", scene.lightReferenceDistance, positive);
-  if (light.find("position")) scene.lightPosition = readVector(light, "position", Eigen::Vector3d::Zero());
+  scene.lightReferenceDistance = readNumber(light, "reference_distance", scene.lightReferenceDistance, anyLength);
+  if (light.find("position")) scene.lightPosition = readVector(light, "position", Eigen::Vector3d::Zero(), anyPlace);
   if (scene.lightPosition && light.find("offset"))
     refuse(light, "offset", "the light has a position in the world, expected one of the two");
   const std::vector<double> haze = readNumbers(light, "haze", 3, notNegative);
   if (!haze.empty()) scene.haze = Eigen::Vector3d(haze[0], haze[1], haze[2]);
-  scene.hazeDistance = readNumber(light, "haze_distance", scene.hazeDistance, positive);
+  scene.hazeDistance = readNumber(light, "haze_distance", scene.hazeDistance, anyLength);
   if (!scene.haze && light.find("haze_distance")) refuse(light, "haze_distance", "expected a haze beside it");
   scene.caustics = readNumber(light, "caustics", scene.caustics, {0, 1});
   if (!scene.lightPosition && scene.caustics > 0) refuse(light, "caustics", "expected a light with a position");

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
@@ -197,6 +198,10 @@ std::vector<T> readList(const XmlElement& element, const std::string& attribute,
     const std::optional<T> value = parseNumber<T>(text);
     if (!value || !contains(range, *value)) refuse(element, attribute, expected);
     values.push_back(*value);
+    if (std::abs(static_cast<double>(*value)) <= range.most) continue;
+    std::string most;
+    appendNumber(most, range.most);
+    refuse(element, attribute, "expected no number beyond " + most);
   }
   return values;
 }

@@ -56,10 +56,14 @@ std::string nearestName(const std::string& name, const std::vector<std::string>&
 struct Range {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
   bool lowExcluded = false, highExcluded = false;
+  double most = 1e30;  // either way: products of larger numbers overflow
 };
 inline constexpr Range anyNumber{};
 inline constexpr Range positive{0, std::numeric_limits<double>::infinity(), true, false};
 inline constexpr Range notNegative{0};
+// In metres, of what is drawn and felt: both is done in single precision.
+inline constexpr Range anyPlace{.most = 1000};
+inline constexpr Range anyLength{.low = 0, .lowExcluded = true, .most = anyPlace.most};
 
 // Complaint about one attribute: "WHERE: <element> name="value": message".
 [[noreturn]] void refuse(const XmlElement& element, const std::string& attribute, const std::string& message);
