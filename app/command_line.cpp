@@ -164,7 +164,8 @@ struct RenderArguments {
   bool resume = false, timings = false;
 };
 
-// "{scene}" in the name of a file stands for the scene's: so several scenes have files of their own.
+// "{scene}" in the name of a file stands for the scene file's, without its ending: so several scenes have files of
+// their own.
 std::string fileOf(const std::string& scene, std::string path) {
   const std::string place = "{scene}", name = std::filesystem::path(scene).stem().string();
   for (std::size_t at = path.find(place); at != std::string::npos; at = path.find(place, at + name.size()))
@@ -235,7 +236,7 @@ void checkRender(const RenderArguments& a) {
   files.insert(files.end(), a.run.records.begin(), a.run.records.end());
   for (const std::string& file : files)
     if (a.scenes.size() > 1 && file.find("{scene}") == std::string::npos)
-      usageError("of several scenes", file, "a name with {scene} in it, which becomes each one's name");
+      usageError("of several scenes", file, "a name with {scene} in it, which becomes each file's name");
   const bool asksForRun = !a.run.log.empty() || !a.run.frameTimes.empty() || !a.run.surfaces.empty() ||
                           !a.run.records.empty() || std::find(a.show.begin(), a.show.end(), "force") != a.show.end();
   if (!a.cache.empty() && asksForRun)
@@ -245,6 +246,12 @@ void checkRender(const RenderArguments& a) {
   if (a.outputs.empty() || !a.still.empty()) usageError("--resume", "", "-o DIR: folders of PNG files can be resumed");
   for (const std::string& output : a.outputs)
     if (isVideoName(output)) usageError("--resume", output, "a folder: videos are made in one go");
+}
+
+// What an earlier write met is told as well: flushing again would succeed.
+void flushResults() {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    throw std::runtime_error("standard output cannot be written");
 }
 
 int runRenders(const RenderArguments& a) {
@@ -259,7 +266,7 @@ int runRenders(const RenderArguments& a) {
   }
   for (const RenderOptions& options : all) {
     runRender(options);
-    std::fflush(stdout);
+    flushResults();
   }
   return 0;
 }
@@ -303,8 +310,8 @@ Verb addRender(CLI::App& app) {
   addOverrides(*c, a.run);
   addRunOptions(*c, a.run);
   c->add_option("-o,--output", a.outputs,
-                "FILE.mp4, .webm, .gif or .webp, or a folder for PNG files; {scene} in it is the scene's name; "
-                "repeatable (default: {scene}.mp4)")
+                "FILE.mp4, .webm, .gif or .webp, or a folder for PNG files; {scene} in it is the scene file's name "
+                "without its ending; repeatable (default: {scene}.mp4)")
       ->type_name("FILE|DIR")
       ->allow_extra_args(false);
   addPictureOptions(c, a);
@@ -367,6 +374,16 @@ void requireCommand(const CLI::App& app, const std::string& word) {
                         CLI::ExitCodes::ExtrasError);
 }
 
+// An empty word, or an option with nothing behind its =, would be taken for one that was not given.
+void requireWords(const std::vector<std::string>& words) {
+  for (std::size_t k = 0; k < words.size(); ++k) {
+    const std::string& word = words[k];
+    if (!word.empty() && !(word.starts_with("--") && word.find('=') == word.size() - 1)) continue;
+    const std::string name = !word.empty() ? word : k > 0 ? words[k - 1] + " ''" : "''";
+    throw CLI::ParseError(name + ": is empty, expected a value", CLI::ExitCodes::ConversionError);
+  }
+}
+
 // CLI11 would complain of what stands behind a misspelt option, or of too many meshes where it has a value.
 void requireOptions(const CLI::App& command, const std::vector<std::string>& words) {
   std::vector<std::string> known;
@@ -400,6 +417,7 @@ int dispatch(int argc, char** argv) {
     for (const Verb& verb : verbs) {
       if (words.empty() || verb.command->get_name() != words[0]) continue;
       command = words[0] + " ";
+      requireWords(words);
       requireOptions(*verb.command, words);
     }
     app.parse(argc, argv);
@@ -422,7 +440,7 @@ int runCommandLine(int argc, char** argv) {
   watchInterrupts();
   try {
     const int code = dispatch(argc, argv);
-    if (std::fflush(stdout) != 0) throw std::runtime_error("standard output cannot be written");
+    flushResults();
     return code;
   } catch (const Interrupted&) {
     std::fputs("medulla: interrupted, nothing unfinished has its final name\n", stderr);

@@ -10,7 +10,7 @@ struct Interrupted : std::exception {
 };
 
 // From now on SIGINT, SIGTERM and SIGHUP only raise a flag, however often they come: ending at once would leave
-// unfinished files behind. SIGQUIT still ends the process.
+// unfinished files behind. SIGQUIT still ends the process. Nor does a limit on the size of files: writing fails there.
 void watchInterrupts();
 bool interruptRequested();
 void checkInterrupt();  // throws Interrupted once a signal came

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "app/files/output_file.h"
+#include "app/files/number_text.h"
 #include "app/files/text_file.h"
 #include "app/interrupt.h"
 
@@ -43,24 +43,33 @@ bool isWholePng(const fs::path& path) {
 }  // namespace
 
 PngFolder::PngFolder(const std::string& path, const Slice& slice)
-    : folder_(path),
+    : made_(path),
+      folder_(path),
       collecting_(fmt::format("{}.{}-{}.part", withoutSlash(path), slice.first, slice.last)),
       keep_(slice.resume) {
+  requireReplaceable(slice);
   std::error_code error;
-  fs::create_directories(folder_, error);
-  const auto require = [&] {
-    if (error) throw std::runtime_error(fmt::format("{}: cannot make the folder: {}", path, error.message()));
-  };
-  require();
+  fs::create_directory(collecting_, error);
+  if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", collecting_.string(), error.message()));
   try {
-    fs::create_directory(collecting_, error);
-    require();
     lock();
     takeOver(slice);
   } catch (...) {
     if (lock_ >= 0) close(lock_);
-    fs::remove(folder_, error);  // only if it is empty
     throw;
+  }
+}
+
+// Noticed before the first picture is drawn, and not when half of them have moved in.
+void PngFolder::requireReplaceable(const Slice& slice) const {
+  if (access(folder_.c_str(), W_OK | X_OK) != 0)
+    throw std::runtime_error(fmt::format("{}: cannot be written: {}", folder_.string(), std::strerror(errno)));
+  for (const auto& entry : fs::directory_iterator(folder_)) {
+    const int number = parseNumber<int>(entry.path().stem().string()).value_or(-1);
+    const bool ours = slice.first <= number && number < slice.last && entry.path().filename() == pngName(number);
+    if (ours && fs::is_directory(entry.symlink_status()))
+      throw std::runtime_error(
+          fmt::format("{}: is a folder, expected the name of a file to write", entry.path().string()));
   }
 }
 
@@ -90,7 +99,6 @@ void PngFolder::takeOver(const Slice& slice) const {
 PngFolder::~PngFolder() {
   std::error_code ignored;
   if (!keep_) fs::remove_all(collecting_, ignored);
-  fs::remove(folder_, ignored);  // only if nothing came into it
   close(lock_);
 }
 
@@ -120,6 +128,8 @@ PictureOutputs::PictureOutputs(const std::vector<std::string>& paths, const Sett
       stills_.push_back(path);
     } else if (isVideoName(path)) {
       videos_.emplace_back(path, settings.width, settings.height, settings.fps);
+    } else if (isVideoName("film" + fs::path(path).filename().string())) {
+      throw std::runtime_error(path + ": expected a name before the dot");  // a hidden file without an extension
     } else if (!extension.empty() && !fs::is_directory(path)) {
       throw std::runtime_error(path + ": expected FILE.mp4, .webm, .gif or .webp, or a folder for PNG files");
     } else {

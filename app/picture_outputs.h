@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "app/files/output_file.h"
 #include "render/video_writer.h"
 
 namespace medulla {
@@ -19,8 +20,8 @@ class PngFolder {
     std::uint64_t run = 0;    // of all that the pictures follow from
     bool resume = false;      // takes over what an ended run left of the same pictures, and leaves its own
   };
-  // Throws std::runtime_error where the folder cannot be made, where another process is at this slice, and where what
-  // is to be resumed belongs to another run.
+  // Throws std::runtime_error where the folder cannot be made or written, where a folder has the name of a picture,
+  // where another process is at this slice, and where what is to be resumed belongs to another run.
   PngFolder(const std::string& path, const Slice& slice);
   ~PngFolder();
   PngFolder(const PngFolder&) = delete;
@@ -30,9 +31,11 @@ class PngFolder {
   void finish();
 
  private:
+  void requireReplaceable(const Slice& slice) const;
   void lock();
   void takeOver(const Slice& slice) const;
 
+  OutputFolder made_;
   std::filesystem::path folder_, collecting_;
   bool keep_;
   int lock_ = -1;

@@ -1,3 +1,9 @@
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#include <thread>
+
+#include "app/files/text_file.h"
 #include "tests/own_scene.h"
 
 // What users hand the program by mistake: one line, the exit code, nothing written and nothing harmed.
@@ -23,6 +29,103 @@ TEST_F(BadInput, AStaticMeshBeyondWhatCanBeDrawnIsRefused) {
 TEST_F(BadInput, AMeshThatIsFarTooLargeIsRefusedInOneLine) {
   folder.write("m.obj", "v 1e7 0 0\nv 0 1e7 0\nv 0 0 1e7\nv 0 0 0\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n");
   expectRefused(run({"build", "m.obj", "-o", "m.xml"}), "is the unit right?");
+}
+
+TEST_F(BadInput, ATissueTooStiffForAnyStepIsRefusedWithItsScene) {
+  write({.young = "1e20"});
+  expectRefused(run({"check", "own/organ.xml"}), "own/organ.xml: the stable substep is ");
+}
+
+TEST_F(BadInput, ResultsThatCannotBeWrittenFailTheRun) {
+  ProgramOptions full;
+  full.output = "/dev/full";
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"check", "own/organ.xml"},
+        {"info", "own/organ.xml"},
+        {"render", "own/organ.xml", "--still", "0", "--size", "64x48", "--quality", "draft"}})
+    expectRefused(run(words, full), "standard output cannot be written");
+}
+
+TEST_F(BadInput, APipeThatNobodyFillsEndsAtAnInterrupt) {
+  ASSERT_EQ(::mkfifo((folder / "pipe.xml").c_str(), 0600), 0);
+  int writer = -1;
+  ProgramOptions interrupted;
+  interrupted.interruptWhen = [&] {  // once somebody reads
+    writer = ::open((folder / "pipe.xml").c_str(), O_WRONLY | O_NONBLOCK);
+    return writer >= 0;
+  };
+  EXPECT_EQ(run({"check", "pipe.xml"}, interrupted).exitCode, 130);
+  ::close(writer);
+}
+
+TEST_F(BadInput, APipeIsReadToItsEnd) {
+  const std::string path = folder / "pipe", text(1 << 20, 'x');
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  const std::jthread writer([&] { folder.write("pipe", text); });
+  EXPECT_EQ(readTextFile(path), text);
+}
+
+TEST_F(BadInput, DevicesAndPipesAreNoFiles) {
+  expectRefused(run({"check", "/dev/zero"}), "/dev/zero: is a device, expected a file or a pipe");
+  expectRefused(run({"replay", "own/organ.xml", "--trajectory", "/dev/zero"}), "/dev/zero: is a device");
+  ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
+  expectRefused(run({"render", "own/organ.xml", "--cache", "pipe", "-o", "frames"}), "pipe: is not a file");
+}
+
+TEST_F(BadInput, TwoFilesForOneToolAreRefused) {
+  for (const auto& [option, file] : {std::pair("--record", "r.csv"), std::pair("--trajectory", "own/organ.csv")})
+    expectRefused(run({"replay", "own/organ.xml", option, file, option, "probe=q.csv"}), "one file per tool");
+  EXPECT_EQ(folder.contents(), std::vector<std::string>{"own"});
+}
+
+TEST_F(BadInput, StabilityWritesOverNoInput) {
+  std::string text = read("own/organ.xml");
+  text.replace(text.find("spheres=\"1\""), 11, "vertices=\"map.csv\"");
+  folder.write("own/organ.xml", text);
+  folder.write("own/map.csv", "0\n1\n2\n");
+  expectRefused(run({"stability", "own/organ.xml", "-o", "own"}), "own/map.csv: would be written over an input");
+  EXPECT_EQ(read("own/map.csv"), "0\n1\n2\n");
+}
+
+TEST_F(BadInput, WhatChartsAndStabilityCannotWriteIsSaidBeforeAnyRun) {
+  std::filesystem::create_directories(folder / "out/chart.svg");
+  std::filesystem::create_directories(folder / "out/trials.csv");
+  expectRefused(run({"chart", "own/organ.xml", "-o", "out"}), "out/chart.svg: is a folder");
+  expectRefused(run({"stability", "own/organ.xml", "-o", "out"}), "out/trials.csv: is a folder");
+}
+
+TEST_F(BadInput, AChartOfWhatDoesNotMoveIsRefused) {
+  folder.write("own/organ.csv", "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,0.5,0.5,0.5,1,0,0,0,0\n");
+  expectRefused(
+      run({"chart", "own/organ.xml", "-o", "out", "--steps", "2", "--methods", "skin", "--set", "clock.duration=0.04"}),
+      "nothing moves in this scene");
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+TEST_F(BadInput, FoldersMadeForAFailedCommandGoAgain) {
+  folder.write("a.obj", "");
+  folder.write("b.obj", "");
+  expectRefused(run({"build", "a.obj", "b.obj", "-o", "x/y/z"}), "a.obj: is empty");
+  expectRefused(run({"golden", "none.xml", "--dir", "golden", "--failures", "u/v"}), "none.xml");
+  expectRefused(run({"render", "own/organ.xml", "-o", "p/q/frames", "--set", "dynamics.substeps=1", "--set",
+                     "tissue.t.young=1e9"}),
+                "finite");
+  for (const char* name : {"x", "u", "p"}) EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
+}
+
+TEST_F(BadInput, EmptyWordsAreWrongUsage) {
+  expectRefused(run({"replay", "own/organ.xml", "--log", ""}), "--log ''", 2);
+  expectRefused(run({"replay", "own/organ.xml", "--log="}), "--log=", 2);
+  expectRefused(run({"render", "own/organ.xml", "-o", ""}), "-o ''", 2);
+  EXPECT_EQ(folder.contents(), std::vector<std::string>{"own"});
+}
+
+TEST_F(BadInput, NumbersOfABuildThatAreNoneAreWrongUsage) {
+  const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
+  for (const char* option : {"--gap", "--overshoot", "--surface-mass"})
+    expectRefused(run({"build", mesh, "-o", "m.xml", option, "nan"}), option, 2);
+  expectRefused(run({"build", mesh, "-o", "m.xml", "--identify", "--poisson", "nan"}), "--poisson", 2);
+  expectRefused(run({"build", mesh, "-o", "m.xml", "--identify", "--spheres", "301"}), "at most 300", 2);
 }
 
 }  // namespace

@@ -193,6 +193,24 @@ TEST_F(Outputs, TimingsGoToStandardError) {
   EXPECT_EQ(r.out.find("stage"), std::string::npos);
 }
 
+TEST_F(Outputs, AFolderThatCannotTakeEveryPictureIsRefusedBeforeTheFilm) {
+  fs::create_directories(folder / "frames/00002.png");
+  folder.write("frames/00000.png", "earlier");
+  expectRefused(render({"-o", "frames", "--frames", "0:3"}), "frames/00002.png: is a folder");
+  EXPECT_EQ(read("frames/00000.png"), "earlier");
+  EXPECT_EQ(render({"-o", "frames", "--frames", "3:4", "--size", "64x48"}).exitCode, 0);
+  folder.write("other.0-12.part", "somebody's");
+  expectRefused(render({"-o", "other"}), "other.0-12.part: cannot be made");
+  EXPECT_EQ(read("other.0-12.part"), "somebody's");
+  EXPECT_FALSE(fs::exists(folder / "other"));
+  expectRefused(render({"-o", ".mp4"}), ".mp4: expected a name before the dot");
+  EXPECT_EQ(contents().size(), 2u);
+  if (::geteuid() == 0) return;  // nothing is forbidden to root
+  fs::permissions(folder / "frames", fs::perms::owner_read | fs::perms::owner_exec);
+  expectRefused(render({"-o", "frames", "--frames", "4:5"}), "frames: cannot be written: Permission denied");
+  fs::permissions(folder / "frames", fs::perms::owner_all);
+}
+
 TEST_F(Outputs, WhatCannotBeResumedIsWrongUsage) {
   expectRefused(render({"--resume"}), "--resume", 2);
   expectRefused(render({"--resume", "-o", "a.mp4"}), "a.mp4", 2);

@@ -37,6 +37,7 @@ struct ProgramOptions {
   std::function<bool()> interruptWhen;  // asked every 10 ms; `signal` is sent once it holds
   int signal = SIGINT;
   std::string path;                                              // PATH of the child; empty: inherited
+  std::string output;                                            // where its standard output goes; empty: result.out
   std::vector<std::pair<std::string, std::string>> environment;  // set for the child
   long fileSizeLimit = 0;  // bytes; a longer file fails as on a full disk; 0: none
 };
@@ -51,13 +52,13 @@ inline ProgramResult runProgram(const std::vector<std::string>& arguments, const
   const std::string folder = mkdtemp(base);
   const pid_t child = fork();
   if (child == 0) {
-    if (!freopen((folder + "/out").c_str(), "w", stdout) || !freopen((folder + "/err").c_str(), "w", stderr) ||
+    const std::string output = options.output.empty() ? folder + "/out" : options.output;
+    if (!freopen(output.c_str(), "w", stdout) || !freopen((folder + "/err").c_str(), "w", stderr) ||
         chdir(options.folder.c_str()) != 0)
       _exit(99);
     if (!options.path.empty()) setenv("PATH", options.path.c_str(), 1);
     for (const auto& [name, value] : options.environment) setenv(name.c_str(), value.c_str(), 1);
     if (options.fileSizeLimit > 0) {
-      std::signal(SIGXFSZ, SIG_IGN);  // which the child and its own children inherit
       const rlimit limit{static_cast<rlim_t>(options.fileSizeLimit), static_cast<rlim_t>(options.fileSizeLimit)};
       setrlimit(RLIMIT_FSIZE, &limit);
     }

@@ -107,8 +107,7 @@ void requireDistinct(const BuildOptions& options, const std::vector<BuildJob>& j
     inputs.push_back(job.meshPath);
   }
   requireDistinctFiles(outputs, inputs);
-  for (const std::string& path : outputs)
-    if (!path.empty()) const OutputFile writableAtAll(path);
+  requireWritable(outputs);
 }
 
 void readMeshes(double scale, std::vector<BuildJob>& jobs) {

@@ -72,6 +72,11 @@ std::vector<SceneOverride> expanded(const std::vector<SceneOverride>& overrides,
   return out;
 }
 
+// Of "[BODY=]FILE".
+std::string modelPathOf(const std::string& model) {
+  return model.substr(model.find('=') + 1);
+}
+
 // The override that puts "[BODY=]FILE" in the place of a model. Overrides are relative to the scene, words on the
 // command line to where it was typed.
 SceneOverride modelOverride(const std::string& model, const Scene& scene) {
@@ -80,7 +85,7 @@ SceneOverride modelOverride(const std::string& model, const Scene& scene) {
     throw std::runtime_error(
         fmt::format("--models {}: the scene has {} bodies, write BODY=FILE", model, scene.bodies.size()));
   const std::string body = equals == std::string::npos ? scene.bodies[0].name : model.substr(0, equals);
-  const std::string path = equals == std::string::npos ? model : model.substr(equals + 1);
+  const std::string path = modelPathOf(model);
   if (!fs::exists(path)) throw std::runtime_error(fmt::format("--models {}: {} does not exist", model, path));
   return {fmt::format("body.{}.model", body), fs::absolute(path).string()};
 }
@@ -317,9 +322,11 @@ int runChart(const ChartOptions& options) {
                     spheres = (fs::path(options.folder) / "spheres").string();
   const OutputFolder folder(options.folder);
   std::vector<std::string> outputs;
-  for (const std::string& stem : {chart, spheres})
+  for (const std::string& stem : options.models.size() > 1 ? std::vector{chart, spheres} : std::vector{chart})
     for (const char* ending : {".csv", ".gnuplot", ".svg"}) outputs.push_back(stem + ending);
   requireDistinctOutputs(base, options.run, outputs);
+  for (const std::string& model : options.models) requireDistinctFiles(outputs, {modelPathOf(model)});
+  requireWritable(outputs);
   ChartTruth truth;
   const std::vector<ChartRun> runs = planRuns(options, base);
   const std::vector<ChartPoint> points = executeAll(runs, base, truth);

@@ -54,7 +54,9 @@ static std::map<std::string, std::string> filesOfTools(const std::string& option
     const std::string tool = name.empty() ? scene.tools[0].name : name;
     if (std::none_of(scene.tools.begin(), scene.tools.end(), [&](const SceneTool& t) { return t.name == tool; }))
       throw std::runtime_error(fmt::format("{} {}={}: the scene has no tool \"{}\"", option, name, path, name));
-    out[tool] = path;
+    if (!out.try_emplace(tool, path).second)
+      throw std::runtime_error(
+          fmt::format("{} {}={}: another file is named for this tool, expected one file per tool", option, tool, path));
   }
   return out;
 }

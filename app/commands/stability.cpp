@@ -192,7 +192,14 @@ int runStability(const StabilityOptions& options) {
   const std::vector<TortureMethod> methods = methodsOf(options);
   const fs::path folder = options.folder;
   const OutputFolder made(options.folder);
-  TrialJournal journal((folder / "trials.part").string(), runHash(loaded, false));
+  const std::string kept = (folder / "trials.part").string();
+  std::vector<std::string> outputs;
+  for (const char* name : {"map.csv", "trials.csv", "stability.gnuplot", "stability.svg"})
+    outputs.push_back((folder / name).string());
+  requireWritable(outputs);
+  outputs.push_back(kept);
+  requireDistinctOutputs(loaded, options.run, outputs);
+  TrialJournal journal(kept, runHash(loaded, false));
   const StabilityTables tables = runTrials(options, body, methods, journal);
   writeTables(folder, loaded.scene.name, tables);
   printResults(resultsOf(methods, tables.map, tables.trials));

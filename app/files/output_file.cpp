@@ -73,15 +73,29 @@ void requireDistinctFiles(const std::vector<std::string>& outputs, const std::ve
   }
 }
 
-OutputFolder::OutputFolder(const std::string& path) : path_(path) {
+void requireWritable(const std::vector<std::string>& paths) {
+  for (const std::string& path : paths)
+    if (!path.empty()) const OutputFile writableAtAll(path);
+}
+
+OutputFolder::OutputFolder(const std::string& path) {
   std::error_code error;
-  isMade_ = std::filesystem::create_directories(path, error);
-  if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", path, error.message()));
+  std::filesystem::path missing = path;
+  for (; !missing.empty() && !std::filesystem::exists(missing, error); missing = missing.parent_path())
+    made_.push_back(missing.string());
+  std::filesystem::create_directories(path, error);
+  if (!error) return;
+  removeEmpty();
+  throw std::runtime_error(fmt::format("{}: cannot be made: {}", path, error.message()));
 }
 
 OutputFolder::~OutputFolder() {
+  removeEmpty();
+}
+
+void OutputFolder::removeEmpty() const {
   std::error_code filled;
-  if (isMade_) std::filesystem::remove(path_, filled);
+  for (const std::string& folder : made_) std::filesystem::remove(folder, filled);
 }
 
 }  // namespace medulla

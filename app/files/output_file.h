@@ -35,9 +35,13 @@ class OutputFile {
 // A whole OutputFile in one call.
 void writeText(const std::string& path, const std::string& text);
 
-// A folder for outputs, made where it is missing, with those above it, which stay. One that was made here and is empty
-// at the end, since what was to fill it failed, goes again. Throws std::runtime_error with path and reason where the
-// system refuses.
+// Before work whose results they are to take: throws what OutputFile throws for the first that cannot be written. Empty
+// names are skipped.
+void requireWritable(const std::vector<std::string>& paths);
+
+// A folder for outputs, made where it is missing, with those above it. What was made here and is empty at the end,
+// since what was to fill it failed, goes again. Throws std::runtime_error with path and reason where the system
+// refuses.
 class OutputFolder {
  public:
   explicit OutputFolder(const std::string& path);
@@ -46,8 +50,9 @@ class OutputFolder {
   OutputFolder& operator=(const OutputFolder&) = delete;
 
  private:
-  std::string path_;
-  bool isMade_ = false;
+  void removeEmpty() const;
+
+  std::vector<std::string> made_;  // the innermost first
 };
 
 }  // namespace medulla

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <string_view>
 #include <type_traits>
@@ -224,7 +225,12 @@ void CacheWriter::commit(std::uint64_t finalHash) {
   file_.commit();
 }
 
-CacheReader::CacheReader(const std::string& path) : path_(path), file_(path, std::ios::binary | std::ios::ate) {
+CacheReader::CacheReader(const std::string& path) : path_(path) {
+  std::error_code missing;
+  const std::filesystem::file_status status = std::filesystem::status(path, missing);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    throw inputError(path, 0, "is not a file, expected one that medulla replay --cache wrote");
+  file_.open(path, std::ios::binary | std::ios::ate);
   const std::streamoff end = file_ ? static_cast<std::streamoff>(file_.tellg()) : -1;
   if (end < 0) throw inputError(path, 0, std::string("cannot be opened: ") + std::strerror(errno));
   const auto size = static_cast<std::size_t>(end);
@@ -282,6 +288,8 @@ std::uint64_t CacheReader::read(int number, PictureState& state) {
 }
 
 bool isCache(const std::string& path) {
+  std::error_code missing;
+  if (!std::filesystem::is_regular_file(path, missing)) return false;  // opening a pipe would wait for its writer
   std::ifstream file(path, std::ios::binary);
   std::string start(kMagic.size(), '\0');
   return file.read(start.data(), static_cast<std::streamsize>(start.size())) && start == kMagic;

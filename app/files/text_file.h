@@ -4,7 +4,8 @@
 
 namespace medulla {
 
-// The whole file. Throws std::runtime_error "FILE: ..." where it is missing, a folder, or cannot be read.
+// The whole of a file, or of a pipe up to 1 GiB. Throws std::runtime_error "FILE: ..." where it is missing, a folder, a
+// device, or cannot be read, and Interrupted after a signal, also while nobody writes into the pipe.
 std::string readTextFile(const std::string& path);
 
 }  // namespace medulla
