@@ -5,6 +5,7 @@
 
 #include "app/commands/commands.h"
 #include "app/files/mesh_file.h"
+#include "app/files/number_text.h"
 #include "app/verbs.h"
 
 // The verbs that make models.
@@ -16,6 +17,18 @@ struct BuildArguments {
   BuildOptions options;
   std::string method = "cover", linkForm = "full";
 };
+
+// CLI::Range lets NaN pass.
+CLI::Validator numberFrom(double low, double high) {
+  const std::string expected = fmt::format("a number from {} to {}", low, high);
+  return CLI::Validator(
+      [=](const std::string& word) {
+        const std::optional<double> value = parseNumber<double>(word);
+        return value && low <= *value && *value <= high ? std::string()
+                                                        : fmt::format("{}: expected {}", word, expected);
+      },
+      fmt::format("FLOAT in [{} - {}]", low, high));
+}
 
 BuildOptions buildOptions(const BuildArguments& a) {
   BuildOptions options = a.options;
@@ -31,6 +44,9 @@ BuildOptions buildOptions(const BuildArguments& a) {
   options.identification.links = static_cast<LinkForm>(form - kLinkForms.begin());
   if (options.identify && options.meshes.size() > 1)
     usageError("--identify", "", fmt::format("a single mesh, not {}", options.meshes.size()));
+  if (options.identify && s.method == BuildMethod::cover && s.gap == 0 && s.spheres > identifiedSpheresMax)
+    usageError("--spheres", fmt::format("{}", s.spheres),
+               fmt::format("at most {} with --identify: its time grows with their cube", identifiedSpheresMax));
   return options;
 }
 
@@ -46,6 +62,7 @@ void addIdentification(CLI::App& c, BuildArguments& a) {
       ->allow_extra_args(false)
       ->needs(identify);
   c.add_option("--poisson", a.options.identification.poisson, "Poisson's ratio of the tissue, 0 to less than 0.5")
+      ->check(numberFrom(-1, 0.5))
       ->needs(identify)
       ->capture_default_str();
   c.add_option("--link-form", a.linkForm,
@@ -78,7 +95,7 @@ Verb addBuild(CLI::App& app) {
        "--gap", a.options.settings.gap,
        "instead of a number: the fewest spheres, of each mesh, that leave no wider gap between the surface and "
        "the nearest sphere, in % of the bounding box's diagonal")
-      ->check(CLI::Range(0.01, 99.0))
+      ->check(numberFrom(0.01, 99))
       ->type_name("PERCENT")
       ->excludes(spheres);
   c->add_option(
@@ -86,7 +103,7 @@ Verb addBuild(CLI::App& app) {
        "how far spheres may stick out of the surface, in % of the bounding box's diagonal: they fill more, and "
        "bodies touch by so much too early instead of sinking in by the gap [4.2 / sqrt(spheres), or half the gap, 5 at "
        "most]")
-      ->check(CLI::Range(0.0, 5.0))
+      ->check(numberFrom(0, 5))
       ->type_name("PERCENT");
   c->add_option("--method", a.method, "cover: balls chosen to fill the body; skeleton: the raw edge collapse")
       ->check(CLI::IsMember({"cover", "skeleton"}))
@@ -99,7 +116,7 @@ Verb addBuild(CLI::App& app) {
       ->allow_extra_args(false);
   c->add_option("--surface-mass", a.options.settings.surfaceMassFraction,
                 "share of the mass that surface nodes carry; more allows larger substeps")
-      ->check(CLI::Range(0.0, 0.4))
+      ->check(numberFrom(0, 0.4))
       ->capture_default_str();
   c->add_option("--render-levels", a.options.settings.renderLevels, "subdivisions of the mesh for the drawn surface")
       ->check(CLI::Range(0, 4))

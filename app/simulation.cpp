@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "app/files/input_error.h"
 #include "app/interrupt.h"
 #include "render/stage_times.h"
 
@@ -35,7 +36,11 @@ World makeWorld(const LoadedScene& loaded) {
     statics.push_back(scene.statics[k].shape);
     if (statics.back().kind == StaticShape::Kind::mesh) statics.back().mesh = loaded.statics[k];
   }
-  return World(settings, std::move(bodies), statics);
+  try {
+    return World(settings, std::move(bodies), statics);
+  } catch (const std::runtime_error& error) {
+    throw inputError(scene.path, 0, error.what());
+  }
 }
 
 Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)

@@ -221,7 +221,8 @@ TEST_F(Recording, EveryMistakeInTheDescriptionIsNamedWithTheNearestName) {
   const Case cases[] = {
       {"map=\"jigsaw\" part=\"slave_left\"", "",
        "r.xml:1: <recording> map=\"jigsaw\": did you mean \"jigsaws\"? known: table, jigsaws, ros, sofa"},
-      {"map=\"jigsaws\"", "", "r.xml:1: <recording> map=\"jigsaws\": part="},
+      {"map=\"jigsaws\"", "",
+       "r.xml:1: <recording> map=\"jigsaws\": part=\"master_left|master_right|slave_left|slave_right\" is missing"},
       {"map=\"ros\" part=\"slave_left\"", "", "r.xml:1: <recording> part=\"slave_left\": part="},
       {"map=\"jigsaws\" part=\"slave_rigth\"", "",
        "r.xml:1: <recording> part=\"slave_rigth\": did you mean \"slave_right\"?"},

@@ -30,7 +30,8 @@ void setDisplacement(const LoadedScene& loaded, ChartTruth& truth) {
       for (std::size_t i = 0; i < frame.bodies[b].nodes.size(); ++i)
         squared = std::max(squared, (frame.bodies[b].nodes[i] - restPlace(loaded, b, i)).squaredNorm());
   truth.displacement = std::sqrt(squared);
-  if (!(truth.displacement > 0)) throw std::runtime_error("nothing moves in this scene: no error can be stated");
+  constexpr double kLeast = 1e-9;  // m: less is rounding, and errors in % of it say nothing
+  if (!(truth.displacement > kLeast)) throw std::runtime_error("nothing moves in this scene: no error can be stated");
 }
 
 // Per body and node: whether a dead load acts on it.

@@ -11,7 +11,7 @@ namespace medulla {
 struct ChartTruth {
   std::vector<DynamicsFrame> moments;    // where surface nodes belong, at the moments that runs record
   std::vector<std::vector<char>> known;  // per body and node: whether that is known
-  double displacement = 0;               // m, of the node that is farthest from where it lies at rest; > 0
+  double displacement = 0;               // m, of the node that is farthest from where it lies at rest; > 1e-9
   ChartCost cost = ChartCost::perSimulatedSecond;
   double step = 0;                  // s, of the reference run, where that is one of this program,
   int spheres = 0;                  // and its number of spheres

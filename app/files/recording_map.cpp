@@ -79,9 +79,9 @@ void useRos(RecordingMap& map) {
 void useMap(const XmlElement& root, RecordingMap& map) {
   enum { table, jigsaws, ros, sofa };
   const std::size_t name = readNamed(root, "map", {"table", "jigsaws", "ros", "sofa"}, "table");
-  if ((name == jigsaws) != (root.find("part") != nullptr))
-    refuse(root, name == jigsaws ? "map" : "part",
-           "part=\"master_left|master_right|slave_left|slave_right\" belongs to map=\"jigsaws\"");
+  const std::string parts = "part=\"master_left|master_right|slave_left|slave_right\"";
+  if (name == jigsaws && !root.find("part")) refuse(root, "map", parts + " is missing, which says whose motion it is");
+  if (name != jigsaws && root.find("part")) refuse(root, "part", parts + " belongs to map=\"jigsaws\"");
   map.layouts.resize(1);
   map.writeState = name == sofa;
   if (name == ros) useRos(map);

@@ -34,13 +34,11 @@ void checkSettings(const IdentifySettings& s) {
     throw std::runtime_error(fmt::format("a Poisson's ratio of {}; expected 0 or more and less than 0.5", s.poisson));
 }
 
-// Each evaluation of the links' fit inverts a dense matrix of order 6 spheres, some four hundred times over.
 void checkModel(const SoftBodyModel& model, bool held) {
-  constexpr std::size_t spheresMax = 300;
-  if (model.spheres.size() > spheresMax)
+  if (model.spheres.size() > identifiedSpheresMax)
     throw std::runtime_error(
         fmt::format("{} spheres are too many to identify: the time grows with their cube; expected at most {}",
-                    model.spheres.size(), spheresMax));
+                    model.spheres.size(), identifiedSpheresMax));
   if (model.spheres.size() < 2 && !held)
     throw std::runtime_error(
         "a single sphere that nothing holds has nothing to identify; expected --fix or more spheres");
