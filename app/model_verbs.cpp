@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "app/commands/commands.h"
@@ -40,6 +41,8 @@ BuildOptions buildOptions(const BuildArguments& a) {
   if (!options.fine.empty() && options.fine.size() != options.meshes.size())
     usageError("--fine", options.fine.back(),
                fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
+  if (!std::isfinite(options.identification.poisson))
+    usageError("--poisson", fmt::format("{}", options.identification.poisson), "a number of 0 or more, less than 0.5");
   const auto form = std::find(kLinkForms.begin(), kLinkForms.end(), a.linkForm);
   options.identification.links = static_cast<LinkForm>(form - kLinkForms.begin());
   if (options.identify && options.meshes.size() > 1)
@@ -62,7 +65,6 @@ void addIdentification(CLI::App& c, BuildArguments& a) {
       ->allow_extra_args(false)
       ->needs(identify);
   c.add_option("--poisson", a.options.identification.poisson, "Poisson's ratio of the tissue, 0 to less than 0.5")
-      ->check(numberFrom(-1, 0.5))
       ->needs(identify)
       ->capture_default_str();
   c.add_option("--link-form", a.linkForm,
