@@ -1,9 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <new>
 
+#include "tests/contact_bodies.h"
+#include "tests/synthetic_model.h"
 #include "tests/tool_run.h"
 
 // Counts what this program asks of operator new; sanitizers bring their own.
@@ -22,7 +25,19 @@ static std::atomic<long> allocations{0};
   if (void* p = std::malloc(size == 0 ? 1 : size)) return p;
   throw std::bad_alloc();
 }
+[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
+  ++allocations;
+  const auto a = static_cast<std::size_t>(alignment);
+  if (void* p = std::aligned_alloc(a, std::max<std::size_t>(1, (size + a - 1) / a) * a)) return p;
+  throw std::bad_alloc();
+}
 [[gnu::noinline]] void operator delete(void* p) noexcept {
+  std::free(p);
+}
+[[gnu::noinline]] void operator delete(void* p, std::align_val_t) noexcept {
+  std::free(p);
+}
+[[gnu::noinline]] void operator delete(void* p, std::size_t, std::align_val_t) noexcept {
   std::free(p);
 }
 [[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept {
@@ -69,6 +84,42 @@ TEST(Servo, AllocatesNothingOnItsSide) {
   }
   EXPECT_TRUE(contact && held && slipped);
   EXPECT_EQ(allocated, 0);
+}
+
+namespace {
+
+// In a frame of so many substeps: a tube that a tool holds lies on the floor under a ball.
+long allocationsInFrame(Integrator integrator, int substeps) {
+  WorldSettings settings;
+  settings.integrator = integrator;
+  settings.contact = ContactMode::balls;
+  settings.gravity = {0, -9.81, 0};
+  settings.substeps = substeps;
+  settings.sleepAfter = 0;
+  BodyDescription tube = synthetic::body(synthetic::chainModel(synthetic::straightTube(4, 0.06, 0.012, 8, 10)), 5e3);
+  tube.name = "tube";
+  tube.worldFromModel.translation() = Eigen::Vector3d(0, 0.0125, 0);
+  tube.surface = SurfaceMode::contact;
+  tube.tissue.damping = 0.5;
+  World world(settings, {tube, synthetic::ball("ball", 0.01, {0.03, 0.035, 0})}, {StaticShape{}});
+  Loads loads;
+  loads.heldNodes.resize(1);
+  loads.heldNodes[0].node = 20;
+  loads.heldNodes[0].anchor = tube.worldFromModel * tube.model->restNodes[20];
+  loads.heldNodes[0].stiffness = 5;
+  loads.heldNodes[0].damping = 0.05;
+  for (int k = 0; k < 60; ++k) world.advance(loads);
+  const long before = allocations;
+  world.advance(loads);
+  return allocations - before;
+}
+
+}  // namespace
+
+TEST(World, ASubstepAllocatesNothing) {
+  if (!MEDULLA_COUNTS_ALLOCATIONS) GTEST_SKIP() << "a sanitizer has operator new";
+  EXPECT_EQ(allocationsInFrame(Integrator::explicitEuler, 20), allocationsInFrame(Integrator::explicitEuler, 40));
+  EXPECT_EQ(allocationsInFrame(Integrator::implicit, 4), allocationsInFrame(Integrator::implicit, 8));
 }
 
 }  // namespace medulla

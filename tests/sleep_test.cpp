@@ -119,6 +119,22 @@ TEST(Sleep, AToolFeelsNothingOfIt) {
   EXPECT_LT(farthestApart(world, sleepless), 0.03 * kBallRadius);
 }
 
+// Nodes that were about to be carried again stay as they are.
+TEST(Sleep, NodesOfASleeperStayWhereTheyAre) {
+  BodyDescription held = rod("held", Vector3d::Zero());
+  held.surface = SurfaceMode::contact;
+  held.fixed = {{0, FixedFreedom::all}, {1, FixedFreedom::all}, {2, FixedFreedom::all}, {3, FixedFreedom::all}};
+  World world(settings(0.05), {held});
+  for (int k = 0; k < 20; ++k) world.advance(holding(world, 0, 20, {0, 0, 0.0005}));
+  for (int k = 0; k < 40 && !world.data().rest[0].asleep; ++k) world.advance({});
+  ASSERT_TRUE(world.data().rest[0].asleep);
+  DynamicsFrame before, after;
+  world.readFrame(before);
+  run(world, 0.5);
+  world.readFrame(after);
+  EXPECT_EQ(before.bodies[0].nodes, after.bodies[0].nodes);
+}
+
 // Contacts go on with the impulses that they had: nothing sinks in or jumps.
 TEST(Sleep, WakingMovesNothing) {
   World world = stackedRods(0.5);

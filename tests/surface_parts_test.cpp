@@ -61,6 +61,34 @@ Vector3d linearMomentum(const WorldData& d, double* mass = nullptr) {
   return sum;
 }
 
+// The same, and about the origin.
+Momentum movingMomentum(const WorldData& d) {
+  Momentum out;
+  const auto add = [&](double m, const Vector3d& at, const Vector3d& v) {
+    out.linear += m * v;
+    out.linearScale += m * v.norm();
+    out.angular += m * at.cross(v);
+  };
+  for (int i = 0; i < d.spheres.count; ++i) {
+    add(sphereMass(d, i), vectorOf(d.spheres.position[i]), vectorOf(d.spheres.velocity[i]));
+    out.angular += vectorOf(d.spheres.angularMomentum[i]);
+  }
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+    if (!isCarried(d, i)) add(d.nodes.mass[i], vectorAt(d.nodes.position, i), vectorAt(d.nodes.velocity, i));
+  return out;
+}
+
+// The whole tube, stiffly, about its middle.
+void turn(WorldData& d, const Vector3d& spin) {
+  const Vector3d centre(0.08, 0, 0);
+  for (int i = 0; i < d.spheres.count; ++i) {
+    d.spheres.velocity[i] = quadOf(spin.cross(vectorOf(d.spheres.position[i]) - centre));
+    setAngularVelocity(d, i, spin);
+  }
+  for (const int i : d.ranges[0].node)
+    setVector(d.nodes.velocity, i, spin.cross(vectorAt(d.nodes.position, i) - centre));
+}
+
 constexpr int kNode = 200;  // at about two thirds of the length
 
 }  // namespace
@@ -202,14 +230,7 @@ TEST(SurfaceParts, PartsThatJoinDoNotWeighTwice) {
 TEST(SurfaceParts, AFallingBodyTurnsAsAFullSurfaceDoes) {
   const auto thrown = [](SurfaceMode surface) {
     World world = worldOf(tube(surface, false), {0, -9.81, 0});
-    WorldData& d = world.data();
-    const Vector3d spin(0, 0, 4), centre(0.08, 0, 0);
-    for (int i = 0; i < d.spheres.count; ++i) {
-      d.spheres.velocity[i] = quadOf(spin.cross(vectorOf(d.spheres.position[i]) - centre));
-      setAngularVelocity(d, i, spin);
-    }
-    for (const int i : d.ranges[0].node)
-      setVector(d.nodes.velocity, i, spin.cross(vectorAt(d.nodes.position, i) - centre));
+    turn(world.data(), {0, 0, 4});
     return world;
   };
   World part = thrown(SurfaceMode::contact), full = thrown(SurfaceMode::full);
@@ -256,6 +277,28 @@ TEST(SurfaceParts, JoiningAndLeavingKeepMomentum) {
   EXPECT_LT((linearMomentum(world.data()) - given).norm(), 0.01 * given.norm());
 }
 
+// Parts that join a turning body take along what their places turn with, not what their spheres move with.
+TEST(SurfaceParts, ATurningBodyKeepsMomentumWhereTheyJoin) {
+  World world = worldOf(tube(SurfaceMode::contact, false), Vector3d::Zero());
+  WorldData& d = world.data();
+  turn(d, {3, 0, 4});
+  for (int k = 0; k < 3; ++k) world.advance({});
+  ASSERT_EQ(world.dynamicNodes(0), 0);
+  const Momentum before = movingMomentum(d);
+  Loads nothing = holding(world, kNode, Vector3d::Zero());
+  nothing.heldNodes[0].stiffness = nothing.heldNodes[0].damping = 0;
+  world.advance(nothing);
+  EXPECT_GT(world.dynamicNodes(0), 0);
+  const Momentum joined = movingMomentum(d);
+  EXPECT_LT((joined.linear - before.linear).norm(), 1e-4 * before.linearScale);
+  EXPECT_LT((joined.angular - before.angular).norm(), 1e-4 * before.angular.norm());
+  for (int k = 0; k < 100 && world.dynamicNodes(0) > 0; ++k) world.advance({});
+  EXPECT_EQ(world.dynamicNodes(0), 0);
+  const Momentum left = movingMomentum(d);
+  EXPECT_LT((left.linear - before.linear).norm(), 1e-4 * before.linearScale);
+  EXPECT_LT((left.angular - before.angular).norm(), 1e-4 * before.angular.norm());
+}
+
 // The mass of carried nodes is their spheres', and counts once.
 TEST(SurfaceParts, EnergiesCountEveryMassOnce) {
   World part = worldOf(tube(SurfaceMode::contact, false), {0, -9.81, 0}),
@@ -266,6 +309,20 @@ TEST(SurfaceParts, EnergiesCountEveryMassOnce) {
   }
   EXPECT_EQ(part.dynamicNodes(0), 0);
   EXPECT_NEAR(part.energies().kinetic, full.energies().kinetic, 1e-3 * full.energies().kinetic);
+  EXPECT_NEAR(part.energies().gravity, full.energies().gravity, 1e-4 * std::abs(full.energies().gravity));
+}
+
+// Where a node is has its weight's energy, whether it moves by itself or is carried.
+TEST(SurfaceParts, GravitysEnergyKnowsNoJump) {
+  BodyDescription body = tube(SurfaceMode::contact, true);
+  body.tissue.damping = 2;
+  World world = worldOf(body, {0, -5, 0});
+  for (int k = 0; k < 400; ++k) world.advance({});
+  const double before = world.energies().gravity;
+  Loads nothing = holding(world, kNode, Vector3d::Zero());
+  nothing.heldNodes[0].stiffness = nothing.heldNodes[0].damping = 0;
+  world.advance(nothing);
+  EXPECT_NEAR(world.energies().gravity, before, 1e-6 * std::abs(before));
 }
 
 TEST(SurfaceParts, ADeadLoadKeepsItsNodesMoving) {

@@ -270,8 +270,10 @@ std::vector<double> nodeGive(const BodyDescription& body, const BodyMechanics& m
   }
   for (std::size_t e = 0; e < edges.size(); ++e) {
     for (int k = 0; k < 2; ++k) {
-      const double stiffness = mechanics.edgeStiffness[e], neighbour = all[edges[e][1 - k]];
-      if (neighbour > 0) own[edges[e][k]] += stiffness * (1 - stiffness / neighbour);
+      const int beside = edges[e][1 - k];
+      const double stiffness = mechanics.edgeStiffness[e];
+      const bool yields = mechanics.nodeMoves[beside] && all[beside] > 0;
+      own[edges[e][k]] += yields ? stiffness * (1 - stiffness / all[beside]) : stiffness;
     }
   }
   std::vector<double> give(count, 0);

@@ -82,15 +82,26 @@ void hang(WorldData& d, const HostRange& range) {
   }
 }
 
+void clearWeight(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  s.weight.resize(2 * d.spheres.position.size());
+  for (const Batch& batch : d.awake.batches)
+    for (const int i : batch.spheres) s.weight[2 * i] = s.weight[2 * i + 1] = {};
+  s.weightOnLinks.assign(d.links.loads.size(), LinkLoads{});
+  for (FrameLoad& load : d.identified.loads) load = {};
+}
+
 // What weighs at carried nodes already weighs at their spheres, where their mass is.
 void takeWeightOffSpheres(WorldData& d) {
   SurfaceParts& s = d.surface;
-  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
-    const BodyRange& r = d.ranges[b];
-    const Lanes felt = load(s.felt[b]);
-    for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
-      const double carried = d.spheres.groups[i / 4].mass[i % 4] - s.spheres[i].mass;
-      store(s.weight[2 * i], fnma(splat(carried), felt, load(s.weight[2 * i])));
+  for (const Batch& batch : d.awake.batches) {
+    for (const int b : batch.bodies) {
+      const BodyRange& r = d.ranges[b];
+      const Lanes felt = load(s.felt[b]);
+      for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+        const double carried = d.spheres.groups[i / 4].mass[i % 4] - s.spheres[i].mass;
+        store(s.weight[2 * i], fnma(splat(carried), felt, load(s.weight[2 * i])));
+      }
     }
   }
 }
@@ -99,22 +110,19 @@ void takeWeightOffSpheres(WorldData& d) {
 
 void placeCarriedNodes(WorldData& d) {
   SurfaceParts& s = d.surface;
-  for (const HostRange& range : d.nodes.skinOnLinks) placeOnLink(d, range, [](const LinkHost&) {});
-  for (const HostRange& range : d.nodes.skinOnSpheres)
+  for (const HostRange& range : d.awake.skinOnLinks) placeOnLink(d, range, [](const LinkHost&) {});
+  for (const HostRange& range : d.awake.skinOnSpheres)
     range.onFrames ? placeOnFrames(d, range) : placeOnSphere(d, range);
   const bool weigh = !s.felt.empty();
-  if (weigh) {
-    s.weight.assign(2 * d.spheres.position.size(), Quad{});
-    s.weightOnLinks.assign(d.links.loads.size(), LinkLoads{});
-    for (FrameLoad& load : d.identified.loads) load = {};
+  if (weigh) clearWeight(d);
+  for (const HostRange& range : d.awake.carriedOnLinks) {
+    placeOnLink(d, range, [&](const LinkHost& host) {
+      if (weigh) weighOnLink(d, range, host);
+    });
+    hang(d, range);
   }
-  for (std::size_t k = 0; k < s.carried.size(); ++k) {
-    const HostRange& range = s.carried[k];
-    if (k < s.firstOnSphere) {
-      placeOnLink(d, range, [&](const LinkHost& host) {
-        if (weigh) weighOnLink(d, range, host);
-      });
-    } else if (range.onFrames) {
+  for (const HostRange& range : d.awake.carriedOnSpheres) {
+    if (range.onFrames) {
       placeOnFrames(d, range);
       if (weigh) weighOnFrames(d, range);
     } else {

@@ -14,18 +14,9 @@ void placeBalls(WorldData& d) {
     const Lanes3 q = gather(s.orientation[i], s.orientation[i + 1], s.orientation[i + 2], s.orientation[i + 3], w);
     const Lanes3 rest = gather(c.restBall[i], c.restBall[i + 1], c.restBall[i + 2], c.restBall[i + 3], radius);
     const Lanes3 frame = gather(s.position[i], s.position[i + 1], s.position[i + 2], s.position[i + 3]);
-    Lanes3 centre = frame + rotate(rotationOf(q, w), rest), arm = centre - frame;
-    Lanes none = splat(0);
-    transpose(arm.x, arm.y, arm.z, none);
-    store(c.arm[i], arm.x);
-    store(c.arm[i + 1], arm.y);
-    store(c.arm[i + 2], arm.z);
-    store(c.arm[i + 3], none);
-    transpose(centre.x, centre.y, centre.z, radius);
-    store(c.ball[i], centre.x);
-    store(c.ball[i + 1], centre.y);
-    store(c.ball[i + 2], centre.z);
-    store(c.ball[i + 3], radius);
+    const Lanes3 centre = frame + rotate(rotationOf(q, w), rest);
+    storeFour(centre - frame, c.arm, i);
+    storeFour(centre, radius, c.ball, i);
   }
 }
 

@@ -42,13 +42,8 @@ void prepareSpheres(WorldData& d) {
     const Rotation r = rotationOf(q, w);
     const Lanes3 momentum =
         gather(s.angularMomentum[i], s.angularMomentum[i + 1], s.angularMomentum[i + 2], s.angularMomentum[i + 3]);
-    const auto put = [out](Lanes3 a, Quad& (*place)(ContactSphere&)) {
-      Lanes fourth = splat(0);
-      transpose(a.x, a.y, a.z, fourth);
-      store(place(out[0]), a.x);
-      store(place(out[1]), a.y);
-      store(place(out[2]), a.z);
-      store(place(out[3]), fourth);
+    const auto put = [out](const Lanes3& a, Quad& (*place)(ContactSphere&)) {
+      scatter(a, splat(0), place(out[0]), place(out[1]), place(out[2]), place(out[3]));
     };
     const auto columnOf = [&](const Lanes3& unit) {
       return group.freeToTurn * rotate(r, timesInverseInertia(group, unit));

@@ -102,9 +102,7 @@ void place(WorldData& d, const ImplicitData& s, double time) {
   for (std::size_t i = 0; i < to.orientation.size(); i += 4) {
     const Orientation now =
         turned(gatherOrientations(s.start.orientation, i), splat(time) * gatherFour(to.angularVelocity, i));
-    Lanes q[4] = {now.q.x, now.q.y, now.q.z, now.w};
-    transpose(q[0], q[1], q[2], q[3]);
-    for (int l = 0; l < 4; ++l) store(to.orientation[i + l], q[l]);
+    storeFour(now.q, now.w, to.orientation, i);
   }
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
     d.nodes.velocity[g] = gatherFour(s.motion, 2 * to.count + 4 * g);

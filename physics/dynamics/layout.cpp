@@ -7,6 +7,7 @@
 
 #include "physics/dynamics/identified_layout.h"
 #include "physics/dynamics/stages.h"
+#include "physics/model/mesh_topology.h"
 
 namespace medulla {
 
@@ -303,12 +304,6 @@ class Batches {
   int batch_ = 0;
 };
 
-double enclosedVolume(const SoftBodyModel& m) {
-  double sum = 0;
-  for (const auto& t : m.triangles) sum += m.restNodes[t[0]].dot(m.restNodes[t[1]].cross(m.restNodes[t[2]])) / 6;
-  return sum;
-}
-
 }  // namespace
 
 std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<BodyDescription> bodies,
@@ -328,7 +323,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.firstLink = d.links.count;
     r.linkCount = d.bodies[b].links == LinkModel::identified ? 0 : static_cast<int>(m.links.size());
     r.node.resize(m.restNodes.size());
-    r.restVolume = enclosedVolume(m);
+    r.restVolume = enclosedVolume({m.restNodes, m.triangles});
     r.massDamping = mechanics[b].massDamping;
     const bool knowsNodes = d.bodies[b].surface != SurfaceMode::skin || d.bodies[b].links == LinkModel::identified;
     r.held = !d.bodies[b].fixed.empty() || (knowsNodes && !d.bodies[b].fixedNodes.empty());

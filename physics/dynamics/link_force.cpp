@@ -261,15 +261,6 @@ void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundT
   }
 }
 
-void storeVectors(const Lanes3& v, Quad& q0, Quad& q1, Quad& q2, Quad& q3) {
-  Lanes a = v.x, b = v.y, c = v.z, d = splat(0);
-  transpose(a, b, c, d);
-  store(q0, a);
-  store(q1, b);
-  store(q2, c);
-  store(q3, d);
-}
-
 // The forces on four links' spheres: `own` at the ends and on the spheres, less what the anchors' loads take.
 MEDULLA_INLINE void giveToSpheres(const LinkGroup& link, const Lanes3& ownForce1, const Lanes3& ownTorque0,
                                   const Lanes3& ownTorque1, const EndLoads& nodes, const Lanes3& arm0,
@@ -282,10 +273,11 @@ MEDULLA_INLINE void giveToSpheres(const LinkGroup& link, const Lanes3& ownForce1
     torque0 = torque0 + cross(arm0, force0);
     torque1 = torque1 + cross(arm1, force1);
   }
-  storeVectors(force0, s[0].force, s[2].force, s[4].force, s[6].force);
-  storeVectors(torque0, s[0].torque, s[2].torque, s[4].torque, s[6].torque);
-  storeVectors(force1, s[1].force, s[3].force, s[5].force, s[7].force);
-  storeVectors(torque1, s[1].torque, s[3].torque, s[5].torque, s[7].torque);
+  const Lanes none = splat(0);
+  scatter(force0, none, s[0].force, s[2].force, s[4].force, s[6].force);
+  scatter(torque0, none, s[0].torque, s[2].torque, s[4].torque, s[6].torque);
+  scatter(force1, none, s[1].force, s[3].force, s[5].force, s[7].force);
+  scatter(torque1, none, s[1].torque, s[3].torque, s[5].torque, s[7].torque);
 }
 
 // Links on which nothing hangs that moves by itself: their frames, 2.5 kB for four, are nobody's business. To the bit

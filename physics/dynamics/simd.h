@@ -136,6 +136,14 @@ inline Lanes3 gather(const Quad& q0, const Quad& q1, const Quad& q2, const Quad&
   Lanes unused;
   return gather(q0, q1, q2, q3, unused);
 }
+inline void scatter(const Lanes3& v, Lanes fourth, Quad& q0, Quad& q1, Quad& q2, Quad& q3) {
+  Lanes a = v.x, b = v.y, c = v.z, d = fourth;
+  transpose(a, b, c, d);
+  store(q0, a);
+  store(q1, b);
+  store(q2, c);
+  store(q3, d);
+}
 // Sums over the lanes of four: one result per lane.
 inline Lanes sumsOfLanes(Lanes a, Lanes b, Lanes c, Lanes d) {
   const Lanes ab = _mm256_hadd_pd(a, b), cd = _mm256_hadd_pd(c, d);
@@ -206,13 +214,12 @@ Lanes3 gatherFour(const Array& q, std::size_t i) {
   return gather(q[i], q[i + 1], q[i + 2], q[i + 3]);
 }
 template <class Array>
+void storeFour(const Lanes3& v, Lanes fourth, Array& q, std::size_t i) {
+  scatter(v, fourth, q[i], q[i + 1], q[i + 2], q[i + 3]);
+}
+template <class Array>
 void storeFour(const Lanes3& v, Array& q, std::size_t i) {
-  Lanes a = v.x, b = v.y, c = v.z, d = splat(0);
-  transpose(a, b, c, d);
-  store(q[i], a);
-  store(q[i + 1], b);
-  store(q[i + 2], c);
-  store(q[i + 3], d);
+  storeFour(v, splat(0), q, i);
 }
 
 }  // namespace medulla

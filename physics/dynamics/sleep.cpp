@@ -99,6 +99,29 @@ void shareOutLinkGroups(WorldData& d) {
   }
 }
 
+// Skins, and what of each host's nodes is carried.
+void listStillNodes(WorldData& d) {
+  Awake& a = d.awake;
+  const auto isAwake = [&](const HostRange& range) { return !d.rest[range.body].asleep; };
+  const auto listSkins = [&](const std::vector<HostRange>& from, std::vector<HostRange>& to) {
+    to.clear();
+    std::copy_if(from.begin(), from.end(), std::back_inserter(to), isAwake);
+  };
+  listSkins(d.nodes.skinOnLinks, a.skinOnLinks);
+  listSkins(d.nodes.skinOnSpheres, a.skinOnSpheres);
+  std::size_t part = 0;
+  const auto listCarried = [&](const std::vector<HostRange>& from, std::vector<HostRange>& to) {
+    to.clear();
+    for (HostRange range : from) {
+      const SurfacePart& p = d.surface.parts[part++];
+      range.firstGroup = p.firstChoice;
+      if (!p.moves && isAwake(range)) to.push_back(range);
+    }
+  };
+  listCarried(d.nodes.onLinks, a.carriedOnLinks);
+  listCarried(d.nodes.onSpheres, a.carriedOnSpheres);
+}
+
 // `visit(array, groups, perGroup)` of all that lies in such arrays: the batch's groups, and places for each of them.
 template <class Visit>
 void visitStageArrays(WorldData& d, const Batch& batch, const Visit& visit) {
@@ -171,6 +194,7 @@ void listAwake(WorldData& d) {
   list(d.nodes.onLinks, &Batch::onLinks);
   list(d.nodes.onSpheres, &Batch::onSpheres);
   for (Batch& batch : a.batches) std::sort(batch.nodeGroups.begin(), batch.nodeGroups.end());
+  listStillNodes(d);
   shareOutLinkGroups(d);
   shareStages(d);
 }
@@ -213,6 +237,7 @@ void fallAsleep(WorldData& d, const Loads& loads) {
   moveImpulses(d, true, d.contact.carried, d.contact.resting);
   runStage(d, evaluateLinks);  // once more, for the nodes that hang on them: without speed
   runStage(d, evaluateAttachments);
+  placeCarriedNodes(d);
   listAwake(d);
   d.contact.listsAreOld = true;
 }

@@ -29,14 +29,6 @@ Turning readTurning(const Spheres& s, std::size_t i) {
   return t;
 }
 
-void storeQuads(Lanes a, Lanes b, Lanes c, Lanes d, Quad* out) {
-  transpose(a, b, c, d);
-  store(out[0], a);
-  store(out[1], b);
-  store(out[2], c);
-  store(out[3], d);
-}
-
 // Orientation after h at the body-frame angular velocity of the half step: the gyroscopic term -omega x L, stepped to
 // the middle, is what makes a free top keep its energy to second order; its world angular momentum is exact by
 // construction. exp of the half angle vector u as (1, u tan|u|/|u|) normalised; the series is good to 5e-8 at |u| =
@@ -57,7 +49,7 @@ void turn(const SphereGroup& g, Turning& t, Lanes h) {
 
 void storeAngularVelocity(const SphereGroup& g, const Turning& t, Quad* out) {
   const Lanes3 omega = rotate(t.rotation, timesInverseInertia(g, t.bodyMomentum));
-  storeQuads(omega.x, omega.y, omega.z, splat(0), out);
+  storeFour(omega, out, 0);
 }
 
 // Nodes without an inverse mass, fixed or pads, do not fall either.
@@ -107,7 +99,7 @@ void stepPositions(WorldData& d, const Batch& batch) {
   for (const int g : batch.sphereGroups) {
     Turning t = readTurning(s, 4 * g);
     turn(s.groups[g], t, h);
-    storeQuads(t.q.x, t.q.y, t.q.z, t.w, &s.orientation[4 * g]);
+    storeFour(t.q, t.w, s.orientation, 4 * g);
     orient(t);
     storeAngularVelocity(s.groups[g], t, &s.angularVelocity[4 * g]);
   }

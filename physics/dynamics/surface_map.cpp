@@ -38,14 +38,7 @@ void returnLinkLoads(const WorldData& d, const std::vector<LinkLoads>& loads, Mo
     const EndLoads e = sphereLoads(g, f, gatherLoads(&loads[4 * k], g.hasBeams));
     Quad q[4][4];
     const Lanes3* parts[4] = {&e.force0, &e.torque0, &e.force1, &e.torque1};
-    for (int p = 0; p < 4; ++p) {
-      Lanes a = parts[p]->x, b = parts[p]->y, c = parts[p]->z, w = splat(0);
-      transpose(a, b, c, w);
-      store(q[p][0], a);
-      store(q[p][1], b);
-      store(q[p][2], c);
-      store(q[p][3], w);
-    }
+    for (int p = 0; p < 4; ++p) storeFour(*parts[p], q[p], 0);
     const int end = std::min(4, d.links.count - 4 * static_cast<int>(k));
     for (int l = 0; l < end; ++l) {
       addTo(motion[2 * g.sphere0[l]], load(q[0][l]));

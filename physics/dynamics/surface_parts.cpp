@@ -166,17 +166,79 @@ void shareOutMasses(WorldData& d) {
 
 // All that follows from which parts move.
 void partsChanged(WorldData& d) {
-  SurfaceParts& s = d.surface;
   shareOutMasses(d);
-  s.carried.clear();
-  for (std::size_t k = 0; k < s.parts.size(); ++k) {
-    if (k == d.nodes.onLinks.size()) s.firstOnSphere = s.carried.size();
-    if (s.parts[k].moves) continue;
-    s.carried.push_back(rangeOf(d, k));
-    s.carried.back().firstGroup = s.parts[k].firstChoice;
-  }
-  if (s.parts.size() == d.nodes.onLinks.size()) s.firstOnSphere = s.carried.size();
   listAwake(d);
+}
+
+// Of a body, about the origin; zero where nothing of it is awake.
+struct WholeMotion {
+  double mass = 0;
+  Vector3d moment = Vector3d::Zero(), linear = Vector3d::Zero(), angular = Vector3d::Zero();  // kg m, N s, N m s
+  Matrix3d inertia = Matrix3d::Zero();
+};
+
+void addMass(double mass, const Vector3d& at, const Vector3d& velocity, WholeMotion& to) {
+  to.mass += mass;
+  to.moment += mass * at;
+  to.linear += mass * velocity;
+  to.angular += mass * at.cross(velocity);
+  to.inertia += mass * inertiaAt(at);
+}
+
+Matrix3d inertiaOf(const WorldData& d, int sphere) {
+  const Matrix3d r = quaternionOf(d.spheres.orientation[sphere]).toRotationMatrix();
+  return r * inverseInertiaOf(d.spheres.groups[sphere / 4], sphere % 4).inverse() * r.transpose();
+}
+
+// Of spheres and of the nodes that move by WorldData::awake.
+std::vector<WholeMotion> wholeMotions(const WorldData& d) {
+  std::vector<WholeMotion> out(d.bodies.size());
+  for (const Batch& batch : d.awake.batches) {
+    for (const int b : batch.bodies) {
+      for (int i = d.ranges[b].firstSphere; i < d.ranges[b].firstSphere + d.ranges[b].sphereCount; ++i) {
+        addMass(d.spheres.groups[i / 4].mass[i % 4], vectorOf(d.spheres.position[i]), vectorOf(d.spheres.velocity[i]),
+                out[b]);
+        out[b].angular += vectorOf(d.spheres.angularMomentum[i]);
+        out[b].inertia += inertiaOf(d, i);
+      }
+    }
+    for (const std::vector<HostRange>* ranges : {&batch.onLinks, &batch.onSpheres})
+      for (const HostRange& range : *ranges)
+        for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i)
+          addMass(d.nodes.mass[i], vectorAt(d.nodes.position, i), vectorAt(d.nodes.velocity, i), out[range.body]);
+  }
+  return out;
+}
+
+// A rigid motion more of spheres and of the nodes that move.
+void addMotion(WorldData& d, int body, const Vector3d& velocity, const Vector3d& spin, const Vector3d& centre) {
+  const BodyRange& r = d.ranges[body];
+  const auto at = [&](const Vector3d& x) { return Vector3d(velocity + spin.cross(x - centre)); };
+  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+    store(d.spheres.velocity[i], load(d.spheres.velocity[i]) + load(quadOf(at(vectorOf(d.spheres.position[i])))));
+    d.spheres.angularVelocity[i] = quadOf(vectorOf(d.spheres.angularVelocity[i]) + spin);
+    d.spheres.angularMomentum[i] = quadOf(vectorOf(d.spheres.angularMomentum[i]) + inertiaOf(d, i) * spin);
+  }
+  for (const int i : r.node)
+    setVector(d.nodes.velocity, i, vectorAt(d.nodes.velocity, i) + at(vectorAt(d.nodes.position, i)));
+}
+
+// A node and its share of a sphere do not move alike where the sphere turns, and what edges have pulled at a node since
+// it joined goes when it leaves. Free bodies get back what they lose so, as a rigid motion of the whole: at the hosts
+// alone it would be a jolt.
+void changeParts(WorldData& d) {
+  const std::vector<WholeMotion> before = wholeMotions(d);
+  partsChanged(d);
+  const std::vector<WholeMotion> now = wholeMotions(d);
+  for (std::size_t b = 0; b < now.size(); ++b) {
+    const BodyDescription& body = d.bodies[b];
+    const bool isFree = body.fixed.empty() && body.fixedNodes.empty() && body.driven.empty();
+    if (body.surface != SurfaceMode::contact || !isFree || now[b].mass == 0) continue;
+    const Vector3d centre = now[b].moment / now[b].mass, lost = before[b].linear - now[b].linear;
+    const Matrix3d inertia = now[b].inertia - now[b].mass * inertiaAt(centre);
+    const Vector3d spin = inertia.inverse() * (before[b].angular - now[b].angular - centre.cross(lost));
+    addMotion(d, static_cast<int>(b), lost / now[b].mass, spin, centre);
+  }
 }
 
 // Wanted are the parts that loads act on, and those beside them.
@@ -253,6 +315,10 @@ void carry(WorldData& d, std::size_t part) {
   releaseLink(d, part);
 }
 
+bool isAsleep(const WorldData& d, std::size_t part) {
+  return d.rest[rangeOf(d, part).body].asleep;
+}
+
 bool hasChoice(const SurfaceParts& s) {
   return !s.nodes.empty();
 }
@@ -289,7 +355,7 @@ void moveLoadedParts(WorldData& d, const Loads& loads) {
     part.quietFrames = 0;
   }
   if (!changed) return;
-  partsChanged(d);
+  changeParts(d);
   placeCarriedNodes(d);  // what joins weighs by itself from now on, not on its hosts besides
 }
 
@@ -312,20 +378,20 @@ void chooseSurfaceParts(WorldData& d, const Loads& loads) {
   }
   for (std::size_t k = 0; k < parts.size(); ++k) {
     const bool moves = parts[k].moves || parts[k].firstChoice > rangeOf(d, k).firstGroup;
-    if (!moves || parts[k].neighbours.empty()) continue;
+    if (!moves || parts[k].neighbours.empty() || isAsleep(d, k)) continue;
     parts[k].shifted = measureShifts(d, k);
     for (const int other : parts[k].neighbours) parts[other].isBeside = true;
   }
   for (std::size_t k = 0; k < parts.size(); ++k) {
     SurfacePart& part = parts[k];
-    if (part.moves) continue;
+    if (part.moves || isAsleep(d, k)) continue;
     if (!part.isBeside) clearShifts(d, k);
     if (part.isBeside && balanceShifts(d, k) > part.unrest) part.isWanted = true;
   }
   bool changed = false;
   for (std::size_t k = 0; k < parts.size(); ++k) {
     SurfacePart& part = parts[k];
-    if (part.always) continue;
+    if (part.always || isAsleep(d, k)) continue;
     const bool quiet = !part.isWanted && part.shifted < kQuiet * part.unrest;
     part.quietFrames = quiet ? part.quietFrames + 1 : 0;
     if (!part.moves && part.isWanted) {
@@ -335,7 +401,7 @@ void chooseSurfaceParts(WorldData& d, const Loads& loads) {
       changed = true;
     }
   }
-  if (changed) partsChanged(d);
+  if (changed) changeParts(d);
 }
 
 }  // namespace medulla

@@ -277,12 +277,12 @@ Energies World::energies() const {
     const double mass = d.spheres.groups[i / 4].mass[i % 4];
     e.kinetic += 0.5 * mass * vectorOf(d.spheres.velocity[i]).squaredNorm() +
                  0.5 * vectorOf(d.spheres.angularVelocity[i]).dot(vectorOf(d.spheres.angularMomentum[i]));
-    e.gravity -= mass * g.dot(vectorOf(d.spheres.position[i]));
+    e.gravity -= d.surface.spheres[i].mass * g.dot(vectorOf(d.spheres.position[i]));
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
-    if (isCarried(d.surface, i / 4)) continue;  // its mass is its spheres'
-    e.kinetic += 0.5 * d.nodes.mass[i] * vectorAt(d.nodes.velocity, i).squaredNorm();
     e.gravity -= d.nodes.mass[i] * g.dot(vectorAt(d.nodes.position, i));
+    if (isCarried(d.surface, i / 4)) continue;  // its mass is its spheres', though it weighs where it hangs
+    e.kinetic += 0.5 * d.nodes.mass[i] * vectorAt(d.nodes.velocity, i).squaredNorm();
   }
   return e;
 }
@@ -350,6 +350,7 @@ std::uint64_t World::stateHash() const {
   for (const SurfacePart& p : d.surface.parts)
     if (!p.always) hash.add(p.moves ? p.quietFrames : -1.0);
   for (const Quad& q : d.surface.weight) add(q, 3);
+  if (d.settings.integrator == Integrator::implicit) hash.add(d.mostEnergy);
   for (const Rest& r : d.rest) hash.add(r.asleep ? -1.0 : r.stillFrames);
   for (const StillPlace& place : d.stillPlace) {
     add(place.position, 3);

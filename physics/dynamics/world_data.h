@@ -255,8 +255,6 @@ struct SurfaceParts {
   std::vector<BareSphere> spheres;
   std::vector<double> ownShare;    // per sphere: of its mass now, without what carried nodes add
   std::vector<CarriedNode> nodes;  // of parts that have the choice; by sphere
-  std::vector<HostRange> carried;  // those that do not move now, on links and, from firstOnSphere on, on spheres
-  std::size_t firstOnSphere = 0;
 };
 
 inline bool isCarried(const SurfaceParts& s, int group) {
@@ -288,6 +286,7 @@ struct Batch {
 struct Awake {
   int bodies = 0;
   std::vector<Batch> batches;
+  std::vector<HostRange> skinOnLinks, skinOnSpheres, carriedOnLinks, carriedOnSpheres;  // as they hang at frames' ends
   std::vector<char> loadedSkins;  // per body: a skin, and loads act on its nodes in this frame
 };
 
