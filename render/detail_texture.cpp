@@ -167,20 +167,22 @@ class VesselPainter {
   std::uint16_t count_ = 0;
 };
 
-// Adds amplitude * tiledNoise(period * x / side + shift, period * y / side, period, seed) to every texel. Row by row:
-// the lattice is blended along y once per lattice column instead of once per texel.
-void addNoise(int period, float shift, int seed, float amplitude, std::vector<float>& image, int side) {
+// Adds amplitude * tiledNoise(columns * x / side + shift, period * y / side, period, seed) to every texel, with so many
+// times fewer columns than rows as it is `longer` along x than across. Row by row: the lattice is blended along y once
+// per lattice column instead of once per texel.
+void addNoise(int period, int longer, float shift, int seed, float amplitude, std::vector<float>& image, int side) {
+  const int columns = std::max(1, period / longer);
   std::vector<int> cell(side);
-  std::vector<float> share(side), column(period + 1);
-  const float scale = float(period) / float(side);
+  std::vector<float> share(side), column(columns + 1);
+  const float scale = float(period) / float(side), scaleX = float(columns) / float(side);
   for (int x = 0; x < side; ++x) {
-    const float u = float(x) * scale + shift, floor = std::floor(u), t = u - floor;
-    cell[x] = int(floor) % period;
+    const float u = float(x) * scaleX + shift, floor = std::floor(u), t = u - floor;
+    cell[x] = int(floor) % columns;
     share[x] = t * t * (3 - 2 * t);
   }
   for (int y = 0; y < side; ++y) {
-    for (int k = 0; k < period; ++k) column[k] = amplitude * tiledNoise(float(k), float(y) * scale, period, seed);
-    column[period] = column[0];
+    for (int k = 0; k < columns; ++k) column[k] = amplitude * tiledNoise(float(k), float(y) * scale, period, seed);
+    column[columns] = column[0];
     float* row = &image[std::size_t(y) * side];
     for (int x = 0; x < side; ++x) {
       const float a = column[cell[x]];
@@ -194,13 +196,30 @@ std::vector<float> lobules(const DetailPattern& pattern) {
   const int n = pattern.side, cells = pattern.cells;
   std::vector<float> out(std::size_t(n) * n, 0.f), warpU = out, warpV = out;
   if (cells == 0) return out;
-  addNoise(14, 0, 61, 0.9f, warpU, n);
-  addNoise(14, 0, 62, 0.9f, warpV, n);
+  addNoise(14, 1, 0, 61, 0.9f, warpU, n);
+  addNoise(14, 1, 0, 62, 0.9f, warpV, n);
   const float scale = float(cells) / float(n);
   for (int y = 0, i = 0; y < n; ++y)
     for (int x = 0; x < n; ++x, ++i)
       out[i] = smoothStep(0, 0.5f, tiledCells(float(x) * scale + warpU[i], float(y) * scale + warpV[i], cells, 77));
   return out;
+}
+
+// A board's growth rings are a section through nested shells: bands of even noise, each dark towards its end, with
+// fibres between.
+std::vector<float> woodGrain(const DetailPattern& pattern, int seed) {
+  constexpr float kRings = 7, kFibres = 0.55f;
+  const int n = pattern.side;
+  std::vector<float> shells(std::size_t(n) * n, 0.f), fibres = shells;
+  for (int octave = 0; octave < 3; ++octave)
+    addNoise(4 << octave, pattern.grain / 4, 0, octave + 31 * seed, 0.6f / float(1 << octave), shells, n);
+  for (int octave = 0; octave < 2; ++octave)
+    addNoise(128 << octave, pattern.grain, 0, 7 + octave + 31 * seed, 0.5f, fibres, n);
+  for (std::size_t i = 0; i < shells.size(); ++i) {
+    const float ring = kRings * shells[i], along = ring - std::floor(ring);
+    shells[i] = (1 - kFibres) * (1 - along * along) * smoothStep(0, 0.12f, along) + kFibres * fibres[i];
+  }
+  return shells;
 }
 
 std::uint8_t toByte(float v) {
@@ -215,9 +234,10 @@ std::vector<std::uint8_t> makeDetailTexture(const DetailPattern& pattern, int se
   const std::vector<float> lobule = lobules(pattern);
   std::vector<float> mottling(lobule.size(), 0.f), height = mottling;
   for (int octave = 0; octave < 6; ++octave)
-    addNoise(4 << octave, 0, octave + 31 * seed, 0.5f / float(1 << octave), mottling, n);
+    addNoise(4 << octave, 1, 0, octave + 31 * seed, 0.5f / float(1 << octave), mottling, n);
+  if (pattern.grain > 0) mottling = woodGrain(pattern, seed);
   for (int octave = 0; octave < 4; ++octave)
-    addNoise(20 << octave, 0.3f, 17 + octave + 31 * seed, 0.5f / float(1 << octave), height, n);
+    addNoise(20 << octave, 1, 0.3f, 17 + octave + 31 * seed, 0.5f / float(1 << octave), height, n);
   // Vessels stand out a little, but not among lobules: there they read as scratches.
   const float vesselHeight = pattern.cellContrast > 0 ? 0.f : 0.05f;
   for (std::size_t i = 0; i < height.size(); ++i) {

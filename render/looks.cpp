@@ -215,7 +215,7 @@ Look seabed() {
 Look bowl() {
   Look l;
   l.name = "bowl";
-  l.albedoLow = {0.52f, 0.50f, 0.46f};
+  l.albedoLow = {0.58f, 0.56f, 0.52f};
   l.albedoHigh = {0.60f, 0.58f, 0.54f};
   l.mottleFrequency = 12;
   l.roughness = 0.55f;
@@ -237,12 +237,13 @@ Look wood() {
   l.roughness = 0.5f;
   l.wetRoughness = 0.35f;
   l.specular = 0.35f;
-  l.mottle = 0.35f;
-  l.bump = 0.10f;
-  l.detailScale = 2;
+  l.mottle = 0.6f;
+  l.bump = 0.06f;
+  l.detailScale = 1.6f;
   l.unrollTilt = 1.5708f;
   l.castsShadow = false;
-  l.detail = {512, 0, 0, 0, 0, 0, 0};
+  l.detail = {1024, 0, 0, 0, 0, 0, 0};
+  l.detail.grain = 24;
   return l;
 }
 
