@@ -52,6 +52,10 @@ void computeNormals(SceneMesh& mesh, const MeshPart& part) {
   }
 }
 
+float spacingOf(const SceneMesh& mesh, std::size_t i) {
+  return 0.44f * std::sqrt(mesh.area[i]);
+}
+
 void computeTangents(SceneMesh& mesh, const MeshPart& part) {
   std::fill_n(mesh.tangent.begin() + part.firstVertex, part.vertexCount, glm::vec3(0));
   for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {

@@ -38,6 +38,8 @@ struct SceneMesh {
 
 // Area-weighted vertex normals (the sum of cross products) of one part, and what else its triangles tell: area, hollow.
 void computeNormals(SceneMesh& mesh, const MeshPart& part);
+// m, from vertex i to those beside it: six even triangles of edge e have, twice, 5.2 e^2.
+float spacingOf(const SceneMesh& mesh, std::size_t i);
 // Tangents from the gradient of u over each triangle; needs normals.
 void computeTangents(SceneMesh& mesh, const MeshPart& part);
 

@@ -18,20 +18,28 @@ void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part) {
 
 namespace {
 
-// x -> x + offset exp(-(x - centre)^2 / width^2), m. A normal turns to n - grad w (offset . n), up to length (inverse
-// transpose, first order). What lies next to the centre loses its blood, over `blanched` metres.
-void displace(const MeshPart& part, glm::vec3 centre, glm::vec3 offset, float width, float blanched, SceneMesh& mesh) {
+// x -> x + offset w, w = exp(-|narrow (x - centre)|^2), m and 1/m. A normal turns to n - grad w (offset . n) / (1 +
+// offset . grad w), up to length: the inverse transpose. What lies next to the centre loses its blood, over `blanched`
+// metres.
+struct Bump {
+  glm::vec3 centre, offset;
+  glm::mat3 narrow;
+  float blanched;
+};
+void displace(const MeshPart& part, const Bump& bump, SceneMesh& mesh) {
   constexpr float kShade = 1.8f;  // share of the cavity's light lost, per slope
   for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
-    const glm::vec3 d = mesh.position[i] - centre;
-    const float q = glm::dot(d, d) / (width * width);
+    const glm::vec3 d = mesh.position[i] - bump.centre, scaled = bump.narrow * d;
+    const float q = glm::dot(scaled, scaled);
     if (q > 9) continue;
-    mesh.blanch[i] = glm::mix(mesh.blanch[i], 1.f, std::exp(-glm::dot(d, d) / (blanched * blanched)));
+    mesh.blanch[i] = glm::mix(mesh.blanch[i], 1.f, std::exp(-glm::dot(d, d) / (bump.blanched * bump.blanched)));
     const float w = std::exp(-q);
-    const glm::vec3 gradient = d * (-2 * w / (width * width));
-    const float along = glm::dot(offset, mesh.normal[i]);
-    mesh.normal[i] = glm::normalize(mesh.normal[i] - gradient * along);
-    mesh.position[i] += offset * w;
+    const glm::vec3 gradient = (scaled * bump.narrow) * (-2 * w);
+    const float along = glm::dot(bump.offset, mesh.normal[i]);
+    // Where the surface would fold over itself its normal stays short of the fold.
+    const float lengthened = std::max(1 + glm::dot(bump.offset, gradient), 0.2f);
+    mesh.normal[i] = glm::normalize(mesh.normal[i] - gradient * (along / lengthened));
+    mesh.position[i] += bump.offset * w;
     if (along < 0) mesh.openness[i] *= std::max(1 + kShade * along * glm::length(gradient), 0.3f);
   }
 }
@@ -39,7 +47,8 @@ void displace(const MeshPart& part, glm::vec3 centre, glm::vec3 offset, float wi
 // The vertex of a moving part that is nearest to p, at most `reach` away; nullptr as part where there is none.
 struct Nearest {
   const MeshPart* part = nullptr;
-  glm::vec3 position{0};
+  glm::vec3 position{0}, normal{0};
+  float spacing = 0;  // m, to the next vertices
 };
 Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
   Nearest nearest;
@@ -50,7 +59,7 @@ Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
       const glm::vec3 d = mesh.position[i] - p;
       if (const float q = glm::dot(d, d); q < best) {
         best = q;
-        nearest = {&part, mesh.position[i]};
+        nearest = {&part, mesh.position[i], mesh.normal[i], spacingOf(mesh, i)};
       }
     }
   }
@@ -64,16 +73,29 @@ void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
   constexpr float kWidth = 0.0055f, kPressed = 0.0014f, kBlanchWidth = 0.0050f;  // m, at scale 1, as all here
   // A smooth surface stays behind the held nodes that it hangs on, up to kReach; the jaws bite kBite of it.
   constexpr float kReach = 0.014f, kBite = 0.0035f;
+  // Between the jaws stands a fold, as thick as they are apart there and wider than they are: so far beyond the tip of
+  // a tool that stands upright. Along the surface it would be a slit.
+  constexpr float kFold = 0.0090f, kFoldThickness = 0.0013f, kFoldWidth = 0.0040f;
   const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, instrument.scale);
   const float width = instrument.scale * kWidth, blanched = instrument.scale * kBlanchWidth;
   if (instrument.holding) {
     const Nearest held = nearestMoving(mesh, instrument.tip, instrument.scale * kReach);
     if (!held.part) return;
     const glm::vec3 offset = instrument.tip + kBite * axis - held.position;
-    displace(*held.part, held.position, offset, std::max(width, 1.3f * glm::length(offset)), blanched, mesh);
+    const float around = std::max(width, 1.3f * glm::length(offset));
+    displace(*held.part, {held.position, offset, glm::mat3(1 / around), blanched}, mesh);
+    const float thickness = std::max(kFoldThickness, 0.8f * held.spacing / instrument.scale);  // else facets stand out
+    const float wide = std::max(kFoldWidth, thickness);
+    const glm::vec3 narrow(1 / wide, 1 / thickness, 1 / wide);
+    const glm::mat3 toTool = glm::transpose(glm::mat3_cast(instrument.worldFromTool));
+    const glm::mat3 scale(narrow.x, 0, 0, 0, narrow.y, 0, 0, 0, narrow.z);
+    const float upright = std::max(glm::dot(held.normal, axis) / instrument.scale, 0.f);
+    displace(*held.part,
+             {instrument.tip + kBite * axis, kFold * upright * axis, scale * toTool / instrument.scale, blanched},
+             mesh);
   } else {
     for (const MeshPart& part : mesh.parts)
-      if (!part.instrument) displace(part, instrument.tip, -kPressed * axis, width, blanched, mesh);
+      if (!part.instrument) displace(part, {instrument.tip, -kPressed * axis, glm::mat3(1 / width), blanched}, mesh);
   }
 }
 

@@ -133,11 +133,6 @@ bool canGlint(float gloss, float cosine, const Look& look, const GlossLobes& lob
   return gloss * (lobes.c1 / (d1 * d1) + std::min(lobes.c2 / (d2 * d2), kFilmPeak)) > kVisible;
 }
 
-// m to the next vertices: six even triangles of edge e have, twice, 5.2 e^2.
-float spacingOf(const SceneMesh& mesh, std::size_t i) {
-  return 0.44f * std::sqrt(mesh.area[i]);
-}
-
 // Is the vertex lit, dark, or near an edge? Looks around it in the shadow map as far as a soft edge reaches; the
 // distance of what it finds in the way sets how soft the edge is (Fernando 2005, percentage-closer soft shadows).
 Shade shadeVertex(const ShadowMap& shadow, vec3 texel, float spacing, const Shading& v, const LightView& light,

@@ -78,6 +78,13 @@ TEST(Touch, PressedTissueGivesWayAndHeldTissueComesBetweenTheJaws) {
   applyTouch(tool, held);
   EXPECT_GT(held.position[middleOf(rest)].z, tool.tip.z + 0.002f);
   EXPECT_NEAR(held.blanch[middleOf(rest)], 1, 1e-5);
+  // As a fold: thin where the jaws close on it, along y, and long across them.
+  const auto heightAt = [&](vec3 place) {
+    const auto nearer = [&](vec3 a, vec3 b) { return glm::distance(a, place) < glm::distance(b, place); };
+    return held.position[std::min_element(rest.position.begin(), rest.position.end(), nearer) - rest.position.begin()]
+        .z;
+  };
+  EXPECT_GT(heightAt({0.002f, 0, 0}), heightAt({0, 0.002f, 0}) + 0.003f);
   // Far away nothing moves.
   EXPECT_EQ(held.position[0], rest.position[0]);
   EXPECT_EQ(pressed.position[0], rest.position[0]);
