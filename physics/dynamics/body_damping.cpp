@@ -62,13 +62,18 @@ void dampBodies(WorldData& d, const Batch& batch) {
     const BodyRange& r = d.ranges[b];
     if (r.massDamping == 0) continue;
     const double lost = 1 - 1 / (1 + d.substep * r.massDamping);
-    const Lanes zero = splat(0);
-    const RigidMotion motion = r.held ? RigidMotion{zero, zero, zero} : rigidMotionOf(s, ownShare, r);
-    for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
-      const Lanes v = load(s.velocity[i]);
-      const Lanes rigid = motion.linear + crossProduct(motion.angular, load(s.position[i]) - motion.centre);
-      store(s.velocity[i], fma(splat(-lost * ownShare[i]), v - rigid, v));
+    const auto slow = [&](const auto& rigidAt) {
+      for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+        const Lanes v = load(s.velocity[i]);
+        store(s.velocity[i], fma(splat(-lost * ownShare[i]), v - rigidAt(i), v));
+      }
+    };
+    if (r.held) {
+      slow([](int) { return splat(0); });
+      continue;
     }
+    const RigidMotion m = rigidMotionOf(s, ownShare, r);
+    slow([&](int i) { return m.linear + crossProduct(m.angular, load(s.position[i]) - m.centre); });
   }
 }
 
