@@ -6,6 +6,8 @@ namespace medulla {
 namespace {
 
 constexpr float kBehind = -1e9f, kFarAway = 1e6f;
+// Of the near plane, which only says how depths are spread: a shaft beside the lens casts its shadow from before it.
+constexpr float kNearest = 0.1f;
 
 void projectVertices(const SceneMesh& mesh, const LightView& light, std::vector<glm::vec3>& texel) {
   texel.resize(mesh.position.size());
@@ -16,7 +18,7 @@ void projectVertices(const SceneMesh& mesh, const LightView& light, std::vector<
     texel[i] = {(clip.x * inverse + 1) * half, (clip.y * inverse + 1) * half, clip.z * inverse * 0.5f + 0.5f};
     // Bounded, so that texels convert to integers whatever the picture holds.
     texel[i] = glm::clamp(texel[i], glm::vec3(-kFarAway), glm::vec3(kFarAway));
-    if (clip.w < light.nearDistance) texel[i] = glm::vec3(kBehind, kBehind, 0);
+    if (clip.w < kNearest * light.nearDistance) texel[i] = glm::vec3(kBehind, kBehind, 0);
   }
 }
 

@@ -160,7 +160,7 @@ static const std::vector<CommittedMesh> committedMeshes = {{"gallbladder/gallbla
                                                            {"toys/drop", 160},
                                                            {"toys/star", 240},
                                                            {"toys/bowl", 4000},
-                                                           {"toys/bowl_fine", 16000},
+                                                           {"toys/bowl_fine", 26000},
                                                            {"scenery/fat", 18000},
                                                            {"scenery/wall", 4000}};
 

@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "render/shadow_map.h"
 
 namespace medulla {
 namespace {
@@ -69,6 +73,23 @@ TEST(VisibleTriangles, ASurfaceDoesNotHideItselfNorWhatLiesOnIt) {
   const std::vector<std::uint32_t> seen = trianglesSeen(mesh, true);
   EXPECT_EQ(seen[0], 2u * 150 * 150);
   EXPECT_EQ(seen[1], 2u * 150 * 150);  // half a millimetre behind: left to OpenGL
+}
+
+// A shaft runs past the lamp: what is nearer than the near plane hides what lies behind it, too; what is behind the
+// lamp nothing.
+TEST(ShadowMap, WhatIsNearerThanTheNearPlaneCastsItsShadow) {
+  LightView light;
+  light.nearDistance = 0.1f;
+  light.clipFromWorld = glm::perspective(1.0f, 1.f, light.nearDistance, light.farDistance);
+  for (const float distance : {0.2f, 0.03f, -0.03f}) {
+    SceneMesh mesh;
+    addSquare(mesh, {0.0001f * distance, 0.0002f * distance, -distance}, 0.2f * std::abs(distance), 3);
+    ShadowMap shadow;
+    renderShadowMap(mesh, light, shadow);
+    const float behind = 0.9f;  // 0.5 m away
+    EXPECT_EQ(shadow.map.at(kShadowSide / 2 + 3, kShadowSide / 2 + 5) < behind, distance > 0) << distance;
+    EXPECT_EQ(shadow.map.at(3, 5), 1) << distance;
+  }
 }
 
 }  // namespace
