@@ -10,11 +10,15 @@ namespace medulla {
 namespace {
 
 // The ACES curve (Narkowicz 2015) and the sRGB transfer in one rational fit over sqrt(x), largest error 0.006: a
-// quarter of the time of both in turn.
-constexpr const char* kToneCurve = R"(
+// quarter of the time of both in turn. For slow gradients half a grey level of interleaved gradient noise (Jimenez
+// 2014) either way.
+constexpr const char* kToPixels = R"(
 vec3 toneCurve(vec3 c) {
   vec3 r = sqrt(max(c, 0.));
   return (5.21175593 * c + .0267191537 * r - .00373619759) / (5.32664275 * c - .583381459 * r + 1.);
+}
+float tremble() {
+  return (fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(.06711056, .00583715)))) - .5) / 255.;
 }
 )";
 
@@ -38,7 +42,7 @@ unsigned buildProgram(const std::string& defines, const char* vertex, const char
       "#version 330 core\n#extension GL_ARB_texture_gather : require\n#define BLEED .045\n" + defines;
   const unsigned program = glCreateProgram();
   const unsigned shaders[] = {compile(GL_VERTEX_SHADER, head + vertex),
-                              compile(GL_FRAGMENT_SHADER, head + kToneCurve + fragment)};
+                              compile(GL_FRAGMENT_SHADER, head + kToPixels + fragment)};
   for (const unsigned s : shaders) glAttachShader(program, s);
   glLinkProgram(program);
   for (const unsigned s : shaders) glDeleteShader(s);
@@ -232,13 +236,11 @@ void main() {
   gl_Position = vec4(place, 1, 1);
 }
 )";
-// Interleaved gradient noise (Jimenez 2014).
 const char* const kHazeFragmentShader = R"(
 noperspective in vec3 vColour;
 out vec4 pixel;
 void main() {
-  float tremble = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(.06711056, .00583715)))) - .5;
-  pixel = vec4(toneCurve(vColour) + tremble / 255., 1);
+  pixel = vec4(toneCurve(vColour) + tremble(), 1);
 }
 )";
 
@@ -255,8 +257,7 @@ out vec4 pixel;
 void main() {
   float r = dot(place, place);
   vec3 c = mix(vec3(.93, .94, .95), vec3(.66, .69, .73), clamp(.45 * r + .18 * place.y, 0., 1.));
-  float tremble = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(.06711056, .00583715)))) - .5;
-  pixel = vec4(c + tremble / 255., 1);
+  pixel = vec4(c + tremble(), 1);
 }
 )";
 
