@@ -30,7 +30,7 @@ struct Property {
 };
 
 struct Element {
-  std::string name;
+  std::string_view name;  // in the file
   long long count = 0;
   std::vector<Property> properties;
 };
@@ -138,7 +138,7 @@ Header readHeader(std::string_view bytes, const std::string& name) {
       if (!count || *count < 0)
         fail(fmt::format("expected element NAME COUNT, a count from 0 to {}", std::numeric_limits<int>::max()));
       if (header.find(element)) fail(fmt::format("element {} stands twice", quoted(element)));
-      header.elements.push_back({std::string(element), *count, {}});
+      header.elements.push_back({element, *count, {}});
     } else if (word == "property" && !header.elements.empty()) {
       const std::optional<Property> property = propertyOf(header.elements.back(), words);
       if (!property) fail("expected property TYPE NAME or property list TYPE TYPE NAME, the first type a whole number");
@@ -276,12 +276,12 @@ class Values {
   long long number_ = 0;
 };
 
-struct Row {
+struct PlyRow {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   std::vector<int> corners;
 };
 
-void readRow(Values& values, const Element& element, long long vertices, Row& row) {
+void readRow(Values& values, const Element& element, long long vertices, PlyRow& row) {
   row.corners.clear();
   for (const Property& p : element.properties) {
     const long long length = p.count ? values.listLength(p) : 1;
@@ -297,7 +297,7 @@ void readRow(Values& values, const Element& element, long long vertices, Row& ro
 }
 
 void readElements(Values& values, const Element& element, long long vertices, TriangleMesh& mesh) {
-  Row row;
+  PlyRow row;
   const bool isVertex = element.name == "vertex", isFace = has(&element, Use::corners);
   for (long long k = 0; k < element.count; ++k) {
     values.beginRow(element, k);
