@@ -299,6 +299,31 @@ TEST(SurfaceParts, ATurningBodyKeepsMomentumWhereTheyJoin) {
   EXPECT_LT((left.angular - before.angular).norm(), 1e-4 * before.angular.norm());
 }
 
+// What joins a body under way goes with it from the start: a tube of which a tool wants nothing, drawn along by it.
+TEST(SurfaceParts, WhatJoinsAMovingBodyIsNotLeftBehind) {
+  World world = worldOf(tube(SurfaceMode::contact, false), Vector3d::Zero());
+  WorldData& d = world.data();
+  const Vector3d velocity(0, 0, 0.5);
+  for (int i = 0; i < d.spheres.count; ++i) d.spheres.velocity[i] = quadOf(velocity);
+  for (const int i : d.ranges[0].node) setVector(d.nodes.velocity, i, velocity);
+  world.advance({});
+  const std::vector<Vector3d>& rest = world.bodies()[0].model->restNodes;
+  int joined = 0;
+  for (int k = 0; k < 8; ++k) {
+    std::vector<bool> wasCarried;
+    for (const int i : d.ranges[0].node) wasCarried.push_back(isCarried(d, i));
+    Loads loads = holding(world, kNode, Vector3d(0, 0, 0.004) + world.time() * velocity);
+    world.advance(loads);
+    for (std::size_t n = 0; n < rest.size(); ++n) {
+      const int i = d.ranges[0].node[n];
+      if (!wasCarried[n] || isCarried(d, i)) continue;
+      ++joined;
+      EXPECT_LT((vectorAt(d.nodes.position, i) - rest[n] - world.time() * velocity).norm(), 0.006) << "node " << n;
+    }
+  }
+  EXPECT_GT(joined, 20);
+}
+
 // The mass of carried nodes is their spheres', and counts once.
 TEST(SurfaceParts, EnergiesCountEveryMassOnce) {
   World part = worldOf(tube(SurfaceMode::contact, false), {0, -9.81, 0}),

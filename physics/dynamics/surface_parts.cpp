@@ -401,7 +401,10 @@ void chooseSurfaceParts(WorldData& d, const Loads& loads) {
       changed = true;
     }
   }
-  if (changed) changeParts(d);
+  if (!changed) return;
+  runStage(d, evaluateLinks);
+  placeCarriedNodes(d);  // what joins sets out from where its hosts are now, not from where they were a frame ago
+  changeParts(d);
 }
 
 }  // namespace medulla
