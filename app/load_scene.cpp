@@ -220,7 +220,7 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
     if (!item.meshPath.empty()) requireFile(scene, item.line, "mesh", "mesh", item.meshPath);
     loaded.statics.push_back(item.meshPath.empty() ? shapeMesh(item.shape)
                                                    : readMesh(item.meshPath, metresPerUnit(item.unit)));
-    requireNearby(scene, item, loaded.statics.back());
+    if (!item.meshPath.empty()) requireNearby(scene, item, loaded.statics.back());
   }
   for (SceneTool& tool : scene.tools) loaded.trajectories.push_back(loadTrajectory(scene, tool));
   loaded.scene = std::move(scene);

@@ -212,7 +212,7 @@ std::vector<float> woodGrain(const DetailPattern& pattern, int seed) {
   const int n = pattern.side;
   std::vector<float> shells(std::size_t(n) * n, 0.f), fibres = shells;
   for (int octave = 0; octave < 3; ++octave)
-    addNoise(4 << octave, pattern.grain / 4, 0, octave + 31 * seed, 0.6f / float(1 << octave), shells, n);
+    addNoise(4 << octave, std::max(1, pattern.grain / 4), 0, octave + 31 * seed, 0.6f / float(1 << octave), shells, n);
   for (int octave = 0; octave < 2; ++octave)
     addNoise(128 << octave, pattern.grain, 0, 7 + octave + 31 * seed, 0.5f, fibres, n);
   for (std::size_t i = 0; i < shells.size(); ++i) {
@@ -233,7 +233,7 @@ std::vector<std::uint8_t> makeDetailTexture(const DetailPattern& pattern, int se
   const VesselPainter vessels(pattern, seed + 3);
   const std::vector<float> lobule = lobules(pattern);
   std::vector<float> mottling(lobule.size(), 0.f), height = mottling;
-  for (int octave = 0; octave < 6; ++octave)
+  for (int octave = 0; octave < 6 && pattern.grain == 0; ++octave)
     addNoise(4 << octave, 1, 0, octave + 31 * seed, 0.5f / float(1 << octave), mottling, n);
   if (pattern.grain > 0) mottling = woodGrain(pattern, seed);
   for (int octave = 0; octave < 4; ++octave)

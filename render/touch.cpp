@@ -24,7 +24,7 @@ namespace {
 struct Bump {
   glm::vec3 centre, offset;
   glm::mat3 narrow;
-  float blanched;
+  float blanched;  // 0: nothing does
 };
 void displace(const MeshPart& part, const Bump& bump, SceneMesh& mesh) {
   constexpr float kShade = 1.8f;  // share of the cavity's light lost, per slope
@@ -32,7 +32,8 @@ void displace(const MeshPart& part, const Bump& bump, SceneMesh& mesh) {
     const glm::vec3 d = mesh.position[i] - bump.centre, scaled = bump.narrow * d;
     const float q = glm::dot(scaled, scaled);
     if (q > 9) continue;
-    mesh.blanch[i] = glm::mix(mesh.blanch[i], 1.f, std::exp(-glm::dot(d, d) / (bump.blanched * bump.blanched)));
+    if (bump.blanched > 0)
+      mesh.blanch[i] = glm::mix(mesh.blanch[i], 1.f, std::exp(-glm::dot(d, d) / (bump.blanched * bump.blanched)));
     const float w = std::exp(-q);
     const glm::vec3 gradient = (scaled * bump.narrow) * (-2 * w);
     const float along = glm::dot(bump.offset, mesh.normal[i]);
@@ -90,8 +91,7 @@ void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
     const glm::mat3 toTool = glm::transpose(glm::mat3_cast(instrument.worldFromTool));
     const glm::mat3 scale(narrow.x, 0, 0, 0, narrow.y, 0, 0, 0, narrow.z);
     const float upright = std::max(glm::dot(held.normal, axis) / instrument.scale, 0.f);
-    displace(*held.part,
-             {instrument.tip + kBite * axis, kFold * upright * axis, scale * toTool / instrument.scale, blanched},
+    displace(*held.part, {instrument.tip + kBite * axis, kFold * upright * axis, scale * toTool / instrument.scale, 0},
              mesh);
   } else {
     for (const MeshPart& part : mesh.parts)

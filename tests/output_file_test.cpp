@@ -135,5 +135,15 @@ TEST(OutputFile, AFullDiskIsReportedAndLeavesNothing) {
   EXPECT_EQ(folder.contents().size(), 1u);
 }
 
+TEST(OutputFolder, ALinkThatLeadsNowhereStays) {
+  const TemporaryFolder folder;
+  std::filesystem::create_symlink("nowhere/dir", folder / "link");
+  EXPECT_THROW(const OutputFolder made(folder / "link/deep"), std::runtime_error);
+  EXPECT_THROW(const OutputFolder made(folder / "link"), std::runtime_error);
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  { const OutputFolder made(folder / "a/b"); }
+  EXPECT_FALSE(std::filesystem::exists(folder / "a"));
+}
+
 }  // namespace
 }  // namespace medulla

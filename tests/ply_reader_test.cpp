@@ -141,5 +141,17 @@ TEST(PlyReader, ReadsFilesByTheirName) {
   EXPECT_EQ(mesh.triangles, kTetrahedron);
 }
 
+TEST(PlyReader, NoPropertyStandsTwiceAndVerticesAre) {
+  const std::string header = "ply\nformat ascii 1.0\n";
+  EXPECT_NE(refusal(header + kVertices + "property float x\n" + kFaces).find("a.ply:7: "), std::string::npos);
+  const std::string twice =
+      "element face 4\nproperty list uchar int vertex_index\nproperty list uchar int "
+      "vertex_indices\nend_header\n";
+  EXPECT_NE(refusal(header + kVertices + twice).find("twice"), std::string::npos);
+  std::string none = kVertices;
+  none[none.find('4')] = '0';
+  EXPECT_NE(refusal(header + none + kFaces + kTriangles).find("no vertices"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace medulla

@@ -81,8 +81,11 @@ void requireWritable(const std::vector<std::string>& paths) {
 OutputFolder::OutputFolder(const std::string& path) {
   std::error_code error;
   std::filesystem::path missing = path;
-  for (; !missing.empty() && !std::filesystem::exists(missing, error); missing = missing.parent_path())
-    made_.push_back(missing.string());
+  // A link that leads nowhere is there, and not ours to remove.
+  const auto isMissing = [&](const std::filesystem::path& p) {
+    return std::filesystem::symlink_status(p, error).type() == std::filesystem::file_type::not_found;
+  };
+  for (; !missing.empty() && isMissing(missing); missing = missing.parent_path()) made_.push_back(missing.string());
   std::filesystem::create_directories(path, error);
   if (!error) return;
   removeEmpty();
@@ -94,8 +97,7 @@ OutputFolder::~OutputFolder() {
 }
 
 void OutputFolder::removeEmpty() const {
-  std::error_code filled;
-  for (const std::string& folder : made_) std::filesystem::remove(folder, filled);
+  for (const std::string& folder : made_) rmdir(folder.c_str());
 }
 
 }  // namespace medulla

@@ -113,6 +113,11 @@ std::optional<Form> formOf(std::string_view words) {
   return std::nullopt;
 }
 
+bool has(const Element* element, Use use) {
+  return element && std::any_of(element->properties.begin(), element->properties.end(),
+                                [use](const Property& p) { return p.use == use; });
+}
+
 Header readHeader(std::string_view bytes, const std::string& name) {
   Header header;
   bool knowsForm = false;
@@ -142,17 +147,14 @@ Header readHeader(std::string_view bytes, const std::string& name) {
     } else if (word == "property" && !header.elements.empty()) {
       const std::optional<Property> property = propertyOf(header.elements.back(), words);
       if (!property) fail("expected property TYPE NAME or property list TYPE TYPE NAME, the first type a whole number");
+      if (property->use != Use::none && has(&header.elements.back(), property->use))
+        fail("a property of this use stands twice in its element");
       header.elements.back().properties.push_back(*property);
     } else {
       fail(fmt::format("{} is no line of a PLY header, expected element, property or end_header", quoted(word)));
     }
   }
   throw inputError(name, header.lines, "the file ends within the header");
-}
-
-bool has(const Element* element, Use use) {
-  return element && std::any_of(element->properties.begin(), element->properties.end(),
-                                [use](const Property& p) { return p.use == use; });
 }
 
 // Counts are compared with what is there before anything is allocated for them: the shortest number takes a byte of
@@ -322,6 +324,7 @@ TriangleMesh parsePly(std::string_view bytes, const std::string& name) {
   const Element* vertex = header.find("vertex");
   if (!has(vertex, Use::x) || !has(vertex, Use::y) || !has(vertex, Use::z))
     throw inputError(name, 0, "expected a header with an element vertex that has the properties x, y and z");
+  if (vertex->count == 0) throw inputError(name, 0, "no vertices in this PLY file");
   if (!has(header.find("face"), Use::corners))
     throw inputError(name, 0, "no triangles: expected a header with an element face that has a list vertex_indices");
   requireEnough(header, name);

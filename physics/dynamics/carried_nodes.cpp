@@ -82,6 +82,7 @@ void hang(WorldData& d, const HostRange& range) {
   }
 }
 
+// Sleepers keep theirs until they wake.
 void clearWeight(WorldData& d) {
   SurfaceParts& s = d.surface;
   s.weight.resize(2 * d.spheres.position.size());

@@ -210,7 +210,7 @@ std::vector<WholeMotion> wholeMotions(const WorldData& d) {
   return out;
 }
 
-// A rigid motion more of spheres and of the nodes that move.
+// A rigid motion more of spheres and nodes; those that are carried are placed anew after it.
 void addMotion(WorldData& d, int body, const Vector3d& velocity, const Vector3d& spin, const Vector3d& centre) {
   const BodyRange& r = d.ranges[body];
   const auto at = [&](const Vector3d& x) { return Vector3d(velocity + spin.cross(x - centre)); };
