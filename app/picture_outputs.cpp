@@ -51,11 +51,12 @@ PngFolder::PngFolder(const std::string& path, const Slice& slice)
   std::error_code error;
   fs::create_directory(collecting_, error);
   if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", collecting_.string(), error.message()));
+  lock();
   try {
-    lock();
     takeOver(slice);
   } catch (...) {
-    if (lock_ >= 0) close(lock_);
+    fs::remove(collecting_, error);  // if it is empty
+    close(lock_);
     throw;
   }
 }
@@ -76,9 +77,11 @@ void PngFolder::requireReplaceable(const Slice& slice) const {
 void PngFolder::lock() {
   lock_ = open(collecting_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (lock_ >= 0 && flock(lock_, LOCK_EX | LOCK_NB) == 0) return;
-  const bool taken = errno == EWOULDBLOCK;
-  throw std::runtime_error(fmt::format("{}: {}", collecting_.string(),
-                                       taken ? "another run is drawing these pictures" : std::strerror(errno)));
+  const int error = errno;
+  if (lock_ >= 0) close(lock_);
+  throw std::runtime_error(
+      fmt::format("{}: {}", collecting_.string(),
+                  error == EWOULDBLOCK ? "another run is drawing these pictures" : std::strerror(error)));
 }
 
 void PngFolder::takeOver(const Slice& slice) const {

@@ -88,11 +88,10 @@ void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
     const float thickness = std::max(kFoldThickness, 0.8f * held.spacing / instrument.scale);  // else facets stand out
     const float wide = std::max(kFoldWidth, thickness);
     const glm::vec3 narrow(1 / wide, 1 / thickness, 1 / wide);
-    const glm::mat3 toTool = glm::transpose(glm::mat3_cast(instrument.worldFromTool));
-    const glm::mat3 scale(narrow.x, 0, 0, 0, narrow.y, 0, 0, 0, narrow.z);
+    glm::mat3 across = glm::mat3_cast(instrument.worldFromTool);  // a column per axis of the tool
+    for (int k = 0; k < 3; ++k) across[k] *= narrow[k] / instrument.scale;
     const float upright = std::max(glm::dot(held.normal, axis) / instrument.scale, 0.f);
-    displace(*held.part, {instrument.tip + kBite * axis, kFold * upright * axis, scale * toTool / instrument.scale, 0},
-             mesh);
+    displace(*held.part, {instrument.tip + kBite * axis, kFold * upright * axis, glm::transpose(across), 0}, mesh);
   } else {
     for (const MeshPart& part : mesh.parts)
       if (!part.instrument) displace(part, {instrument.tip, -kPressed * axis, glm::mat3(1 / width), blanched}, mesh);
