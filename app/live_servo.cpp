@@ -95,7 +95,10 @@ void LiveServo::Data::run() {
     const double time = static_cast<double>(tick) * simulation.tickDuration();
     wait(start + toDuration(time));
     const double before = threadCpuSeconds();
-    if (within == ticksPerFrame && servo.beginFrame()) within = 0;
+    if (within == ticksPerFrame && servo.beginFrame()) {
+      handedOver.publish();  // not before, or a fast dynamics' surface would take the place of one that still waits
+      within = 0;
+    }
     const bool stands = within == ticksPerFrame;
     standingTicks += stands;
     ServoRecord& record = handedOver.writing();
@@ -110,10 +113,7 @@ void LiveServo::Data::run() {
     if (!stands) {
       record.inputs[within] = inputs;
       record.tools[within] = servo.tools();
-      if (within == ticksPerFrame) {
-        servo.handOver(record.duration, record.loads);
-        handedOver.publish();
-      }
+      if (within == ticksPerFrame) servo.handOver(record.duration, record.loads);
     }
     cpu.add(threadCpuSeconds() - before);
     ++ticks;

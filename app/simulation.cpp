@@ -116,7 +116,8 @@ void Simulation::advanceDynamics() {
   std::swap(previous_, current_);
   world_.readFrame(current_);
   // Without tools nobody feels the surface; a servo that runs elsewhere waits for it all the same.
-  if (isAwaited_ || !loaded_->trajectories.empty()) servo_->commit(previous_, current_, record_.tools[ticksPerFrame_]);
+  if (isAwaited_ || !loaded_->trajectories.empty())
+    servo_->commit(previous_, current_, record_.tools[ticksPerFrame_], &report.toolImpulse);
   times_.dynamics = stepped - start;
   times_.surface = wallSeconds() - stepped;
   ++frame_;

@@ -30,6 +30,9 @@ struct BlendedSurface {
   // m, what each node moved from `from` to `to`, in the frame before and in the one before that
   std::array<std::vector<Eigen::Vector3d>, 3> steps;
   double duration = 0;  // s, between the two frames
+  // N, by each tool on what it touched, means over the frame between `from` and `to`, and over the one before; empty:
+  // not known.
+  std::array<std::vector<Eigen::Vector3d>, 2> toolForce;
 
   Eigen::Vector3d node(int n, double alpha) const { return blendPoint(from[n], to[n], alpha); }
   // What a node moves within one frame at its present velocity, m; continuous from frame to frame.
@@ -66,10 +69,12 @@ class Buckets {
 
   const BlendedSurface& surface() const;
 
-  // The two frames to blend from now on, and the steps (BlendedSurface) of the commit before. Bounding spheres are
+  // The two frames to blend from now on, the steps of the commit before and the tools' forces (BlendedSurface).
+  // Bounding spheres are
   // renewed around both frames; Embree's bounds only by refitNear().
   void commit(const DynamicsFrame& from, const DynamicsFrame& to,
-              const std::array<std::vector<Eigen::Vector3d>, 3>& stepsBefore);
+              const std::array<std::vector<Eigen::Vector3d>, 3>& stepsBefore,
+              const std::array<std::vector<Eigen::Vector3d>, 2>& toolForce = {});
   // Renews Embree's bounds in the buckets within largestRadius + `distance` (m) of `centre`. Buckets that are left out
   // are searched triangle by triangle, with the same result.
   void refitNear(const Eigen::Vector3d& centre, double distance);

@@ -306,6 +306,8 @@ static void pushOut(const Buckets& buckets, double alpha, double toolRadius, Pro
     addClearance(buckets, alpha, nearest, toolRadius, proxy.centre, touched);
     Vector3d target;
     if (!nearestInHalfSpaces(start, touched.planes.data(), touched.count, target, touched.pressure)) return;
+    if ((target - start).norm() > 2 * toolRadius)
+      return;  // two faces all but parallel: their wedge's mouth, metres away
     SurfaceHit hit;
     if (moveTo(buckets, alpha, target, proxy, hit))
       addClearance(buckets, alpha, hit.triangle, toolRadius, proxy.centre, touched);

@@ -19,21 +19,20 @@ namespace medulla {
 using Eigen::Vector3d;
 
 namespace {
-// A tool between two hand-overs. The "coupled" position is the device as the coupling feels it: where the clamped
-// spring would end. It is the device itself unless forceMax was reached.
+// A tool between two hand-overs.
 struct Tool {
   ToolSample device, deviceAtFrameStart;
   ToolSettings settings;
+  int index = 0;
   Proxy proxy;
   Grip grip;
-  Vector3d coupled = Vector3d::Zero(), coupledAtFrameStart = Vector3d::Zero();
-  Vector3d coupledSum = Vector3d::Zero();  // over the frame's ticks
+  Vector3d deviceSum = Vector3d::Zero();  // of positions over the frame's ticks
   ContactPatch patch;
   ProxyContact lastContact;              // while isLeaving: in contact, or not yet clear of it
   Vector3d lastFelt = Vector3d::Zero();  // unit; along which it was felt
   double largestPush = 0;                // N, of the coupling's spring during this contact
   DeviceMotion motion;                   // in this contact or grip
-  double clampScale = 1;                 // of the force, at the last tick
+  double clampScale = 1;                 // of the force and of the springs, at the last tick
   int ticks = 0;                         // in this frame
   bool isLeaving = false;
 };
@@ -41,7 +40,9 @@ struct Tool {
 
 struct Servo::Data {
   TripleBuffer<Buckets> surfaces;
-  std::array<std::vector<Vector3d>, 3> steps;  // dynamics' side: of the surface committed last
+  // Dynamics' side: of the surface committed last.
+  std::array<std::vector<Vector3d>, 3> steps;
+  std::array<std::vector<Vector3d>, 2> toolForce;
   double tickDuration;
   double alpha = 0;  // of the last tick
   std::vector<Tool> tools;
@@ -86,18 +87,40 @@ static Vector3d motionForce(const Tool& tool, const TissueMotion& tissue) {
   return tool.settings.stiffness * tissue.lead + tool.settings.damping * (tissue.velocity - tool.motion.velocity);
 }
 
+static std::span<const ProxyContact> touchedContacts(const Tool& tool) {
+  const Proxy& proxy = tool.proxy;
+  return proxy.inContact() ? std::span(proxy.contacts).first(proxy.contactCount) : std::span(&tool.lastContact, 1);
+}
+
 static TissueMotion touchedMotion(const BlendedSurface& surface, double alpha, const Vector3d& normal,
                                   const Tool& tool) {
-  const Proxy& proxy = tool.proxy;
-  const auto contacts =
-      proxy.inContact() ? std::span(proxy.contacts).first(proxy.contactCount) : std::span(&tool.lastContact, 1);
-  return contactMotion(surface, alpha, contacts, normal, tool.settings.stiffness, tool.motion);
+  return contactMotion(surface, alpha, touchedContacts(tool), normal, tool.settings.stiffness, tool.motion);
+}
+
+// A push, as far as the dynamics can have it by now: what the tissue gave one and a half frames ago, give or take what
+// it can have changed since. Where a stiff tool meets limp tissue, a place that is off by a tenth of a millimetre is
+// several times the force.
+static double keptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal, const Tool& tool,
+                           double push) {
+  if (surface.toolForce[0].empty()) return push;
+  const Vector3d force = blendPoint(surface.toolForce[1][tool.index], surface.toolForce[0][tool.index], alpha);
+  const double given = std::max(0.0, -force.dot(normal));
+  const double since = pushSince(surface, alpha, touchedContacts(tool), normal, tool.settings.stiffness, tool.motion);
+  return std::clamp(push, std::max(0.0, given - since), given + since);
+}
+
+// Coulomb's, about the unit vector `axis`.
+static Vector3d withinCone(const Vector3d& force, const Vector3d& axis, double friction) {
+  const Vector3d across = tangential(force, axis);
+  const double along = force.dot(axis), size = across.norm(), most = friction * std::max(0.0, along);
+  return size > most ? Vector3d(along * axis + most / size * across) : force;
 }
 
 // The coupling of a contact that pushes, or that the tool is leaving: along the normal the spring, negative once the
 // device has left the late surface, plus the motion's part, never pulling. The motion's part is bounded by the largest
 // that the spring has been in this contact, so that force begins without a step on a surface that already moves.
-// Tangentially a slipping contact is dragged by friction alone, which the proxy's position already holds.
+// Tangentially a slipping contact is dragged by friction alone, which the proxy's position already holds; one that
+// sticks by no more than friction carries.
 static Vector3d contactForce(const BlendedSurface& surface, double alpha, const Vector3d& way, Tool& tool) {
   if (!tool.isLeaving) return Vector3d::Zero();
   const Proxy& proxy = tool.proxy;
@@ -111,8 +134,11 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   tool.largestPush = std::max(tool.largestPush, spring);
   tool.motion.way[0] += std::max(way.dot(normal), -std::max(0.0, depth)) * normal;  // from where it touched
   const Vector3d motion = motionForce(tool, touchedMotion(surface, alpha, normal, tool));
-  const double push = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
-  return push * normal + (proxy.slipping ? Vector3d::Zero() : tangential(motion, normal));
+  const double estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
+  const double push = keptToTissue(surface, alpha, normal, tool, estimate);
+  return proxy.slipping
+             ? Vector3d(push * normal)
+             : withinCone(push * normal + tangential(motion, normal), tool.lastFelt, tool.settings.staticFriction);
 }
 
 static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Tool& tool) {
@@ -150,16 +176,13 @@ static void record(const Vector3d& force, Tool& tool, ToolState& state) {
   state.holding = !tool.grip.held.empty();
   state.slipped = tool.grip.slipped;
   state.inContact = tool.proxy.inContact() || (!state.holding && size > 0);
-  tool.coupled = state.clamped && !state.holding
-                     ? Vector3d(tool.proxy.centre + tool.clampScale * (tool.device.position - tool.proxy.centre))
-                     : tool.device.position;
-  tool.coupledSum += tool.coupled;
+  tool.deviceSum += tool.device.position;
   ++tool.ticks;
 }
 
-// Opens or closes. The targets of what it takes hold of are measured where the nodes are by now, from where the contact
-// is felt by now: the springs, with what motion adds, then start with the contact's force, and the tissue with no jerk.
-static void tickGrip(const BlendedSurface& surface, double alpha, Tool& tool) {
+// Opens or closes. The targets of what it takes hold of are measured where the nodes are by now, and then shifted so
+// that the springs, with what motion adds, start with the force `felt` so far (N): neither hand nor tissue is jerked.
+static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d& felt, Tool& tool) {
   Grip& grip = tool.grip;
   const bool wasHolding = !grip.held.empty();
   updateGrip(surface, alpha, tool.proxy, tool.device, tool.settings.gripRadius, grip);
@@ -168,12 +191,11 @@ static void tickGrip(const BlendedSurface& surface, double alpha, Tool& tool) {
     tool.isLeaving = false;
     return;
   }
-  const Vector3d pull = tool.proxy.centre + tool.proxy.shading - tool.device.position;
-  const Vector3d normal = pull.squaredNorm() > 0 ? Vector3d(pull.normalized()) : tool.lastFelt;
-  const Vector3d lead = touchedMotion(surface, alpha, normal, tool).lead;
   beginHold(surface, alpha, grip, tool.settings.stiffness, tool.motion);
   const Eigen::Quaterniond toolFromWorld = tool.device.worldFromTool.conjugate();
-  for (HeldOffset& held : grip.held) held.offset += toolFromWorld * (surface.nodeLead(held.node, alpha) - lead);
+  for (HeldOffset& held : grip.held) held.offset += toolFromWorld * surface.nodeLead(held.node, alpha);
+  const Vector3d shift = (heldForce(surface, alpha, tool) - felt) / tool.settings.stiffness;
+  for (HeldOffset& held : grip.held) held.offset += toolFromWorld * shift;
 }
 
 // Whether the grip holds on, its force recorded.
@@ -199,7 +221,7 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
   tool.device = input;
   tool.motion.velocity = way / tickDuration;
   followSurface(buckets, alphaBefore, alpha, tool.settings.radius, tool.proxy);
-  tickGrip(surface, alpha, tool);
+  tickGrip(surface, alpha, state.force, tool);
   if (feelGrip(surface, alpha, way, tool, state)) return;
   followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
   followLeaving(surface, alphaBefore, alpha, tool);
@@ -219,8 +241,7 @@ void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
 static void startFrame(double tickDuration, Tool& tool) {
   constexpr double memory = 0.05;  // s; half as long a force scatters by 16 % where this leaves 10
   tool.deviceAtFrameStart = tool.device;
-  tool.coupledAtFrameStart = tool.coupled;
-  tool.coupledSum.setZero();
+  tool.deviceSum.setZero();
   startFrame(tool.motion);
   fadePatch(std::exp(-tool.ticks * tickDuration / memory), tool.patch);
   tool.ticks = 0;
@@ -235,10 +256,18 @@ bool Servo::beginFrame() {
 
 // ---- Dynamics' side --------------------------------------------------------------------------------------
 
-void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<ToolState>& tools) {
+void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<ToolState>& tools,
+                   const std::vector<Vector3d>* toolImpulse) {
   constexpr double kTravel = 0.02;  // m that a tool moves in a frame at 1 m/s and 50 Hz
+  if (toolImpulse != nullptr) {
+    auto& [last, before] = data_->toolForce;
+    before = last;
+    last.assign(data_->tools.size(), Vector3d::Zero());
+    before.resize(last.size(), Vector3d::Zero());
+    for (std::size_t k = 0; k < toolImpulse->size(); ++k) last[k] = (*toolImpulse)[k] / (to.time - from.time);
+  }
   Buckets& buckets = data_->surfaces.writing();
-  buckets.commit(from, to, data_->steps);
+  buckets.commit(from, to, data_->steps, data_->toolForce);
   data_->steps = buckets.surface().steps;
   for (const ToolState& tool : tools) buckets.refitNear(tool.proxy, (tool.device - tool.proxy).norm() + kTravel);
   data_->surfaces.publish();
@@ -253,34 +282,33 @@ struct Path {
 };
 }  // namespace
 
-// The path of the coupled device, with the frame's mean rather than its end kept: the dynamics then feels the same mean
+// The device's path, with the frame's mean rather than its end kept: the dynamics then feels the same mean
 // pull that the hand felt, however the device moved within the frame. Ticks stand at dt, 2 dt .. T, their mean time is
 // T/2 + dt/2, so the path's end lies (T - dt)/2 later than their mean.
-static Path coupledPath(const Tool& tool, double frameDuration, double tickDuration) {
-  if (tool.ticks == 0) return {tool.coupled, Vector3d::Zero()};
-  const Vector3d velocity = (tool.coupled - tool.coupledAtFrameStart) / (tool.ticks * tickDuration);
-  return {tool.coupledSum / tool.ticks + 0.5 * (frameDuration - tickDuration) * velocity, velocity};
+static Path devicePath(const Tool& tool, double frameDuration, double tickDuration) {
+  if (tool.ticks == 0) return {tool.device.position, Vector3d::Zero()};
+  const Vector3d velocity = (tool.device.position - tool.deviceAtFrameStart.position) / (tool.ticks * tickDuration);
+  return {tool.deviceSum / tool.ticks + 0.5 * (frameDuration - tickDuration) * velocity, velocity};
+}
+
+// m: by how much the point has come off the proxy
+static double comeOff(const Proxy& proxy, const ProxyContact& contact) {
+  return (proxy.centre - contact.point).norm() - proxy.radius;
 }
 
 // A contact's spring, anchored so that stiffness (anchor - x) is the force of the coupling, k (device - proxy), when x
 // is the contact point: anchor = device + (contact point - proxy). Its tangential part is limited to what friction
-// carries; a slipping contact's anchor moves along the surface with the surface, not with the device, because the point
-// that is touched stays behind.
-static void handOverContact(const BlendedSurface& surface, double alpha, const Tool& tool, int index, const Path& path,
+// carries; where the contact slips the spring slides. Beyond forceMax all springs are softer, so that the tissue feels
+// no more than the hand: nearer anchors would be as stiff against what the tissue moves within the frame.
+static void handOverContact(const BlendedSurface& surface, const Tool& tool, int index, const Path& path,
                             const ProxyContact& contact, double share, Loads& out) {
   const ToolSettings& settings = tool.settings;
   const Proxy& proxy = tool.proxy;
-  // Of the coupling along the normal, and what the point has come off the proxy; < 0: pushes.
-  const double stretch =
-      contact.normal.dot(path.end - proxy.centre) + (proxy.centre - contact.point).norm() - proxy.radius;
-  Vector3d drag = tangential(path.end - proxy.centre, contact.normal), velocity = path.velocity;
-  const double limit = (proxy.slipping ? settings.dynamicFriction : settings.staticFriction) * std::max(0.0, -stretch);
+  // Of the coupling along the normal; < 0: pushes.
+  const double stretch = contact.normal.dot(path.end - proxy.centre) + comeOff(proxy, contact);
+  Vector3d drag = tangential(path.end - proxy.centre - proxy.shading, contact.normal);
+  const double limit = settings.staticFriction * std::max(0.0, -stretch);
   if (drag.norm() > limit) drag *= limit / drag.norm();
-  if (proxy.slipping) {
-    const Vector3d own =
-        surface.duration > 0 ? Vector3d(contactStep(surface, alpha, contact) / surface.duration) : Vector3d::Zero();
-    velocity += tangential(own - path.velocity, contact.normal);
-  }
   const auto& nodes = surface.triangles[contact.triangle];
   const int body = surface.bodyOfNode[nodes[0]], first = surface.firstNode[body];
   ToolSpring& spring = out.toolSprings.emplace_back();
@@ -289,10 +317,25 @@ static void handOverContact(const BlendedSurface& surface, double alpha, const T
   spring.nodes = {nodes[0] - first, nodes[1] - first, nodes[2] - first};
   spring.weights = {contact.weights.x(), contact.weights.y(), contact.weights.z()};
   spring.anchor = contact.point + stretch * contact.normal + drag;
-  spring.anchorVelocity = velocity;
+  spring.anchorVelocity = path.velocity;
   spring.outward = contact.normal;
-  spring.stiffness = settings.stiffness * share;
-  spring.damping = settings.damping * share;
+  spring.stiffness = tool.clampScale * settings.stiffness * share;
+  spring.damping = tool.clampScale * settings.damping * share;
+  spring.slides = proxy.slipping;
+  spring.friction = settings.dynamicFriction;
+}
+
+// What the tool has slid away from no longer pushes in full; the rest of the patch pushes so much more.
+static double makeUpFor(const Proxy& proxy, const Path& path, const std::vector<ProxyContact>& contacts) {
+  constexpr double kMost = 3, kTouching = 1e-7;  // m: the proxy stands 0.05 um off what it touches
+  double wanted = 0, left = 0;
+  for (const ProxyContact& contact : contacts) {
+    const double depth = contact.normal.dot(proxy.centre - path.end);
+    wanted += contact.share * std::max(0.0, depth);
+    left += contact.share * std::max(0.0, depth - std::max(0.0, comeOff(proxy, contact) - kTouching));
+  }
+  if (wanted > kMost * left) return kMost;
+  return wanted > left ? wanted / left : 1;
 }
 
 // Several contacts stand oblique to the direction p of their common push (a groove, a dimple). The force on the proxy
@@ -310,14 +353,15 @@ static void handOverContacts(const BlendedSurface& surface, double alpha, const 
   const auto cosine = [&](const ProxyContact& contact) { return std::max(leastCosine, contact.normal.dot(push)); };
   double meanCosine = 0;
   for (const ProxyContact& contact : contacts) meanCosine += contact.share * cosine(contact);
+  const double stiffer = makeUpFor(tool.proxy, path, contacts);
   for (const ProxyContact& contact : contacts)
-    handOverContact(surface, alpha, tool, index, path, contact, contact.share / (cosine(contact) * meanCosine), out);
-  if (contacts.empty() && tool.isLeaving) handOverContact(surface, alpha, tool, index, path, tool.lastContact, 1, out);
+    handOverContact(surface, tool, index, path, contact, stiffer * contact.share / (cosine(contact) * meanCosine), out);
+  if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, index, path, tool.lastContact, 1, out);
 }
 
 // Every held node pulled to where the tool wants it, by an equal share of the tool's stiffness: pulling is as stiff as
-// pushing. Beyond forceMax the targets come nearer, so that the tissue feels no more than the hand.
-static void handOverGrip(const BlendedSurface& surface, double alpha, const Tool& tool, int index, const Path& path,
+// pushing.
+static void handOverGrip(const BlendedSurface& surface, const Tool& tool, int index, const Path& path,
                          double frameDuration, Loads& out) {
   const double share = 1.0 / double(tool.grip.held.size());
   const int body = surface.bodyOfNode[tool.grip.held.front().node];
@@ -325,15 +369,15 @@ static void handOverGrip(const BlendedSurface& surface, double alpha, const Tool
   end.position = path.end;
   start.position = path.end - frameDuration * path.velocity;
   for (const HeldOffset& held : tool.grip.held) {
-    const Vector3d x = surface.node(held.node, alpha), target = heldTarget(end, held);
+    const Vector3d target = heldTarget(end, held);
     HeldNode& node = out.heldNodes.emplace_back();
     node.tool = index;
     node.body = body;
     node.node = held.node - surface.firstNode[body];
-    node.anchor = x + tool.clampScale * (target - x);
+    node.anchor = target;
     node.anchorVelocity = (target - heldTarget(start, held)) / frameDuration;
-    node.stiffness = tool.settings.stiffness * share;
-    node.damping = tool.settings.damping * share;
+    node.stiffness = tool.clampScale * tool.settings.stiffness * share;
+    node.damping = tool.clampScale * tool.settings.damping * share;
   }
 }
 
@@ -344,9 +388,9 @@ void Servo::handOver(double frameDuration, Loads& out) const {
   const BlendedSurface& surface = data_->surfaces.reading().surface();
   for (std::size_t k = 0; k < data_->tools.size(); ++k) {
     const Tool& tool = data_->tools[k];
-    const Path path = coupledPath(tool, frameDuration, data_->tickDuration);
+    const Path path = devicePath(tool, frameDuration, data_->tickDuration);
     if (!tool.grip.held.empty())
-      handOverGrip(surface, data_->alpha, tool, int(k), path, frameDuration, out);
+      handOverGrip(surface, tool, int(k), path, frameDuration, out);
     else
       handOverContacts(surface, data_->alpha, tool, int(k), path, data_->contacts, out);
   }
@@ -359,11 +403,11 @@ void Servo::makeRoom(Loads& out) const {
 
 // ---- Life ------------------------------------------------------------------------------------------------
 
-static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, const ToolSample& start) {
+static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, int index, const ToolSample& start) {
   Tool tool;
+  tool.index = index;
   tool.settings = settings;
   tool.device = start;
-  tool.coupled = start.position;
   tool.proxy = placeProxy(buckets, start.position, settings.radius);
   tool.grip.held.reserve(buckets.surface().from.size());
   tool.patch.entries.reserve(contactPatchCapacity);
@@ -385,7 +429,7 @@ static TripleBuffer<Buckets> makeSurfaces(const std::vector<TouchableBody>& bodi
 
 Servo::Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools, double tickDuration,
              const DynamicsFrame& rest, const std::vector<ToolSample>& start, const EmbreeSettings& embree)
-    : data_(new Data{makeSurfaces(bodies, tools, rest, embree), {}, tickDuration, 0, {}, {}, {}}) {
+    : data_(new Data{makeSurfaces(bodies, tools, rest, embree), {}, {}, tickDuration, 0, {}, {}, {}}) {
   assert(tools.size() == start.size() && tickDuration > 0);
   const Buckets& buckets = data_->surfaces.reading();
   data_->steps = buckets.surface().steps;
@@ -394,7 +438,7 @@ Servo::Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSet
   data_->states.reserve(tools.size());
   for (std::size_t k = 0; k < tools.size(); ++k) {
     checkSample(start[k], k);
-    data_->tools.push_back(makeTool(buckets, tools[k], start[k]));
+    data_->tools.push_back(makeTool(buckets, tools[k], int(k), start[k]));
     ToolState state;
     state.device = start[k].position;
     state.proxy = data_->tools.back().proxy.centre;

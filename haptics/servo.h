@@ -45,8 +45,10 @@ class Servo {
   Servo& operator=(Servo&&) noexcept;
 
   // Dynamics' side, after each dynamics frame: the two frames to blend next, `from` being the `to` of the last commit.
-  // `tools` is about where the tools are: Embree's bounds are renewed near them. Contents are copied.
-  void commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<ToolState>& tools);
+  // `tools` is about where the tools are: Embree's bounds are renewed near them. `toolImpulse` is what they gave in
+  // this frame (FrameReport, N s); null: not known, and no force is kept to it. Contents are copied.
+  void commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<ToolState>& tools,
+              const std::vector<Eigen::Vector3d>* toolImpulse = nullptr);
 
   // The rest is the servo's side; none of it allocates or locks.
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 namespace medulla {
 
@@ -59,6 +60,7 @@ double contactGive(const BlendedSurface& surface, std::span<const ProxyContact> 
 
 }  // namespace
 
+// m, of the point that is touched, within a frame at its present velocity.
 Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyContact& contact) {
   return blendPoint(meanOver(surface, contact, surface.steps[1]), meanOver(surface, contact, surface.steps[0]), alpha);
 }
@@ -106,6 +108,25 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
   const Vector3d answered = wayOfStep(device, alpha);
   const Vector3d beyond = latestWay(device, alpha) - answered, faster = device.velocity - answered / surface.duration;
   return {step + part * normal.dot(beyond) * normal, step / surface.duration + part * normal.dot(faster) * normal};
+}
+
+double pushSince(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
+                 const Vector3d& normal, double stiffness, const DeviceMotion& device) {
+  constexpr double kFrames = 1.5;
+  Vector3d step = Vector3d::Zero();
+  double shares = 0;
+  for (const ProxyContact& contact : contacts) {
+    step += contact.share * contactStep(surface, alpha, contact);
+    shares += contact.share;
+  }
+  double way = 0, frames = kFrames;  // of the device
+  for (int k = 0; frames > 0; ++k) {
+    const double within = std::min(frames, k == 0 ? alpha : 1.0);
+    way += (k == 0 ? 1 : within) * std::abs(normal.dot(device.way[k]));
+    frames -= within;
+  }
+  const double longer = std::max(way, kFrames / shares * std::abs(normal.dot(step)));
+  return stiffness * (1 - followedPart(stiffness, contactGive(surface, contacts))) * longer;
 }
 
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,

@@ -42,8 +42,10 @@ struct TissueMotion {
 TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
                            const Eigen::Vector3d& normal, double stiffness, const DeviceMotion& device);
 
-// m, of the point that is touched, within a frame at its present velocity.
-Eigen::Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyContact& contact);
+// N: by how much a push along `normal` can differ from what it was one and a half frames ago, by what device and tissue
+// went since and the stiffness of both in series.
+double pushSince(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
+                 const Eigen::Vector3d& normal, double stiffness, const DeviceMotion& device);
 
 // Mean over what a grip holds.
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,

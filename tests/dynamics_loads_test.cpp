@@ -8,13 +8,15 @@ namespace medulla {
 
 using namespace states;
 
-static World tubeWorld(SurfaceMode surface, bool fixed, double damping = 0.1) {
+static World tubeWorld(SurfaceMode surface, bool fixed, double damping = 0.1,
+                       Integrator integrator = Integrator::explicitEuler) {
   BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
   b.surface = surface;
   b.tissue.damping = damping;
   if (fixed) b.fixed = {{0, FixedFreedom::all}, {4, FixedFreedom::all}};
   WorldSettings settings;
   settings.gravity.setZero();
+  settings.integrator = integrator;
   return World(settings, {b});
 }
 
@@ -186,6 +188,36 @@ TEST(Loads, APushingSpringNeverPulls) {
   Loads loads;
   loads.toolSprings = {pushAt(world, 80, -0.003)};  // anchor outside
   for (int i = 0; i < 5; ++i) EXPECT_LE(world.advance(loads).toolImpulse[0].dot(loads.toolSprings[0].outward), 1e-15);
+}
+
+// A slipping contact is dragged by what friction carries, whichever way and however fast the tool goes.
+TEST(Loads, ASlidingSpringDragsByFrictionAlone) {
+  for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit}) {
+    for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+      World world = tubeWorld(surface, true, 1, integrator);
+      Loads loads;
+      loads.toolSprings = {pushAt(world, 80, 0.003)};
+      ToolSpring& s = loads.toolSprings[0];
+      s.slides = true;
+      s.friction = 0.3;
+      const Vector3d along = s.outward.unitOrthogonal();
+      const double push = [&] {
+        FrameReport report;
+        for (int i = 0; i < 100; ++i) report = world.advance(loads);
+        const double normal = -report.toolImpulse[0].dot(s.outward);
+        EXPECT_LT((report.toolImpulse[0] + normal * s.outward).norm(), 0.3 * normal);
+        return normal;
+      }();
+      for (const double speed : {0.05, -0.5}) {
+        s.anchorVelocity = speed * along;
+        FrameReport report;
+        for (int i = 0; i < 100; ++i) report = world.advance(loads);
+        const double normal = -report.toolImpulse[0].dot(s.outward), drag = report.toolImpulse[0].dot(along);
+        EXPECT_NEAR(normal, push, 0.2 * push);
+        EXPECT_NEAR(drag, (speed > 0 ? 0.3 : -0.3) * normal, 1e-3 * normal) << speed;
+      }
+    }
+  }
 }
 
 TEST(Loads, TheAnchorMovesWithinTheFrame) {

@@ -150,6 +150,29 @@ TEST(Proxy, SqueezedBetweenWallsShrinksAndDoesNotTunnel) {
   });
 }
 
+// The planes of two walls that are all but parallel meet metres away: no room for the tool.
+TEST(Proxy, IsNotThrownOutOfAWedge) {
+  for (const double slant : {0.0, 1e-6, 1e-5, 1e-4, 1e-3}) {
+    ProxyRun r;
+    const double w = 0.03;
+    std::vector<Vector3d> nodes;
+    for (const double y : {0.01, -0.01})
+      for (const double x : {-w, w})
+        for (const double z : {-w, w}) nodes.emplace_back(x, y + (y > 0 ? slant * x : 0), z);
+    r.shape = shapeOf(nodes, {{0, 2, 3}, {0, 3, 1}, {4, 7, 6}, {4, 5, 7}});
+    r.device = [](double) { return Vector3d(0.001, 0.002, 0.0005); };
+    r.motion = [](const Vector3d& x, double t) {
+      return Vector3d(x.x(), x.y() - (x.y() > 0 ? 1 : -1) * std::min(0.008, 0.02 * t), x.z());
+    };
+    r.duration = 0.6;
+    Vector3d last(0.001, 0.002, 0.0005);
+    r.run([&](double, const ToolState& tool, const BlendedSurface&, double) {
+      ASSERT_LT((tool.proxy - last).norm(), 0.001) << slant;
+      last = tool.proxy;
+    });
+  }
+}
+
 // A fan of needles and points without area in the middle of a plate, which is slid over along its shared edges.
 TEST(Proxy, SlidesOverDegenerateTrianglesAndAlongSharedEdges) {
   const TouchShape whole = plate(8, 0.02, 0.004, 3);

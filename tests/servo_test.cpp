@@ -184,6 +184,27 @@ TEST(Servo, PressingSoftTissueHasNoForceStepsAndOneContact) {
   EXPECT_EQ(changes, 2);
 }
 
+// However the device swings about where it sticks, it feels no more across than static friction carries.
+TEST(Servo, StickingForceStaysWithinTheFrictionCone) {
+  const TouchShape shape = plate(10, 0.03, thickness, 5);
+  ToolSettings tool = frictionless();
+  tool.staticFriction = 0.3;
+  tool.dynamicFriction = 0.2;
+  Servo servo = plateServo(shape, tool, {0, 0.02, 0});
+  double most = 0;
+  for (int frame = 0; frame < 60; ++frame) {
+    for (int k = 1; k <= 20; ++k) {
+      const double t = 0.001 * (20 * frame + k), swing = t < 0.2 ? 0 : 0.0004 * std::sin(50 * (t - 0.2));
+      servo.tick(k / 20.0, {deviceAt({swing, top + 0.001, 0})});
+      const Vector3d force = servo.tools()[0].force;
+      if (t > 0.1) most = std::max(most, std::hypot(force.x(), force.z()) / force.y());
+    }
+    nextFrame(servo, frameAt(*shape, 0.02 * frame), frameAt(*shape, 0.02 * (frame + 1)));
+  }
+  EXPECT_GT(most, 0.15);
+  EXPECT_LE(most, 0.3 * (1 + 1e-6));
+}
+
 // The largest step of the force from tick to tick while a tool presses and strokes soft tissue.
 static double largestStep(int dynamicsRate, bool blend) {
   ToolRun run = pressing(0.05);

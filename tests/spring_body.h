@@ -59,6 +59,11 @@ struct SpringBody {
       Eigen::Vector3d f = spring.stiffness * (spring.anchor - left * spring.anchorVelocity - x) +
                           spring.damping * (spring.anchorVelocity - v);
       f -= std::max(0.0, f.dot(spring.outward)) * spring.outward;
+      if (spring.slides) {  // regularised: full friction from 1 mm/s on
+        const Eigen::Vector3d push = f.dot(spring.outward) * spring.outward, slip = spring.anchorVelocity - v;
+        const Eigen::Vector3d across = slip - slip.dot(spring.outward) * spring.outward;
+        f = push + spring.friction * push.norm() / std::max(1e-3, across.norm()) * across;
+      }
       for (int k = 0; k < 3; ++k) force[spring.nodes[k]] += spring.weights[k] * f;
       sum += f;
     }

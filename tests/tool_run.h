@@ -40,7 +40,8 @@ struct ToolRun {
       bodyImpulseLength += impulse.norm();
       last = now;
       now = body.frame();
-      servo.commit(last, now, servo.tools());
+      const std::vector<Eigen::Vector3d> impulses{impulse};
+      servo.commit(last, now, servo.tools(), &impulses);
       servo.beginFrame();
     }
   }

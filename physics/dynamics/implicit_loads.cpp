@@ -94,17 +94,22 @@ void settleTool(WorldData& d, const ImplicitData& s, const PointLoad& load, cons
   Vector3d x = Vector3d::Zero();
   for (int i = 0; i < p.count; ++i) x += p.weights[i] * nodePosition(d, p.nodes[i]);
   const Vector3d rate = ratesOf(s, rows);
-  const double h = s.duration, weight = h * (h * p.stiffness + p.damping);
-  Vector3d force = Vector3d::Zero();
-  for (int a = 0; a < 3; ++a) {
-    const double along =
-        p.stiffness * load.axes[a].dot(p.anchor - x) + p.damping * (load.axes[a].dot(p.anchorVelocity) - rate[a]);
-    if (a == 0 && p.outward != nullptr && along > 0) continue;
+  constexpr double kSticking = 1e-3;  // m/s: slower slip is dragged by less than Coulomb's friction
+  const double h = s.duration, spring = h * (h * p.stiffness + p.damping);
+  const auto act = [&](int a, double weight, double along) {
     rows[a].weight = weight;
     rows[a].impulse = h * along;
-    force += along * load.axes[a];
+    d.loadForces[load.index] += along * load.axes[a];
+  };
+  Vector3d pull, slip;  // along the axes
+  for (int a = 0; a < 3; ++a) {
+    slip[a] = load.axes[a].dot(p.anchorVelocity) - rate[a];
+    pull[a] = p.stiffness * load.axes[a].dot(p.anchor - x) + p.damping * slip[a];
   }
-  d.loadForces[load.index] = force;
+  d.loadForces[load.index].setZero();
+  if (p.outward == nullptr || pull[0] <= 0) act(0, spring, pull[0]);
+  const double drag = p.friction * std::max(0.0, -pull[0]) / std::max(kSticking, std::hypot(slip[1], slip[2]));
+  for (int a = 1; a < 3; ++a) p.slides ? act(a, h * drag, drag * slip[a]) : act(a, spring, pull[a]);
 }
 
 void addDeadLoads(const WorldData& d, ImplicitData& s, double time) {

@@ -99,6 +99,18 @@ void addImpulse(WorldData& d, const SettlingSpring& s, const Vector3d& impulse) 
     addNodeImpulse(d, s.spring.nodes[i], s.hosts[i], s.spring.weights[i] * impulse);
 }
 
+// Towards the anchor's velocity across `outward`, by what makes them equal or by what friction carries. `force` is what
+// has acted so far.
+Vector3d dragOf(const SettlingSpring& s, const Vector3d& velocity, const Vector3d& force, double push, double substep) {
+  constexpr double kLeastMobility = 1e-9;  // 1/kg: what is held
+  const Vector3d& n = *s.spring.outward;
+  const auto across = [&n](const Vector3d& a) { return Vector3d(a - a.dot(n) * n); };
+  const Vector3d sticking =
+      across(force) + across(s.spring.anchorVelocity - velocity) / (substep * std::max(kLeastMobility, s.mobility));
+  const double size = sticking.norm(), most = s.spring.friction * push;
+  return size > most ? Vector3d(most / size * sticking) : sticking;
+}
+
 // One pass of Gauss-Seidel at one load: its force goes to what the spring asks for now. Returns the change's size.
 double settle(WorldData& d, const SettlingSpring& s, Vector3d& force) {
   const PointSpring& p = s.spring;
@@ -108,6 +120,10 @@ double settle(WorldData& d, const SettlingSpring& s, Vector3d& force) {
   const Vector3d wanted = p.stiffness * (p.anchor - s.place - h * v) + p.damping * (p.anchorVelocity - v);
   Vector3d next = force + (wanted - force) / (1 + gain * s.mobility);
   if (p.outward != nullptr) next -= std::max(0.0, next.dot(*p.outward)) * *p.outward;
+  if (p.slides) {
+    const double push = -next.dot(*p.outward);
+    next = dragOf(s, v, force, push, h) - push * *p.outward;
+  }
   const Vector3d change = next - force;
   addImpulse(d, s, h * change);
   force = next;
@@ -129,6 +145,8 @@ PointSpring pointSpring(const WorldData& d, const Loads& loads, std::size_t k, d
     p.outward = &t.outward;
     p.stiffness = t.stiffness;
     p.damping = t.damping;
+    p.slides = t.slides;
+    p.friction = t.friction;
   } else {
     const HeldNode& held = loads.heldNodes[k - loads.toolSprings.size()];
     p.count = 1;

@@ -13,7 +13,10 @@ struct SoftBodyModel;
 
 // The virtual coupling between a tool and the point of the surface that it touches. The surface point is
 // x = sum weights x_nodes; force on it: stiffness (anchor - x) + damping (anchorVelocity - x'), spread to the nodes by
-// the same weights (paper 4). A pushing spring never pulls: its component along `outward` is dropped when positive.
+// the same weights (paper 4). A pushing spring never pulls: its component along `outward` is dropped when positive. One
+// that slides is such a spring along `outward` alone, and across it Coulomb's friction against the anchor's velocity: a
+// spring would hold the tissue where it was touched at the frame's start, as a drag of stiffness times the frame's
+// duration, 8 N s/m at 50 Hz.
 struct ToolSpring {
   int tool = 0;  // whose reaction this is
   int body = 0;
@@ -24,6 +27,8 @@ struct ToolSpring {
   Eigen::Vector3d outward = Eigen::Vector3d::UnitZ();        // unit surface normal at the contact
   double stiffness = 0;                                      // N/m
   double damping = 0;                                        // N s/m
+  bool slides = false;
+  double friction = 0;  // Coulomb's, >= 0, where it slides
 };
 
 // A grabbed node: the same spring on one node, pulling and pushing.
