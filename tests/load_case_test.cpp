@@ -230,5 +230,20 @@ TEST_F(LoadCase, ARunThatFindsNoRestSaysSoAndKeepsNothing) {
   EXPECT_EQ(runProgram({"replay", scene(kHeld, "0.3"), "--until-rest"}).exitCode, 0);
 }
 
+// Of ticks of 1/1200 s the one at 0.58 s is recorded at 0.5800000000000001 s, past the end of its frame.
+TEST_F(LoadCase, ARecordRestsWhenItsRunDid) {
+  std::string text = readFile(scene(kHeld, "2"));
+  folder.write("case.xml", text.insert(text.find("<camera"), "<tool name='probe' trajectory='motion.csv'/>"));
+  folder.write("motion.csv",
+               "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,0.5,0.5,0.5,1,0,0,0,0\n0.58,0.6,0.5,0.5,1,0,0,0,0\n");
+  const std::string path = folder / "case.xml", record = folder / "record.csv";
+  const ProgramResult run = runProgram({"replay", path, "--until-rest", "--record", record});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_NE(readFile(record).find("\n0.5800000000000001,"), std::string::npos);
+  const ProgramResult again = runProgram({"replay", path, "--until-rest", "--trajectory", record});
+  for (const char* result : {"rest_at", "hash"})
+    EXPECT_EQ(again.out.substr(again.out.find(result), 20), run.out.substr(run.out.find(result), 20)) << result;
+}
+
 }  // namespace
 }  // namespace medulla

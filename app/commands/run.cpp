@@ -112,7 +112,8 @@ class RestWatch {
       body_ = world.bodies()[b].name;
     }
     const double time = simulation.time();
-    if (!(fastest_ < kStill) || time < busyUntil_) movedAt_ = time;
+    // A recorded motion ends at a tick, which may lie a rounding past the frame that ends there.
+    if (!(fastest_ < kStill) || time < busyUntil_ - 1e-9) movedAt_ = time;
     atRest_ = time - movedAt_ >= kStillFor - 1e-9;
   }
   bool atRest() const { return atRest_; }
