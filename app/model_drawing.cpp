@@ -130,17 +130,24 @@ void drawSpheres(const SceneBody& body, const SoftBodyModel& model, const BodyFr
   }
 }
 
-// The second radius as haptics has it: around the middle of the box around a bucket's triangles.
+// The second radius as haptics has it: around the middle of the box around a bucket's triangles. Measured where nodes
+// are drawn, in single precision, which is all that a state cache keeps of them: its pictures are the run's.
 void drawBuckets(const SoftBodyModel& model, const BodyFrame& frame, Drawing& out) {
+  std::vector<glm::vec3> nodes;
   for (const std::vector<int>& bucket : model.buckets) {
-    Eigen::AlignedBox3d box;
+    nodes.clear();
     for (const int t : bucket)
-      for (const int n : model.triangles[t]) box.extend(frame.nodes[n]);
-    if (box.isEmpty()) continue;
-    double radius2 = 0;
-    for (const int t : bucket)
-      for (const int n : model.triangles[t]) radius2 = std::max(radius2, (frame.nodes[n] - box.center()).squaredNorm());
-    out.balls.push_back({toGlm(Vector3d(box.center())), float(std::sqrt(radius2)), kBucketColour});
+      for (const int n : model.triangles[t]) nodes.push_back(toGlm(frame.nodes[n]));
+    if (nodes.empty()) continue;
+    glm::vec3 low = nodes[0], high = nodes[0];
+    for (const glm::vec3& x : nodes) {
+      low = glm::min(low, x);
+      high = glm::max(high, x);
+    }
+    const glm::vec3 centre = 0.5f * (low + high);
+    float radius = 0;
+    for (const glm::vec3& x : nodes) radius = std::max(radius, glm::distance(x, centre));
+    out.balls.push_back({centre, radius, kBucketColour});
   }
 }
 

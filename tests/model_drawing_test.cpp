@@ -120,6 +120,31 @@ TEST(ModelDrawing, PartsStandWhereTheModelHasThem) {
   }
 }
 
+// A state cache keeps nodes in single precision.
+TEST(ModelDrawing, IsTheSameOfNodesInSinglePrecision) {
+  const Moment moment("beam");
+  BodyFrame kept = moment.frame();
+  for (Eigen::Vector3d& node : kept.nodes) {
+    const glm::vec3 single = toGlm(node);
+    node = {single.x, single.y, single.z};
+  }
+  for (const char* part : {"mesh", "skeleton", "spheres", "buckets", "links", "frames", "attachments"}) {
+    const Drawing expected = moment.draw({part});
+    Drawing found;
+    drawBodyModel(moment.loaded.scene.bodies[0], moment.model(), kept, readShown({part}), 0.1f, found);
+    ASSERT_EQ(found.balls.size(), expected.balls.size()) << part;
+    ASSERT_EQ(found.segments.size(), expected.segments.size()) << part;
+    EXPECT_GT(found.balls.size() + found.segments.size() + found.arrows.size(), 0u) << part;
+    int differing = 0;
+    for (std::size_t k = 0; k < found.balls.size(); ++k)
+      differing +=
+          found.balls[k].centre != expected.balls[k].centre || found.balls[k].radius != expected.balls[k].radius;
+    for (std::size_t k = 0; k < found.segments.size(); ++k)
+      differing += found.segments[k].a != expected.segments[k].a || found.segments[k].b != expected.segments[k].b;
+    EXPECT_EQ(differing, 0) << part;
+  }
+}
+
 // What moves is drawn: links between cells, and to what holds them; a node hangs on one of its frames.
 TEST(ModelDrawing, IdentifiedLinksAreDrawnToWhatHoldsThem) {
   const Moment moment(std::string(MEDULLA_SOURCE_DIR) + "/scenes/liver.xml",
