@@ -193,6 +193,23 @@ TEST_F(Outputs, TimingsGoToStandardError) {
   EXPECT_EQ(r.out.find("stage"), std::string::npos);
 }
 
+// A film of twelve pictures, and one of one in the same call.
+TEST_F(Outputs, TimingsAreThoseOfEachSceneAlone) {
+  std::string text = read("own/organ.xml");
+  text.replace(text.find("0.48"), 4, "0.04");
+  text.erase(text.find(" golden"), std::string(" golden=\"0.32 0.4\"").size());
+  folder.write("own/short.xml", text);
+  const ProgramResult r =
+      run({"render", "own/organ.xml", "own/short.xml", "-o", "{scene}", "--size", "64x48", "--timings"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  const auto cpuOf = [&r](std::size_t sum) {  // s
+    double wall = 0, cpu = 0;
+    std::istringstream(r.err.substr(sum + 4)) >> wall >> cpu;
+    return cpu;
+  };
+  EXPECT_LT(cpuOf(r.err.rfind("\nsum ")), cpuOf(r.err.find("\nsum "))) << r.err;
+}
+
 TEST_F(Outputs, AFolderThatCannotTakeEveryPictureIsRefusedBeforeTheFilm) {
   fs::create_directories(folder / "frames/00002.png");
   folder.write("frames/00000.png", "earlier");

@@ -47,16 +47,22 @@ Wanted wantedOf(const RenderOptions& options, const Scene& scene) {
   return {pictureTimes(scene, first, last), first};
 }
 
+// Of one scene: the process may have rendered others before.
+struct Timings {
+  StageTimes stages;                       // of the thread that simulates
+  double cpuBefore = processCpuSeconds();  // s
+};
+
 // Simulation, drawing, OpenGL's threads and encoding overlap: their times add up to more than the run takes by the
 // clock.
-void printTimings(const StageTimes& run, const Artist& artist, int pictures) {
-  std::vector<StageTimes::Stage> rows = run.stages();
+void printTimings(const Timings& run, const Artist& artist, int pictures) {
+  std::vector<StageTimes::Stage> rows = run.stages.stages();
   rows.insert(rows.end(), artist.times().stages().begin(), artist.times().stages().end());
   rows.push_back(artist.encoding());
   // What is left of the process are the threads of OpenGL, which say nothing of themselves.
   double known = 0;
   for (const StageTimes::Stage& s : rows) known += s.cpu;
-  rows.push_back({"raster", 0, processCpuSeconds() - known});
+  rows.push_back({"raster", 0, processCpuSeconds() - run.cpuBefore - known});
   StageTimes::Stage sum{"sum", 0, 0};
   for (const StageTimes::Stage& s : rows) {
     sum.wall += s.wall;
@@ -108,7 +114,8 @@ void requireOwnCache(const CacheReader& cache, const LoadedScene& loaded, const 
                      fmt::format("holds {:g} pictures per second, expected {:g}", found.fps, expected.fps));
 }
 
-void renderCache(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, StageTimes& times) {
+void renderCache(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, Timings& timings) {
+  StageTimes& times = timings.stages;
   CacheReader cache(options.cachePath);
   requireOwnCache(cache, loaded, options);
   const std::vector<int> numbers = cachedNumbers(cache, wanted, options);
@@ -126,12 +133,13 @@ void renderCache(const LoadedScene& loaded, const RenderOptions& options, const 
   times.start("wait");
   artist.finish();
   times.stop();
-  if (options.timings) printTimings(times, artist, wanted.count());
+  if (options.timings) printTimings(timings, artist, wanted.count());
   printFiles(options, artist, wallSeconds() - start);
   fmt::print("hash {:016x}\n", cache.finalHash());
 }
 
-void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, StageTimes& times) {
+void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, Timings& timings) {
+  StageTimes& times = timings.stages;
   Simulation simulation(loaded, options.run.embree);
   Artist artist(loaded, options, wanted.first, wanted.count(), simulation.current());
   ForceView forceView(loaded);
@@ -152,7 +160,7 @@ void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wa
     times.stop();
   });
   const double wall = wallSeconds() - start;
-  if (options.timings) printTimings(times, artist, wanted.count());
+  if (options.timings) printTimings(timings, artist, wanted.count());
   printFiles(options, artist, wall);
   printResults(runResults(simulation, processCpuSeconds() - cpuStart, wall));
   printResults(forces);
@@ -161,8 +169,8 @@ void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wa
 }  // namespace
 
 int runRender(const RenderOptions& options) {
-  StageTimes times;
-  times.start("start");
+  Timings timings;
+  timings.stages.start("start");
   LoadedScene loaded = loadRun(options.run);
   applyOverrides(options, loaded.scene);
   const Wanted wanted = wantedOf(options, loaded.scene);
@@ -170,9 +178,9 @@ int runRender(const RenderOptions& options) {
   requireDistinctFiles(options.outputs, {options.cachePath});
   if (options.still) loaded.scene.duration = *options.still;  // nothing later is asked for
   if (options.cachePath.empty())
-    renderRun(loaded, options, wanted, times);
+    renderRun(loaded, options, wanted, timings);
   else
-    renderCache(loaded, options, wanted, times);
+    renderCache(loaded, options, wanted, timings);
   return 0;
 }
 
