@@ -153,6 +153,19 @@ TEST_F(Recording, ASpanIsCutOutAndPlayedWithADelay) {
 }
 
 // A window wider than the tremor's period takes it out, keeps a steady motion and both ends, and delays nothing.
+// Doubles tell times since 1970 apart by a quarter of a microsecond: 0.1 s later is 0.0999999 s later to them, 0.3 s
+// later 0.3000002.
+TEST_F(Recording, ASpanHoldsTheRowsAtItsEndsWhereverTimeBegins) {
+  const auto played = [this](const char* span, const char* rows) {
+    return read("", fmt::format("<columns time=\"1\" position=\"2 3 4\"/><span {}/>", span), rows).samples;
+  };
+  const char* rows = "1700000000.4,0,0,0\n1700000000.5,1,0,0\n1700000000.6,2,0,0\n1700000000.7,3,0,0\n";
+  EXPECT_EQ(played("from=\"0.1\"", rows).size(), 3u);
+  EXPECT_EQ(played("from=\"0.2\"", rows).size(), 2u);
+  EXPECT_NEAR(played("from=\"0.1\"", rows)[0].time, 0, 1e-6);
+  EXPECT_EQ(played("to=\"0.3\"", "1700000000.1,0,0,0\n1700000000.4,1,0,0\n1700000000.5,2,0,0\n").size(), 2u);
+}
+
 TEST_F(Recording, SmoothingTakesOutTremorAndNothingElse) {
   std::string text;
   const double tremor = 0.0005;
@@ -231,6 +244,9 @@ TEST_F(Recording, EveryMistakeInTheDescriptionIsNamedWithTheNearestName) {
       {"", "<columns time=\"1\" position=\"1 2 3\"/><units time=\"sec\"/>",
        "r.xml:2: <units> time=\"sec\": did you mean \"s\"?"},
       {"", columns + "<units time=\"s\"/>", "r.xml:2: <units> time=\"s\": there is a rate"},
+      {"", "<columns time=\"sec nsec\" position=\"x y z\"/><units time=\"ms\"/>",
+       "r.xml:2: <units> time=\"ms\": times are in columns of seconds and nanoseconds, expected no unit of time"},
+      {"map=\"ros\"", "<units time=\"ms\"/>", "r.xml:2: <units> time=\"ms\": times are in columns of seconds"},
       {"", columns + "<frame mirror=\"w\"/>", "r.xml:2: <frame> mirror=\"w\": did you mean \"x\"?"},
       {"", columns + "<frame scale=\"0\"/>", "r.xml:2: <frame> scale=\"0\": expected 1 number > 0"},
       {"", columns + "<frame tool=\"1 1 0 0\"/>", "r.xml:2: <frame> tool=\"1 1 0 0\": expected a unit quaternion"},

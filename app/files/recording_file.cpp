@@ -232,9 +232,10 @@ Trajectory parseRecording(std::string_view text, const std::string& name, const 
   Trajectory whole, trajectory;
   for (const Row& row : rows) addSample(whole, sampleOf(row, rows[0].time, map), name, row.line);
   if (map.smooth > 0) whole.samples = smoothed(whole.samples, map.smooth);
+  constexpr double slack = 1e-6;  // s; differences of times counted since 1970 are off by a quarter of that
   for (std::size_t k = 0; k < rows.size(); ++k) {
     ToolSample sample = whole.samples[k];
-    if (sample.time < map.from || sample.time > map.to) continue;
+    if (sample.time < map.from - slack || sample.time > map.to + slack) continue;
     sample.time += map.delay - map.from;
     trajectory.samples.push_back(sample);
     if (hasForce)
