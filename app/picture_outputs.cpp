@@ -31,6 +31,12 @@ std::string pngName(int number) {
   return fmt::format("{:05d}.png", number);
 }
 
+// -1: the file is no picture of ours.
+int numberOf(const fs::path& path) {
+  const int number = parseNumber<int>(path.stem().string()).value_or(-1);
+  return number >= 0 && path.filename() == pngName(number) ? number : -1;
+}
+
 // A file that a power cut left short has its name already; its last chunk is missing then.
 bool isWholePng(const fs::path& path) {
   constexpr char end[] = {0, 0, 0, 0, 'I', 'E', 'N', 'D', '\xae', '\x42', '\x60', '\x82'};
@@ -43,17 +49,18 @@ bool isWholePng(const fs::path& path) {
 }  // namespace
 
 PngFolder::PngFolder(const std::string& path, const Slice& slice)
-    : made_(path),
+    : slice_(slice),
+      made_(path),
       folder_(path),
       collecting_(fmt::format("{}.{}-{}.part", withoutSlash(path), slice.first, slice.last)),
       keep_(slice.resume) {
-  requireReplaceable(slice);
+  requireReplaceable();
   std::error_code error;
   fs::create_directory(collecting_, error);
   if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", collecting_.string(), error.message()));
   lock();
   try {
-    takeOver(slice);
+    takeOver();
   } catch (...) {
     fs::remove(collecting_, error);  // if it is empty
     close(lock_);
@@ -62,12 +69,12 @@ PngFolder::PngFolder(const std::string& path, const Slice& slice)
 }
 
 // Noticed before the first picture is drawn, and not when half of them have moved in.
-void PngFolder::requireReplaceable(const Slice& slice) const {
+void PngFolder::requireReplaceable() const {
   if (access(folder_.c_str(), W_OK | X_OK) != 0)
     throw std::runtime_error(fmt::format("{}: cannot be written: {}", folder_.string(), std::strerror(errno)));
   for (const auto& entry : fs::directory_iterator(folder_)) {
-    const int number = parseNumber<int>(entry.path().stem().string()).value_or(-1);
-    const bool ours = slice.first <= number && number < slice.last && entry.path().filename() == pngName(number);
+    const int number = numberOf(entry.path());
+    const bool ours = slice_.first <= number && number < slice_.last;
     if (ours && fs::is_directory(entry.symlink_status()))
       throw std::runtime_error(
           fmt::format("{}: is a folder, expected the name of a file to write", entry.path().string()));
@@ -84,17 +91,17 @@ void PngFolder::lock() {
                   error == EWOULDBLOCK ? "another run is drawing these pictures" : std::strerror(error)));
 }
 
-void PngFolder::takeOver(const Slice& slice) const {
-  const std::string run = fmt::format("{:016x}\n", slice.run);
+void PngFolder::takeOver() const {
+  const std::string run = fmt::format("{:016x}\n", slice_.run);
   const fs::path name = collecting_ / kRunFile;
   const bool same = fs::exists(name) && readTextFile(name.string()) == run;
-  if (slice.resume && fs::exists(name) && !same)
+  if (slice_.resume && fs::exists(name) && !same)
     throw std::runtime_error(fmt::format(
         "{}: holds pictures of another run, by its scene, options or OpenGL: remove it, or render without --resume",
         collecting_.string()));
   for (const auto& entry : fs::directory_iterator(collecting_)) {
     const bool picture = entry.path().extension() == ".png" && isWholePng(entry.path());
-    if (!(slice.resume && same && picture)) fs::remove_all(entry.path());
+    if (!(slice_.resume && same && picture)) fs::remove_all(entry.path());
   }
   writeText(name.string(), run);
 }
@@ -113,13 +120,24 @@ void PngFolder::write(int number, const Image& image) const {
   writePng((collecting_ / pngName(number)).string(), image);
 }
 
-void PngFolder::finish() {
+int PngFolder::finish() {
   std::vector<fs::path> pictures;
   for (const auto& entry : fs::directory_iterator(collecting_))
     if (entry.path().extension() == ".png") pictures.push_back(entry.path());
   fs::create_directories(folder_);  // another slice that failed may have taken it away
   for (const fs::path& picture : pictures) fs::rename(picture, folder_ / picture.filename());
   keep_ = false;
+  return slice_.whole ? removeLater() : 0;
+}
+
+// Who makes a film of the folder would have their end of another one behind this.
+int PngFolder::removeLater() const {
+  std::vector<fs::path> later;
+  for (const auto& entry : fs::directory_iterator(folder_))
+    if (numberOf(entry.path()) >= slice_.last && !fs::is_directory(entry.symlink_status()))
+      later.push_back(entry.path());
+  for (const fs::path& picture : later) fs::remove(picture);
+  return static_cast<int>(later.size());
 }
 
 PictureOutputs::PictureOutputs(const std::vector<std::string>& paths, const Settings& settings) {
@@ -164,7 +182,10 @@ StageTimes::Stage PictureOutputs::encoding() const {
 
 void PictureOutputs::finish() {
   for (VideoWriter& video : videos_) video.finish(checkInterrupt);
-  for (const auto& folder : folders_) folder->finish();
+  for (const auto& folder : folders_)
+    if (const int gone = folder->finish(); gone > 0)
+      notes_.push_back(fmt::format("{}: {} numbered pictures beyond this run's are gone: they were of an earlier one",
+                                   folder->path(), gone));
   for (const std::string& path : stills_) writePng(path, still_);
 }
 

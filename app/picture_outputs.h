@@ -12,11 +12,13 @@
 namespace medulla {
 
 // A folder of numbered PNG files. They collect in DIR.A-B.part beside it and move in when all are there: a run that
-// ends early harms no earlier picture. Runs of other slices may fill the same folder at the same time.
+// ends early harms no earlier picture. Runs of other slices may fill the same folder at the same time; one of every
+// picture takes away what a longer run before it has left beyond its last.
 class PngFolder {
  public:
   struct Slice {
     int first = 0, last = 0;  // pictures [first, last)
+    bool whole = false;       // there are no others
     std::uint64_t run = 0;    // of all that the pictures follow from
     bool resume = false;      // takes over what an ended run left of the same pictures, and leaves its own
   };
@@ -26,15 +28,18 @@ class PngFolder {
   ~PngFolder();
   PngFolder(const PngFolder&) = delete;
   PngFolder& operator=(const PngFolder&) = delete;
+  std::string path() const { return folder_.string(); }
   bool has(int number) const;  // drawn before, and whole
   void write(int number, const Image& image) const;
-  void finish();
+  int finish();  // how many pictures of an earlier run are gone
 
  private:
-  void requireReplaceable(const Slice& slice) const;
+  void requireReplaceable() const;
   void lock();
-  void takeOver(const Slice& slice) const;
+  void takeOver() const;
+  int removeLater() const;
 
+  Slice slice_;
   OutputFolder made_;
   std::filesystem::path folder_, collecting_;
   bool keep_;
@@ -54,14 +59,16 @@ class PictureOutputs {
   PictureOutputs(const std::vector<std::string>& paths, const Settings& settings);
   bool has(int number) const;  // nobody needs this picture any more
   void write(int number, const Image& image);
-  void finish();                       // throws Interrupted too
-  StageTimes::Stage encoding() const;  // of all videos, in threads of their own
+  void finish();                                                    // throws Interrupted too
+  const std::vector<std::string>& notes() const { return notes_; }  // after finish(): what users may not expect
+  StageTimes::Stage encoding() const;                               // of all videos, in threads of their own
 
  private:
   std::vector<VideoWriter> videos_;
   std::vector<std::unique_ptr<PngFolder>> folders_;
   std::vector<std::string> stills_;
   Image still_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace medulla

@@ -100,6 +100,30 @@ TEST_F(Outputs, TwoRunsDoNotDrawTheSamePicturesAtOnce) {
   EXPECT_TRUE(fs::exists(folder / "frames/00002.png"));
 }
 
+TEST_F(Outputs, AShorterRunLeavesNoPicturesOfALongerOne) {
+  const std::vector<std::string> whole{"--size", "64x48", "-o", "frames"};
+  ASSERT_EQ(render(whole).exitCode, 0);
+  const std::string expected = read("frames/00005.png");
+  for (const char* name : {"7.png", "000007.png", "00007.jpg", "a00007.png", "-0007.png"})
+    folder.write(std::string("frames/") + name, "somebody's");
+  fs::create_directory(folder / "frames/00020.png");
+  ASSERT_EQ(render({"--frames", "0:2", "--size", "64x48", "-o", "frames"}).err, "");  // others draw the rest
+  EXPECT_TRUE(fs::exists(folder / "frames/00011.png"));
+
+  std::vector<std::string> shorter = whole;
+  shorter.insert(shorter.end(), {"--set", "clock.duration=0.24"});
+  const ProgramResult r = render(shorter);
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  ASSERT_EQ(complaints(r).size(), 1u) << r.err;
+  EXPECT_TRUE(complaints(r)[0].starts_with("note: frames: 6 ")) << r.err;
+  EXPECT_EQ(read("frames/00005.png"), expected);
+  int left = 0;
+  for (const auto& entry : fs::directory_iterator(folder / "frames")) left += entry.exists();
+  EXPECT_EQ(left, 6 + 5 + 1);
+  EXPECT_FALSE(fs::exists(folder / "frames/00006.png"));
+  EXPECT_EQ(render(shorter).err, "");
+}
+
 TEST_F(Outputs, SeveralScenesInOneProcessHaveFilesOfTheirOwn) {
   folder.write("own/second.xml", read("own/organ.xml"));
   const ProgramResult both = run({"render", "own/organ.xml", "own/second.xml", "-o", "{scene}", "-o", "{scene}.gif",

@@ -41,7 +41,11 @@ PictureOutputs::Settings outputSettings(const LoadedScene& loaded, const RenderO
                   namesOf(options.view.shown), static_cast<int>(options.quality), renderer);
   for (const ViewKind panel : options.view.panels) drawing += fmt::format(" {}", static_cast<int>(panel));
   const std::uint64_t run = contentHash(drawing, runHash(loaded, true));
-  return {scene.width, scene.height, scene.fps, options.still.has_value(), {first, first + count, run, options.resume}};
+  return {scene.width,
+          scene.height,
+          scene.fps,
+          options.still.has_value(),
+          {first, first + count, !options.frames, run, options.resume}};
 }
 
 }  // namespace
@@ -137,6 +141,7 @@ void Artist::drawAll() {
   desk_->outputs.finish();
   times_.stop();
   encoding_ = desk_->outputs.encoding();
+  notes_ = desk_->outputs.notes();
 }
 
 void Artist::takePanel() {
@@ -218,6 +223,7 @@ void Artist::finish() {
   changed_.notify_all();
   thread_.join();
   rethrow();
+  for (const std::string& note : notes_) fmt::print(stderr, "note: {}\n", note);  // now that no bar is in the way
 }
 
 }  // namespace medulla

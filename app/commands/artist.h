@@ -65,6 +65,7 @@ class Artist {
   std::unique_ptr<Desk> desk_;  // the thread's; the caller composes with it
   int drawn_ = 0;
   StageTimes::Stage encoding_;
+  std::vector<std::string> notes_;
   StageTimes times_;
   std::thread thread_;
 };
