@@ -37,9 +37,6 @@ SurfaceShape shapeOf(const RenderSurface& surface, const std::vector<Eigen::Vect
 
 void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& state, Picture& picture) {
   Instrument instrument;
-  // The picture shows the proxy: an instrument never enters the tissue, its device may. The proxy is a sphere, the jaws
-  // reach to its far side along the shaft.
-  instrument.tip = toGlm(state.proxy - tool.settings.radius * (input.worldFromTool * Eigen::Vector3d::UnitZ()));
   instrument.worldFromTool = toGlm(input.worldFromTool);
   // Instruments are 5 mm across whatever sphere feels for them; beside bodies that are no organs they are in
   // proportion.
@@ -49,7 +46,20 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   constexpr double kOpenJaw = 0.38, kClosedJaw = 0.03;  // rad
   instrument.jawAngle = float(kClosedJaw + (kOpenJaw - kClosedJaw) * std::max(0.0, 1 - 2 * input.grip));
   instrument.touching = state.inContact || state.holding;
-  instrument.holding = state.holding;
+  // Over the grip's last part, a few pictures long: tissue would jump into and out of the jaws else.
+  constexpr double kHeld = 0.5, kFirm = 0.95;
+  const double firm = std::clamp((input.grip - kHeld) / (kFirm - kHeld), 0.0, 1.0);
+  instrument.hold = state.holding ? float(firm * firm * (3 - 2 * firm)) : 0.f;
+  // A dent as deep as Hertz's contact has it for a tip of 3 mm in tissue of some 10 kPa, up to what stays a dent.
+  constexpr double kDeepest = 4e-3, kSoft = 0.15;  // m, at scale 1; N
+  const double force = state.force.norm();
+  if (state.inContact && force > 0)
+    instrument.press = toGlm(-kDeepest * instrument.scale * (1 - std::exp(-force / kSoft)) / force * state.force);
+  // The picture shows the proxy: an instrument never enters the tissue, its device may. The proxy is a sphere, the jaws
+  // reach to its far side along the shaft.
+  instrument.press *= 1 - instrument.hold;
+  instrument.tip =
+      toGlm(state.proxy - tool.settings.radius * (input.worldFromTool * Eigen::Vector3d::UnitZ())) + instrument.press;
   picture.instruments.push_back(instrument);
 }
 
@@ -109,7 +119,8 @@ float heightAtTarget(const Camera& camera) {
   return 2 * glm::length(camera.target - camera.position) * std::tan(0.5f * glm::radians(camera.fovDegrees));
 }
 
-SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Renderer& renderer) : loaded_(&loaded) {
+SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Renderer& renderer)
+    : loaded_(&loaded), widening_(widening(renderer.aspect())) {
   const Scene& scene = loaded.scene;
   const auto add = [&](int line, SurfaceShape shape) {
     try {
@@ -132,6 +143,9 @@ void SceneView::compose(const PictureState& state, ViewKind view, const Shown& s
   const Scene& scene = loaded_->scene;
   picture.view = view;
   picture.camera = cameraAt(scene.camera, state.time);
+  if (widening_ > 1)
+    picture.camera.fovDegrees =
+        glm::degrees(2 * std::atan(widening_ * std::tan(0.5f * glm::radians(picture.camera.fovDegrees))));
   picture.light = lightOf(scene);
   picture.endoscopeMask = scene.endoscope;
   picture.time = float(state.time);

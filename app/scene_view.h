@@ -29,6 +29,7 @@ class SceneView {
 
  private:
   const LoadedScene* loaded_;
+  float widening_;
   std::size_t drawnStatics_ = 0;
 };
 

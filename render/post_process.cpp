@@ -120,14 +120,14 @@ PostProcess::PostProcess(int width, int height)
       glare_(std::size_t(cellsX_) * cellsY_),
       blurred_(glare_.size()) {
   for (std::size_t k = 3; k < black_.size(); k += 4) black_[k] = 255;
-  const float h = float(height);
+  const float h = float(height), inner = rimInner(float(width) / h), outer = rimOuter(float(width) / h);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const float px = (float(x) + 0.5f - 0.5f * float(width)) / h, py = (float(y) + 0.5f - 0.5f * h) / h;
       const float r = std::sqrt(px * px + py * py);
-      if (r <= kRimInner) continue;
+      if (r <= inner) continue;
       // The fade is meant in light; pixels are gamma coded.
-      const float share = std::pow(smoothStep(kRimOuter, kRimInner, r), 1 / 2.2f);
+      const float share = std::pow(smoothStep(outer, inner, r), 1 / 2.2f);
       const auto at = std::uint32_t(y * width + x);
       if (const auto factor = std::uint8_t(255 * share + kRound); factor > 0)
         rim_.push_back({at, factor});

@@ -96,6 +96,7 @@ struct Renderer::Data {
   RendererSettings settings;
   std::unique_ptr<GlContext> context;
   int fineWidth, fineHeight;  // px, as drawn; a picture is smaller by `supersample`
+  int largestViewport = 0;    // px: OpenGL would cut what is larger without a word
   Framebuffer framebuffer;
   TissuePass tissue;
   HazePass background;
@@ -128,6 +129,9 @@ struct Renderer::Data {
         seen(fineHeight) {
     if (s.supersample > 1) finePost.emplace(fineWidth, fineHeight);
     tissue.addLook(findLook("steel"));
+    GLint most[2] = {};
+    glGetIntegerv(GL_MAX_VIEWPORT_DIMS, most);
+    largestViewport = std::min(most[0], most[1]);
     glFinish();
     spreadRasterThreads();
   }
@@ -290,7 +294,8 @@ void Renderer::begin(const Picture& picture, StageTimes* times) {
   assert(d.begun.size() < 2);
   d.context->makeCurrent();
   const bool round = picture.endoscopeMask && picture.view != ViewKind::model;
-  const Viewpoint view = makeViewpoint(picture.camera, float(d.settings.width) / float(d.settings.height), round);
+  const Viewpoint view = makeViewpoint(picture.camera, aspect(), round,
+                                       float(d.largestViewport) / float(std::max(d.fineWidth, d.fineHeight)));
   start(times, "bake");
   d.bake();
   start(times, "place");
@@ -336,6 +341,10 @@ RendererSettings rendererSettings(int width, int height, const std::string& cont
   s.shadows = s.antialias = quality != Quality::draft;
   s.supersample = quality == Quality::best ? 2 : 1;
   return s;
+}
+
+float Renderer::aspect() const {
+  return float(data_->settings.width) / float(data_->settings.height);
 }
 
 std::string Renderer::description() const {

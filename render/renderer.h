@@ -32,6 +32,10 @@ struct Camera {
   float fovDegrees = 60;  // vertical
 };
 
+// Cameras of scenes are set up for 16:9. A narrower picture, a half of a split one or one held upright, is to show as
+// much from side to side: so much more from top to bottom, and the endoscope's round picture is so much smaller.
+float widening(float aspect);
+
 // Light scattered by air or water: it fills the background, reaches what the lamp does not, and veils what is far away:
 // a surface at distance d keeps exp(-d / distance) of its own light.
 struct Haze {
@@ -58,8 +62,9 @@ struct Instrument {
   glm::quat worldFromTool{1, 0, 0, 0};  // shaft along +z away from the tip, jaws open in its yz plane
   float jawAngle = 0.3f;                // rad, of each jaw from the axis
   float scale = 1;                      // of one whose shaft is 5 mm across
-  bool touching = false;                // tissue blanches and dimples around the tip
-  bool holding = false;                 // it rises between the jaws instead
+  bool touching = false;                // tissue blanches around the tip
+  glm::vec3 press{0};                   // m: what it gives way by under the tip, which is drawn so much deeper
+  float hold = 0;                       // 0..1: by how much it rises between the jaws instead
 };
 
 struct DrawnBall {  // not Ball: the model has one of its own
@@ -131,6 +136,7 @@ class Renderer {
   // picture ahead of take(), which gives the pictures in their order.
   void begin(const Picture& picture, StageTimes* times = nullptr);
   void take(Image& out, StageTimes* times = nullptr);
+  float aspect() const;             // width over height
   std::string description() const;  // GL_RENDERER and GL_VERSION: golden images record it
 
  private:

@@ -126,9 +126,9 @@ float litAt(vec2 q, float z) {
 }
 
 // Taps on three turned squares and in the middle, evenly apart seen along any edge, or it shows steps. A rotation per
-// pixel would hide their steps better but leaves a pattern. Most pixels agree on the widest square and are done: llvmpipe
-// runs both sides of a branch but leaves a loop when all its pixels do, so the squares are a loop whose length the
-// compiler cannot know.
+// pixel would hide their steps better but leaves a pattern. Most pixels agree on the two widest squares and are done (on
+// one, the shadows of thin tools fell to pieces): llvmpipe runs both sides of a branch but leaves a loop when all its
+// pixels do, so the squares are a loop whose length the compiler cannot know.
 float softShadow(vec3 p, float r) {
   vec2 q = p.xy * SHADOW_HEIGHT;
   float sum = litAt(q, p.z), taps = 1.;
@@ -136,7 +136,7 @@ float softShadow(vec3 p, float r) {
     vec2 d = r * (k == 0 ? vec2(.24, .78) : k == 1 ? vec2(.40, .56) : vec2(.50, .30));
     sum += litAt(q + d, p.z) + litAt(q - d, p.z) + litAt(q + vec2(-d.y, d.x), p.z) + litAt(q + vec2(d.y, -d.x), p.z);
     taps += 4.;
-    if (sum == 0. || sum == taps) break;
+    if (k > 0 && (sum == 0. || sum == taps)) break;
   }
   return sum / taps;
 }

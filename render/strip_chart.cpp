@@ -20,10 +20,10 @@ struct Layout {
   float thin = 0;          // radius of lines
 
   explicit Layout(const Image& image) {
-    const float h = float(image.height), margin = std::round(0.03f * h);
+    const float bottom = float(image.height), h = std::min(bottom, float(image.width)), margin = std::round(0.03f * h);
     const float width = std::round(std::min(0.52f * h, 0.45f * float(image.width)));
-    low = {margin, h - margin - std::round(0.2f * h)};
-    high = {margin + width, h - margin};
+    low = {margin, bottom - margin - std::round(0.2f * h)};
+    high = {margin + width, bottom - margin};
     text = image.height < 120 ? 0 : 0.026f * h;
     plotLow = low + vec2(0.016f * h, text > 0 ? 0.060f * h : 0.016f * h);
     plotHigh = high - 0.016f * h;

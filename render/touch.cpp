@@ -69,33 +69,36 @@ Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
 
 }  // namespace
 
-// The simulation moves nodes a centimetre apart; this is what happens between them.
-void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
-  constexpr float kWidth = 0.0055f, kPressed = 0.0014f, kBlanchWidth = 0.0050f;  // m, at scale 1, as all here
-  // A smooth surface stays behind the held nodes that it hangs on, up to kReach; the jaws bite kBite of it.
-  constexpr float kReach = 0.014f, kBite = 0.0035f;
-  // Between the jaws stands a fold, as thick as they are apart there and wider than they are: so far beyond the tip of
-  // a tool that stands upright. Along the surface it would be a slit.
+// A smooth surface stays behind the held nodes that it hangs on, up to kReach; the jaws bite kBite of it, and between
+// them stands a fold, as thick as they are apart there and wider than they are: so far beyond the tip of a tool that
+// stands upright. Along the surface it would be a slit.
+static void riseBetweenJaws(const Instrument& instrument, float blanched, SceneMesh& mesh) {
+  constexpr float kWidth = 0.0055f, kReach = 0.014f, kBite = 0.0035f;  // m, at scale 1, as all here
   constexpr float kFold = 0.0090f, kFoldThickness = 0.0013f, kFoldWidth = 0.0040f;
   const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, instrument.scale);
+  const Nearest held = nearestMoving(mesh, instrument.tip, instrument.scale * kReach);
+  if (!held.part) return;
+  const glm::vec3 offset = instrument.tip + kBite * axis - held.position;
+  const float around = std::max(instrument.scale * kWidth, 1.3f * glm::length(offset));
+  displace(*held.part, {held.position, instrument.hold * offset, glm::mat3(1 / around), blanched}, mesh);
+  const float thickness = std::max(kFoldThickness, 0.8f * held.spacing / instrument.scale);  // else facets stand out
+  const float wide = std::max(kFoldWidth, thickness);
+  const glm::vec3 narrow(1 / wide, 1 / thickness, 1 / wide);
+  glm::mat3 across = glm::mat3_cast(instrument.worldFromTool);  // a column per axis of the tool
+  for (int k = 0; k < 3; ++k) across[k] *= narrow[k] / instrument.scale;
+  const float upright = instrument.hold * std::max(glm::dot(held.normal, axis) / instrument.scale, 0.f);
+  displace(*held.part, {instrument.tip + kBite * axis, kFold * upright * axis, glm::transpose(across), 0}, mesh);
+}
+
+// The simulation moves nodes a centimetre apart; this is what happens between them.
+void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
+  constexpr float kWidth = 0.0055f, kBlanchWidth = 0.0040f;
   const float width = instrument.scale * kWidth, blanched = instrument.scale * kBlanchWidth;
-  if (instrument.holding) {
-    const Nearest held = nearestMoving(mesh, instrument.tip, instrument.scale * kReach);
-    if (!held.part) return;
-    const glm::vec3 offset = instrument.tip + kBite * axis - held.position;
-    const float around = std::max(width, 1.3f * glm::length(offset));
-    displace(*held.part, {held.position, offset, glm::mat3(1 / around), blanched}, mesh);
-    const float thickness = std::max(kFoldThickness, 0.8f * held.spacing / instrument.scale);  // else facets stand out
-    const float wide = std::max(kFoldWidth, thickness);
-    const glm::vec3 narrow(1 / wide, 1 / thickness, 1 / wide);
-    glm::mat3 across = glm::mat3_cast(instrument.worldFromTool);  // a column per axis of the tool
-    for (int k = 0; k < 3; ++k) across[k] *= narrow[k] / instrument.scale;
-    const float upright = std::max(glm::dot(held.normal, axis) / instrument.scale, 0.f);
-    displace(*held.part, {instrument.tip + kBite * axis, kFold * upright * axis, glm::transpose(across), 0}, mesh);
-  } else {
+  if (instrument.hold < 1)
     for (const MeshPart& part : mesh.parts)
-      if (!part.instrument) displace(part, {instrument.tip, -kPressed * axis, glm::mat3(1 / width), blanched}, mesh);
-  }
+      if (!part.instrument)
+        displace(part, {instrument.tip - instrument.press, instrument.press, glm::mat3(1 / width), blanched}, mesh);
+  if (instrument.hold > 0) riseBetweenJaws(instrument, blanched, mesh);
 }
 
 void shadeAround(const Instrument& instrument, SceneMesh& mesh) {

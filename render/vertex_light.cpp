@@ -108,7 +108,7 @@ void lightMetal(const Shading& v, vec3 tangent, LitVertex& out) {
   const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
   const vec3 mirrored = 2.f * v.normal * facing - v.toEye;
   const float above = mirrored.y * 0.5f + 0.5f, toLamp = glm::dot(mirrored, v.toLight);
-  const float lamp = 0.9f * smoothStep(0.55f, 0.97f, toLamp) + 0.22f * smoothStep(-0.2f, 0.5f, toLamp);
+  const float lamp = 0.9f * smoothStep(0.75f, 0.99f, toLamp) + 0.22f * smoothStep(-0.2f, 0.5f, toLamp);
   const float gap = 1 - 0.75f * smoothStep(0.35f, 0.05f, std::abs(mirrored.y + 0.25f));
   const vec3 cavity = (vec3(0.045f, 0.014f, 0.011f) + vec3(0.17f, 0.085f, 0.07f) * (above * above)) * gap +
                       vec3(0.60f, 0.58f, 0.55f) * lamp;
@@ -208,7 +208,7 @@ namespace {
 
 Surroundings makeSurroundings(const Viewpoint& view, const Light& light, const LightView& lightView,
                               const HazeField* haze, float time) {
-  const float corner = view.round ? 2 * kRimOuter : 1.6f * std::sqrt(1 + view.aspect * view.aspect);
+  const float corner = view.round ? 2 * rimOuter(view.aspect) : 1.6f * std::sqrt(1 + view.aspect * view.aspect);
   const float cone = std::atan(corner * view.tangent);
   Surroundings s{view, light, lightView, haze, time, std::cos(0.40f * cone), std::cos(std::min(1.07f * cone, 1.5f))};
   if (!haze) return s;
@@ -238,7 +238,10 @@ Shading lightVertex(const SceneMesh& mesh, const Look& look, std::size_t i, vec3
   const vec3 halfway = glm::normalize(v.toLight + v.toEye);
   const float lh = glm::dot(v.toLight, halfway);
   const float fresnel = kFilmReflectance + (1 - kFilmReflectance) * std::exp2((-5.55473f * lh - 6.98316f) * lh);
-  o.gloss = fresnel * std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 3 * v.exposure * (1 - v.veil);
+  // Deep in a cleft its walls stand in the lamp's way.
+  const float open = std::min(2 * v.openness, 1.f);
+  o.gloss =
+      fresnel * std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 3 * v.exposure * (1 - v.veil) * open * open;
   const vec3 t = mesh.tangent[i];
   o.halfway = {glm::dot(halfway, t), glm::dot(halfway, glm::cross(v.normal, t)), glm::dot(halfway, v.normal)};
   o.shadowRadius = 2;

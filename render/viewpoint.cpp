@@ -9,7 +9,7 @@
 namespace medulla {
 namespace {
 
-constexpr float kFarPlane = 50;  // m; the depth buffer is floating point
+constexpr float kFarPlane = 2500;  // m, beyond what scenes may hold; the depth buffer is floating point
 
 glm::vec3 anyPerpendicular(glm::vec3 v) {
   return glm::normalize(glm::cross(v, std::abs(v.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
@@ -58,11 +58,15 @@ LightView makeLampView(glm::vec3 position, const SceneMesh& mesh) {
 
 }  // namespace
 
-float vignetteAt(const Viewpoint& v, glm::vec2 p) {
-  return v.round ? 1 - 0.55f * smoothStep(0.25f, 0.85f, std::sqrt(p.x * p.x + p.y * p.y)) : 1.f;
+float widening(float aspect) {
+  return std::max(1.f, 16.f / 9 / aspect);
 }
 
-Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round) {
+float vignetteAt(const Viewpoint& v, glm::vec2 p) {
+  return v.round ? 1 - 0.55f * smoothStep(0.25f, 0.85f, widening(v.aspect) * std::sqrt(p.x * p.x + p.y * p.y)) : 1.f;
+}
+
+Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round, float mostOverscan) {
   Viewpoint v;
   v.position = camera.position;
   v.back = -direction(camera.position, camera.target);
@@ -76,7 +80,7 @@ Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round) {
   if (distance > 0) v.nearPlane = std::min(v.nearPlane, 0.1f * distance);
   glm::mat4 clip = glm::perspective(glm::radians(camera.fovDegrees), aspect, v.nearPlane, kFarPlane);
   clip[1][1] = -clip[1][1];
-  v.overscan = round ? 1.f : 2.f;
+  v.overscan = round ? 1.f : std::min(2.f, mostOverscan);
   clip[0][0] /= v.overscan;
   clip[1][1] /= v.overscan;
   v.clipFromWorld = clip * glm::lookAt(v.position, v.position - v.back, v.up);
@@ -89,7 +93,7 @@ LightView makeLightView(const Light& light, const Viewpoint& v, const Camera& ca
   l.position = v.position + v.right * light.offset.x + v.up * light.offset.y + v.back * light.offset.z;
   l.direction = direction(l.position, camera.target);
   // The view covers what the camera sees; the light sits beside it, hence the margin.
-  const float corner = v.round ? 2 * kRimOuter : std::sqrt(1 + v.aspect * v.aspect);
+  const float corner = v.round ? 2 * rimOuter(v.aspect) : std::sqrt(1 + v.aspect * v.aspect);
   l.tangent = std::min(1.15f * corner * v.tangent, 3.f);
   l.nearDistance = 0.2f * light.referenceDistance;
   l.farDistance = 20 * light.referenceDistance;

@@ -8,7 +8,12 @@
 namespace medulla {
 
 // Radius of the endoscope's round picture, in picture heights from the centre; its rim fades between the two.
-constexpr float kRimInner = 0.79f, kRimOuter = 0.815f;
+inline float rimInner(float aspect) {
+  return 0.79f / widening(aspect);
+}
+inline float rimOuter(float aspect) {
+  return 0.815f / widening(aspect);
+}
 
 // The camera of one picture with what follows from it.
 struct Viewpoint {
@@ -35,7 +40,8 @@ inline glm::vec3 pictureFromWorld(const Viewpoint& v, glm::vec3 p) {
 // The endoscope's picture fades towards its rim: factor on light, p in picture heights from the centre.
 float vignetteAt(const Viewpoint& v, glm::vec2 p);
 
-Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round);
+// `mostOverscan`: >= 1, what OpenGL allows.
+Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round, float mostOverscan = 2);
 // A lamp beside the lens sees what the camera sees, one in the world the casters of `mesh`.
 LightView makeLightView(const Light& light, const Viewpoint& viewpoint, const Camera& camera, const SceneMesh& mesh);
 

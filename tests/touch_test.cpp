@@ -67,16 +67,26 @@ TEST(Touch, AFoldIsDarkAndARidgeIsNot) {
 TEST(Touch, PressedTissueGivesWayAndHeldTissueComesBetweenTheJaws) {
   const SceneMesh rest = sheet(30, 0.002f);
   Instrument tool;
-  tool.tip = {0, 0, 0.004f};  // its shaft along +z, away from the sheet
+  tool.tip = {0, 0, 0.001f};  // its shaft along +z, away from the sheet
   tool.touching = true;
+  tool.press = {0, 0, -0.002f};
   SceneMesh pressed = rest;
   applyTouch(tool, pressed);
   EXPECT_LT(pressed.position[middleOf(rest)].z, -0.0005f);
   EXPECT_GT(pressed.blanch[middleOf(rest)], 0.3f);
-  tool.holding = true;
+  // Half held it is halfway there.
+  tool.tip = {0, 0, 0.004f};
+  tool.press = {};
+  tool.hold = 0.5f;
+  SceneMesh between = rest;
+  applyTouch(tool, between);
+  tool.hold = 1;
   SceneMesh held = rest;
   applyTouch(tool, held);
-  EXPECT_GT(held.position[middleOf(rest)].z, tool.tip.z + 0.002f);
+  const float risen = held.position[middleOf(rest)].z, half = between.position[middleOf(rest)].z;
+  EXPECT_GT(risen, tool.tip.z + 0.002f);
+  EXPECT_GT(half, 0.2f * risen);
+  EXPECT_LT(half, 0.8f * risen);
   EXPECT_NEAR(held.blanch[middleOf(rest)], 1, 1e-5);
   // As a fold: thin where the jaws close on it, along y, and long across them.
   const auto heightAt = [&](vec3 place) {
