@@ -46,7 +46,8 @@ class PngFolder {
   int lock_ = -1;
 };
 
-// Where pictures go: any number of videos and folders of numbered PNG files; of a still, PNG files.
+// Where pictures go: any number of videos and folders of numbered PNG files; of a still, PNG files. Folders that are
+// missing are made, and go again where nothing comes into them.
 class PictureOutputs {
  public:
   struct Settings {
@@ -64,6 +65,9 @@ class PictureOutputs {
   StageTimes::Stage encoding() const;                               // of all videos, in threads of their own
 
  private:
+  void makeParent(const std::string& path);
+
+  std::vector<std::unique_ptr<OutputFolder>> made_;  // before what is written into them: they go last
   std::vector<VideoWriter> videos_;
   std::vector<std::unique_ptr<PngFolder>> folders_;
   std::vector<std::string> stills_;

@@ -110,7 +110,13 @@ TEST_F(BadInput, FoldersMadeForAFailedCommandGoAgain) {
   expectRefused(run({"render", "own/organ.xml", "-o", "p/q/frames", "--set", "dynamics.substeps=1", "--set",
                      "tissue.t.young=1e9"}),
                 "finite");
-  for (const char* name : {"x", "u", "p"}) EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
+  for (const char* film : {"v/w/film.webm", "v/film.gif"}) {
+    expectRefused(
+        run({"render", "own/organ.xml", "-o", film, "--set", "dynamics.substeps=1", "--set", "tissue.t.young=1e9"}),
+        "finite");
+    expectRefused(run({"render", "own/organ.xml", "-o", film, "-o", "v/wrong.txt"}), "v/wrong.txt: expected FILE.mp4");
+  }
+  for (const char* name : {"x", "u", "p", "v"}) EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
 }
 
 TEST_F(BadInput, EmptyWordsAreWrongUsage) {

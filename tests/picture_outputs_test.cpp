@@ -138,6 +138,14 @@ TEST_F(Outputs, SeveralScenesInOneProcessHaveFilesOfTheirOwn) {
   expectRefused(run({"render", "own/organ.xml", "own/organ.xml", "-o", "{scene}.mp4"}), "two outputs");
 }
 
+TEST_F(Outputs, FoldersThatAreMissingAreMade) {
+  ASSERT_EQ(render({"--size", "64x48", "--frames", "0:2", "-o", "films/new/{scene}.gif", "-o", "films/b.mp4"}).exitCode,
+            0);
+  ASSERT_EQ(render({"--size", "64x48", "--still", "0", "-o", "stills/{scene}.png"}).exitCode, 0);
+  for (const char* name : {"films/new/organ.gif", "films/b.mp4", "stills/organ.png"})
+    EXPECT_TRUE(fs::is_regular_file(folder / name)) << name;
+}
+
 TEST_F(Outputs, AStillIsThePictureOfItsTimeAndAveragesFourTimesThePixels) {
   ASSERT_EQ(render({"-o", "frames", "--frames", "8:9"}).exitCode, 0);
   ASSERT_EQ(render({"--still", "0.32", "--quality", "standard", "-o", "a.png"}).exitCode, 0);

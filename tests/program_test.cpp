@@ -393,7 +393,7 @@ TEST(ProgramRefuses, BadTrajectories) {
 TEST(ProgramRefuses, OutputsThatCannotBeWritten) {
   const TemporaryFolder folder;
   folder.write("file", "x");
-  expectRefusal(runProgram(command({"render", kScene, "-o", folder / "none/video.mp4"})), 1, {"none"});
+  expectRefusal(runProgram(command({"render", kScene, "-o", folder / "file/video.mp4"})), 1, {"file"});
   expectRefusal(runProgram(command({"render", kScene, "-o", folder / "file/frames"})), 1, {"file/frames"});
   expectRefusal(runProgram(command({"replay", kScene, "--log", folder / "none/log.csv"})), 1, {"none/log.csv"});
   expectRefusal(runProgram(command({"replay", kScene, "--record", folder / "none/r.csv"})), 1, {"none/r.csv"});
