@@ -110,6 +110,9 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
   out += fmt::format("  <body name=\"{0}\" model=\"{0}.model.xml\" tissue=\"soft\" look=\"stomach\">\n", name);
   out += "    <!-- numbers of filling spheres; the model view shows the held ones grey -->\n";
   out += fmt::format("    <fix spheres=\"{}\"/>\n  </body>\n", heldSpheres(model, l));
+  out += "  <!-- what it lies before; a mesh of yours is shape=\"mesh\" mesh=\"FILE\" -->\n";
+  out += fmt::format("  <static shape=\"plane\" position=\"{}\" normal=\"0 0 1\" look=\"wall\" contact=\"false\"/>\n",
+                     vectorText({centre.x(), centre.y(), l.box.min().z() - 0.15 * l.size}));
   out += fmt::format(
       "  <tool name=\"grasper\" trajectory=\"{}.csv\" radius=\"{:.3g}\" stiffness=\"{:.3g}\" damping=\"{:.3g}\" "
       "friction=\"0.3 0.2\"\n        force_max=\"{:.3g}\" grip_force_max=\"{:.3g}\" "
@@ -147,8 +150,7 @@ std::string trajectoryText(const Layout& l) {
   key(2.4, above(-0.05), straight, 0.3);
   out += "# back, open, touch, grab\n";
   key(3.1, above(0.05), straight, 0);
-  key(3.6, above(-0.02), straight, 0);
-  key(4, above(-0.05), straight, 0);
+  key(3.8, above(0), straight, 0);
   key(4.2, above(-0.08), straight, 1);  // on its way in as it closes: a body that swings freely is touched then
   out += "# pull\n";
   key(5.2, pulled, straight, 1);
