@@ -17,6 +17,7 @@ namespace {
 struct BuildArguments {
   BuildOptions options;
   std::string method = "cover", linkForm = "full";
+  std::vector<const CLI::Option*> ofCover;  // which the skeleton follows none of
 };
 
 // CLI::Range lets NaN pass.
@@ -35,9 +36,10 @@ BuildOptions buildOptions(const BuildArguments& a) {
   BuildOptions options = a.options;
   options.settings.method = a.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
   const BuildSettings& s = options.settings;
-  for (const auto& [name, value] : {std::pair("--gap", s.gap), std::pair("--overshoot", s.overshoot.value_or(0))})
-    if (value > 0 && s.method != BuildMethod::cover)
-      usageError(name, fmt::format("{}", value), "together with --method cover");
+  for (const CLI::Option* option : a.ofCover)
+    if (option->count() > 0 && s.method != BuildMethod::cover)
+      usageError(option->get_name(), option->as<std::string>(),
+                 "--method cover with it: of a skeleton it says nothing");
   if (!options.fine.empty() && options.fine.size() != options.meshes.size())
     usageError("--fine", options.fine.back(),
                fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
@@ -51,6 +53,33 @@ BuildOptions buildOptions(const BuildArguments& a) {
     usageError("--spheres", fmt::format("{}", s.spheres),
                fmt::format("at most {} with --identify: its time grows with their cube", identifiedSpheresMax));
   return options;
+}
+
+void addCoverOptions(CLI::App& c, BuildArguments& a) {
+  CLI::Option* spheres =
+      c.add_option(
+           "--spheres", a.options.settings.spheres,
+           "number of filling spheres; of several meshes together: shared out so that the largest gap, in metres, "
+           "is about the same for all")
+          ->check(CLI::Range(1, spheresMax))
+          ->capture_default_str();
+  CLI::Option* gap =
+      c.add_option(
+           "--gap", a.options.settings.gap,
+           "instead of a number: the fewest spheres, of each mesh, that leave no wider gap between the surface and "
+           "the nearest sphere, in % of the bounding box's diagonal")
+          ->check(numberFrom(0.01, 99))
+          ->type_name("PERCENT")
+          ->excludes(spheres);
+  CLI::Option* overshoot =
+      c.add_option(
+           "--overshoot", a.options.settings.overshoot,
+           "how far spheres may stick out of the surface, in % of the bounding box's diagonal: they fill more, and "
+           "bodies touch by so much too early instead of sinking in by the gap [4.2 / sqrt(spheres), or half the gap, "
+           "5 at most]")
+          ->check(numberFrom(0, 5))
+          ->type_name("PERCENT");
+  a.ofCover = {spheres, gap, overshoot};
 }
 
 void addIdentification(CLI::App& c, BuildArguments& a) {
@@ -86,27 +115,7 @@ Verb addBuild(CLI::App& app) {
                 "model file to write; for several meshes a folder, where each becomes MESH.model.xml")
       ->type_name("MODEL.xml|DIR")
       ->required();
-  CLI::Option* spheres =
-      c->add_option(
-           "--spheres", a.options.settings.spheres,
-           "number of filling spheres; of several meshes together: shared out so that the largest gap, in metres, "
-           "is about the same for all")
-          ->check(CLI::Range(1, spheresMax))
-          ->capture_default_str();
-  c->add_option(
-       "--gap", a.options.settings.gap,
-       "instead of a number: the fewest spheres, of each mesh, that leave no wider gap between the surface and "
-       "the nearest sphere, in % of the bounding box's diagonal")
-      ->check(numberFrom(0.01, 99))
-      ->type_name("PERCENT")
-      ->excludes(spheres);
-  c->add_option(
-       "--overshoot", a.options.settings.overshoot,
-       "how far spheres may stick out of the surface, in % of the bounding box's diagonal: they fill more, and "
-       "bodies touch by so much too early instead of sinking in by the gap [4.2 / sqrt(spheres), or half the gap, 5 at "
-       "most]")
-      ->check(numberFrom(0, 5))
-      ->type_name("PERCENT");
+  addCoverOptions(*c, a);
   c->add_option("--method", a.method, "cover: balls chosen to fill the body; skeleton: the raw edge collapse")
       ->check(CLI::IsMember({"cover", "skeleton"}))
       ->capture_default_str();

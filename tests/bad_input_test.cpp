@@ -134,5 +134,16 @@ TEST_F(BadInput, NumbersOfABuildThatAreNoneAreWrongUsage) {
   expectRefused(run({"build", mesh, "-o", "m.xml", "--identify", "--spheres", "301"}), "at most 300", 2);
 }
 
+TEST_F(BadInput, WhatSaysNothingOfASkeletonIsWrongUsageWithIt) {
+  const std::string mesh = MEDULLA_SOURCE_DIR "/assets/gallbladder/gallbladder.obj";
+  for (const auto& [option, value] : {std::pair("--spheres", "7"), {"--overshoot", "0"}, {"--gap", "5"}})
+    expectRefused(run({"build", mesh, "-o", "m.xml", "--method", "skeleton", option, value}),
+                  std::string(option) + " " + value + ": expected --method cover", 2);
+  const ProgramResult r = run({"build", mesh, "-o", "m.xml", "--method", "skeleton"});
+  EXPECT_EQ(r.exitCode, 0) << r.err;
+  ASSERT_EQ(complaints(r).size(), 1u) << r.err;  // that they cover little
+  EXPECT_NE(r.err.find("of the volume\n"), std::string::npos) << r.err;
+}
+
 }  // namespace
 }  // namespace medulla

@@ -70,12 +70,12 @@ void warnOfSize(const std::string& path, const TriangleMesh& mesh) {
 }
 
 // A scene of it would move as bags of skin do, or turn inside out.
-void warnOfCover(const std::string& path, const BuildReport& report) {
+void warnOfCover(const BuildJob& job) {
   constexpr double kLeast = 40;  // %; the scenes' leanest model, of limbs, has 58
-  if (report.cover < kLeast)
-    fmt::print(stderr,
-               "{}: note: the spheres cover {:.2g} % of the volume; do more of them (--spheres) fit it better?\n", path,
-               report.cover);
+  if (job.report.cover >= kLeast) return;
+  const bool chosen = job.settings.method == BuildMethod::cover;  // how many there are of a skeleton follows from it
+  fmt::print(stderr, "{}: note: the spheres cover {:.2g} % of the volume{}\n", job.meshPath, job.report.cover,
+             chosen ? "; do more of them (--spheres) fit it better?" : "");
 }
 
 // All that was repaired and found in one line.
@@ -245,7 +245,7 @@ int runBuild(const BuildOptions& options) {
   for (BuildJob& job : jobs) job.model.settings = repeatingCommand(job, options);
   const std::vector<Result> results = resultsOf(jobs);
   for (const BuildJob& job : jobs) writeModel(job.modelPath, job.model);
-  for (const BuildJob& job : jobs) warnOfCover(job.meshPath, job.report);
+  for (const BuildJob& job : jobs) warnOfCover(job);
   if (!options.reportPath.empty()) writeReport(options.reportPath, results);
   printResults(results);
   return 0;
