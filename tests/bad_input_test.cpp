@@ -31,6 +31,25 @@ TEST_F(BadInput, AMeshThatIsFarTooLargeIsRefusedInOneLine) {
   expectRefused(run({"build", "m.obj", "-o", "m.xml"}), "is the unit right?");
 }
 
+TEST_F(BadInput, CheckWarnsOfWhatRunsWarnOf) {
+  EXPECT_EQ(run({"check", "own/organ.xml"}).err, "");
+  add(fmt::format("<body name='twin' tissue='t' look='liver' model='{}/assets/gallbladder/gallbladder.model.xml'/>",
+                  MEDULLA_SOURCE_DIR));
+  const std::vector<std::string> changes{"--set", "dynamics.sleep_after=1", "--set", "dynamics.integrator=implicit",
+                                         "--set", "clock.duration=0.02",    "--set", "output.golden=0"};
+  const auto warnings = [&](const char* verb) {
+    std::vector<std::string> words{verb, "own/organ.xml"};
+    words.insert(words.end(), changes.begin(), changes.end());
+    const ProgramResult r = run(words);
+    EXPECT_EQ(r.exitCode, 0) << r.err;
+    return complaints(r);
+  };
+  const std::vector<std::string> found = warnings("check");
+  EXPECT_EQ(found, warnings("replay"));
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_TRUE(found[0].starts_with("warning: bodies 'twin' and 'organ' overlap by ")) << found[0];
+}
+
 TEST_F(BadInput, ATissueTooStiffForAnyStepIsRefusedWithItsScene) {
   write({.young = "1e20"});
   expectRefused(run({"check", "own/organ.xml"}), "own/organ.xml: the stable substep is ");

@@ -6,7 +6,8 @@ namespace medulla {
 
 // Everything that a run does before its first step: reading, looking up, laying out.
 int runCheck(const RunOptions& options) {
-  makeWorld(loadRun(options));
+  const LoadedScene loaded = loadRun(options);
+  printWarnings(loaded.scene, makeWorld(loaded));
   fmt::print("valid yes\n");
   return 0;
 }

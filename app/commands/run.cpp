@@ -312,6 +312,14 @@ void PictureTimes::afterFrame(const Simulation& simulation, const std::function<
   }
 }
 
+void printWarnings(const Scene& scene, const World& world) {
+  for (const BodyOverlap& o : world.startOverlaps())
+    fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n", scene.bodies[o.body0].name,
+               scene.bodies[o.body1].name, 1e3 * o.depth);
+  if (scene.sleepAfter > 0 && scene.integrator == Integrator::implicit)
+    fmt::print(stderr, "warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
+}
+
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
                              const std::function<void()>& afterFrame, const std::function<void()>& finish,
                              const std::function<void()>& advance) {
@@ -322,11 +330,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   FrameTimesRecorder frameTimes(options);
   ForceComparison forces(loaded);
   RestWatch rest(loaded);
-  for (const BodyOverlap& o : simulation.world().startOverlaps())
-    fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n",
-               loaded.scene.bodies[o.body0].name, loaded.scene.bodies[o.body1].name, 1e3 * o.depth);
-  if (loaded.scene.sleepAfter > 0 && loaded.scene.integrator == Integrator::implicit)
-    fmt::print(stderr, "warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
+  printWarnings(loaded.scene, simulation.world());
   for (bool last = false; !last;) {
     checkInterrupt();
     if (advance)

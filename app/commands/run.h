@@ -77,6 +77,9 @@ CacheLayout cacheLayout(const LoadedScene& loaded);
 
 LoadedScene loadRun(const RunOptions& options);
 
+// On standard error: what can run, but is hardly meant.
+void printWarnings(const Scene& scene, const World& world);
+
 // Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` after the last, before
 // records, log and surfaces appear under their names: what fails there leaves those as they were. Until rest: until
 // every node has been slower than 1e-5 m/s for 0.1 s, so that the turning point of a swing does not count, and neither
