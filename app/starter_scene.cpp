@@ -114,11 +114,11 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
   out += fmt::format("  <static shape=\"plane\" position=\"{}\" normal=\"0 0 1\" look=\"wall\" contact=\"false\"/>\n",
                      vectorText({centre.x(), centre.y(), l.box.min().z() - 0.15 * l.size}));
   out += fmt::format(
-      "  <tool name=\"grasper\" trajectory=\"{}.csv\" radius=\"{:.3g}\" stiffness=\"{:.3g}\" damping=\"{:.3g}\" "
+      "  <tool name=\"{}\" trajectory=\"{}.csv\" radius=\"{:.3g}\" stiffness=\"{:.3g}\" damping=\"{:.3g}\" "
       "friction=\"0.3 0.2\"\n        force_max=\"{:.3g}\" grip_force_max=\"{:.3g}\" "
       "grip_radius=\"{:.3g}\"/>\n",
-      name, 0.03 * l.size, 0.6 * young * l.size, std::pow(scale, 2.5), 8 * std::pow(scale, 3), 8 * std::pow(scale, 3),
-      0.08 * l.size);
+      name == "grasper" ? "tool" : "grasper", name, 0.03 * l.size, 0.6 * young * l.size, std::pow(scale, 2.5),
+      8 * std::pow(scale, 3), 8 * std::pow(scale, 3), 0.08 * l.size);
   out += fmt::format("  <camera position=\"{}\" target=\"{}\" fov=\"{}\"/>\n",
                      vectorText(centre + distance * Vector3d::UnitZ()), vectorText(centre), fov);
   out += fmt::format("  <light offset=\"{}\" reference_distance=\"{:.3g}\"/>\n",

@@ -207,6 +207,8 @@ TEST_F(SceneFile, MistakesInTheStructureNameTheLineAndWhatWasExpected) {
       {"name=\"second\"", "name=\"gallbladder\"",
        R"(x.xml:16: <body> name="gallbladder": another <body> has this name)"},
       {"name=\"liver\"", "name=\"bile_sac\"", R"(x.xml:8: <tissue> name="bile_sac": another <tissue> has this name)"},
+      {"name=\"grasper\"", "name=\"second\"",
+       R"(x.xml:18: <tool> name="second": a <body> has this name, and columns of logs are named after both)"},
       {"name=\"grasper\"", "name=\"my,tool\"",
        R"(x.xml:18: <tool> name="my,tool": expected letters, digits, _ and - only)"},
       {"tissue=\"bile_sac\"", "tissue=\"bile_sack\"",

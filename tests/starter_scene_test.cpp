@@ -125,6 +125,19 @@ TEST(StarterScene, SpheresThatDoNotFillTheBodyAreNoted) {
   EXPECT_NE(made.err.find("note: the spheres cover"), std::string::npos) << made.err;
 }
 
+// A body and a tool of one name are refused.
+TEST(StarterScene, IsCheckedWhateverTheMeshIsCalled) {
+  const TemporaryFolder folder;
+  for (const char* name : {"grasper", "tool", "my organ"}) {
+    const std::string mesh = folder / (std::string(name) + ".obj");
+    std::filesystem::copy_file(kMesh, mesh);
+    const ProgramResult made = makeStarter(folder, mesh);
+    ASSERT_EQ(made.exitCode, 0) << made.err;
+    const std::string scene = made.out.substr(made.out.find("scene ") + 6);
+    EXPECT_EQ(runProgram({"check", scene.substr(0, scene.find('\n'))}).out, "valid yes\n") << name;
+  }
+}
+
 TEST(Check, NamesFileAndLineOfWhatCannotRun) {
   const TemporaryFolder folder;
   ASSERT_EQ(makeStarter(folder).exitCode, 0);

@@ -306,6 +306,8 @@ void readTools(const XmlElement& root, Scene& scene) {
     ToolSettings& s = tool.settings;
     tool.line = e->line;
     tool.name = readUniqueName(*e, taken);
+    if (std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const SceneBody& b) { return b.name == tool.name; }))
+      refuse(*e, "name", "a <body> has this name, and columns of logs are named after both");
     tool.trajectoryPath = readPath(*e, "trajectory", scene.path);
     s.radius = readNumber(*e, "radius", s.radius, toolLength);
     s.stiffness = readNumber(*e, "stiffness", s.stiffness, positive);
