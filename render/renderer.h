@@ -32,8 +32,9 @@ struct Camera {
   float fovDegrees = 60;  // vertical
 };
 
-// Cameras of scenes are set up for 16:9. A narrower picture, a half of a split one or one held upright, is to show as
-// much from side to side: so much more from top to bottom, and the endoscope's round picture is so much smaller.
+// Cameras of scenes are set up for 16:9. A much narrower picture, a half of a split one or one held upright, is to show
+// three quarters of that from side to side: so much more from top to bottom, and the endoscope's round picture is so much
+// smaller.
 float widening(float aspect);
 
 // Light scattered by air or water: it fills the background, reaches what the lamp does not, and veils what is far away:

@@ -59,7 +59,7 @@ LightView makeLampView(glm::vec3 position, const SceneMesh& mesh) {
 }  // namespace
 
 float widening(float aspect) {
-  return std::max(1.f, 16.f / 9 / aspect);
+  return std::max(1.f, 0.75f * (16.f / 9) / aspect);
 }
 
 float vignetteAt(const Viewpoint& v, glm::vec2 p) {
