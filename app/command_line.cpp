@@ -176,7 +176,7 @@ std::string fileOf(const std::string& scene, std::string path) {
 void readPictures(const RenderArguments& a, RenderOptions& options) {
   if (!a.size.empty()) {
     options.size = splitPair(a.size, 'x');
-    if (!options.size) usageError("--size", a.size, "WIDTHxHEIGHT, even numbers from 16 to 8192");
+    if (!options.size) usageError("--size", a.size, "WIDTHxHEIGHT, numbers from 16 to 8192, even for videos");
   }
   if (!a.frames.empty()) {
     options.frames = splitPair(a.frames, ':');
@@ -285,7 +285,8 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
   parts.back() = ';';
   parts += " of the model what is named [mesh,spheres,links]";
   c->add_option("--show", a.show, parts)->delimiter(',')->type_name("PART,...")->allow_extra_args(false);
-  c->add_option("--size", a.size, "picture size in pixels, even numbers from 16 to 8192 (default: the scene's)")
+  c->add_option("--size", a.size,
+                "picture size in pixels, from 16 to 8192, of videos even numbers (default: the scene's)")
       ->type_name("WxH");
   c->add_option(
        "--quality", a.quality,

@@ -178,6 +178,31 @@ TEST_F(Outputs, SizesThatCannotBeDrawnAreRefused) {
   EXPECT_TRUE(contents().empty());
 }
 
+TEST_F(Outputs, OnlyVideosNeedEvenSizes) {
+  const std::vector<std::string> one{"--frames", "0:1", "--show", "caption"};
+  const auto picture = [&](const std::string& size, const std::string& view) {
+    std::vector<std::string> words{"--size", size, "--view", view, "-o", size + view};
+    words.insert(words.end(), one.begin(), one.end());
+    const ProgramResult r = render(words);
+    EXPECT_EQ(r.exitCode, 0) << r.err;
+    return readPng(folder / (size + view + "/00000.png"));
+  };
+  const Image odd = picture("131x97", "tissue"), even = picture("132x98", "tissue");
+  ASSERT_EQ(odd.width, 131);
+  ASSERT_EQ(odd.height, 97);
+  int differing = 0;  // below the caption
+  for (int y = 30; y < 97; ++y)
+    for (int k = 0; k < 4 * 131; ++k) differing += odd.pixels[4 * 131 * y + k] != even.pixels[4 * 132 * y + k];
+  EXPECT_EQ(differing, 0);
+  const Image sides = picture("131x97", "tissue,model");
+  EXPECT_EQ(sides.width, 131);
+  EXPECT_EQ(sides.height, 97);
+  ASSERT_EQ(render({"--still", "0", "--size", "131x97"}).exitCode, 0);
+  EXPECT_EQ(readPng(folder / "organ.png").width, 131);
+  expectRefused(render({"--size", "131x97", "-o", "frames", "-o", "a.gif"}), "--size 131x97: expected even numbers");
+  expectRefused(render({"--size", "15x97", "-o", "frames"}), "--size 15x97: expected numbers from 16 to 8192");
+}
+
 TEST_F(Outputs, ALinkIsFollowedAndStays) {
   fs::create_directory(folder / "elsewhere");
   for (const char* name : {"still.png", "film.gif"}) {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <tuple>
@@ -9,6 +10,7 @@
 #include "app/files/input_error.h"
 #include "app/files/output_file.h"
 #include "app/interrupt.h"
+#include "render/video_writer.h"
 
 namespace medulla {
 
@@ -17,10 +19,12 @@ namespace {
 void applyOverrides(const RenderOptions& options, Scene& scene) {
   if (options.size) {
     std::tie(scene.width, scene.height) = *options.size;
-    const auto valid = [](int n) { return n >= 16 && n <= 8192 && n % 2 == 0; };
+    const bool video = !options.still && std::any_of(options.outputs.begin(), options.outputs.end(), isVideoName);
+    const auto valid = [video](int n) { return n >= 16 && n <= 8192 && !(video && n % 2 != 0); };
     if (!valid(scene.width) || !valid(scene.height))
-      throw std::runtime_error(fmt::format(
-          "--size {}x{}: expected even numbers from 16 to 8192 (video needs them even)", scene.width, scene.height));
+      throw std::runtime_error(fmt::format("--size {}x{}: expected {}numbers from 16 to 8192{}", scene.width,
+                                           scene.height, video ? "even " : "",
+                                           video ? " (video needs them even)" : ""));
   }
   if (options.fps) scene.fps = *options.fps;
 }
