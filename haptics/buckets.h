@@ -70,8 +70,7 @@ class Buckets {
   const BlendedSurface& surface() const;
 
   // The two frames to blend from now on, the steps of the commit before and the tools' forces (BlendedSurface).
-  // Bounding spheres are
-  // renewed around both frames; Embree's bounds only by refitNear().
+  // Bounding spheres are renewed around both frames; Embree's bounds only by refitNear().
   void commit(const DynamicsFrame& from, const DynamicsFrame& to,
               const std::array<std::vector<Eigen::Vector3d>, 3>& stepsBefore,
               const std::array<std::vector<Eigen::Vector3d>, 2>& toolForce = {});

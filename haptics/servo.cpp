@@ -92,11 +92,6 @@ static std::span<const ProxyContact> touchedContacts(const Tool& tool) {
   return proxy.inContact() ? std::span(proxy.contacts).first(proxy.contactCount) : std::span(&tool.lastContact, 1);
 }
 
-static TissueMotion touchedMotion(const BlendedSurface& surface, double alpha, const Vector3d& normal,
-                                  const Tool& tool) {
-  return contactMotion(surface, alpha, touchedContacts(tool), normal, tool.settings.stiffness, tool.motion);
-}
-
 // A push, as far as the dynamics can have it by now: what the tissue gave one and a half frames ago, give or take what
 // it can have changed since. Where a stiff tool meets limp tissue, a place that is off by a tenth of a millimetre is
 // several times the force.
@@ -133,7 +128,8 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   const double spring = tool.settings.stiffness * depth;
   tool.largestPush = std::max(tool.largestPush, spring);
   tool.motion.way[0] += std::max(way.dot(normal), -std::max(0.0, depth)) * normal;  // from where it touched
-  const Vector3d motion = motionForce(tool, touchedMotion(surface, alpha, normal, tool));
+  const Vector3d motion = motionForce(
+      tool, contactMotion(surface, alpha, touchedContacts(tool), normal, tool.settings.stiffness, tool.motion));
   const double estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
   const double push = keptToTissue(surface, alpha, normal, tool, estimate);
   return proxy.slipping
