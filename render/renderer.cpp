@@ -51,10 +51,10 @@ struct Framebuffer {
 };
 
 void checkSettings(const RendererSettings& s) {
-  const auto bad = [](int v) { return v < 16 || v > 8192 || v % 2 != 0; };
+  const auto bad = [](int v) { return v < 16 || v > 8192; };
   if (bad(s.width) || bad(s.height))
     throw std::runtime_error("picture size " + std::to_string(s.width) + "x" + std::to_string(s.height) +
-                             ", expected even numbers from 16 to 8192");
+                             ", expected whole numbers from 16 to 8192");
   assert(s.supersample >= 1 && s.supersample <= 4);
 }
 
@@ -213,9 +213,9 @@ void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
   glClearColor(0.02f, 0.01f, 0.01f, 1);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   if (picture.view == ViewKind::model) model.drawBackdrop();
-  const auto scaled = [&view](int side) { return int(float(side) * view.overscan); };
-  const int w = scaled(fineWidth), h = scaled(fineHeight);
-  glViewport((fineWidth - w) / 2, (fineHeight - h) / 2, w, h);
+  const auto beyond = [&view](int side) { return int(std::lround(float(side) * 0.5f * (view.overscan - 1))); };
+  const int x = beyond(fineWidth), y = beyond(fineHeight);
+  glViewport(-x, -y, fineWidth + 2 * x, fineHeight + 2 * y);
   if (view.round) tissue.drawMask(view);
   tissue.upload(lit, lists, shadowIfOn());
 

@@ -116,7 +116,7 @@ struct Picture {
 };
 
 struct RendererSettings {
-  int width = 1280, height = 720;  // 16..8192, even
+  int width = 1280, height = 720;  // 16..8192
   std::string context = "auto";    // auto | osmesa | egl
   bool shadows = true, antialias = true;
   int supersample = 1;  // 1 to 4: every pixel is the mean, in light, of its square

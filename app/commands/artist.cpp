@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "app/interrupt.h"
@@ -18,22 +17,9 @@ namespace {
 // Two that are drawn, one that waits, one that is composed: more only costs memory.
 constexpr int kSheets = 4;
 
-// The renderer draws even sizes alone, as videos need them. Of other pictures the last column and row are cut off.
-int evenUp(int length) {
-  return (length + 1) / 2 * 2;
-}
-
-void cutTo(int width, int height, Image& image) {
-  for (int y = 1; y < height; ++y)
-    std::copy_n(&image.pixels[4ul * image.width * y], 4ul * width, &image.pixels[4ul * width * y]);
-  image = {width, height, std::move(image.pixels)};
-  image.pixels.resize(4ul * width * height);
-}
-
 // What several panels leave over stays black between them.
 int panelWidth(const Scene& scene, const ViewOptions& view) {
-  const int count = static_cast<int>(view.panels.size());
-  const int width = count == 1 ? evenUp(scene.width) : scene.width / count / 2 * 2;
+  const int count = static_cast<int>(view.panels.size()), width = scene.width / count;
   if (width < 16)
     throw std::runtime_error(fmt::format("{} pictures side by side: expected a width of {} at least, not {}", count,
                                          16 * count, scene.width));
@@ -78,7 +64,7 @@ struct Artist::Desk {
 
   Desk(const LoadedScene& loaded, const RenderOptions& options, int first, int count, int width,
        const DynamicsFrame& rest)
-      : renderer(rendererSettings(width, evenUp(loaded.scene.height), options.context, options.quality)),
+      : renderer(rendererSettings(width, loaded.scene.height, options.context, options.quality)),
         view(loaded, rest, renderer),
         outputs(options.outputs, outputSettings(loaded, options, first, count, renderer.description())),
         image(blackImage(loaded.scene.width, loaded.scene.height)),
@@ -160,21 +146,17 @@ void Artist::drawAll() {
 
 void Artist::takePanel() {
   Desk& desk = *desk_;
-  const Scene& scene = loaded_->scene;
-  const int count = static_cast<int>(options_->view.panels.size());
-  const int width = std::min(panelWidth_, scene.width), room = scene.width - width;
-  Image& image = count == 1 ? desk.image : desk.panel;
-  desk.renderer.take(image, &times_);
+  const int count = static_cast<int>(options_->view.panels.size()), room = loaded_->scene.width - panelWidth_;
+  desk.renderer.take(count == 1 ? desk.image : desk.panel, &times_);
   --desk.ahead;
-  if (image.width != width || image.height != scene.height) cutTo(width, scene.height, image);
-  if (count > 1) copyInto(image, desk.taken * room / (count - 1), desk.image);
+  if (count > 1) copyInto(desk.panel, desk.taken * room / (count - 1), desk.image);
   if (++desk.taken < count) return;
   desk.taken = 0;
   std::unique_ptr<Sheet> sheet = std::move(desk.begun.front());
   desk.begun.pop_front();
   times_.start("letters");
   if (sheet->chart) drawStripChart(*sheet->chart, desk.image);
-  if (!sheet->caption.empty()) drawCaption(sheet->caption, width, desk.image);
+  if (!sheet->caption.empty()) drawCaption(sheet->caption, panelWidth_, desk.image);
   times_.start("hand over");
   desk.outputs.write(sheet->number, desk.image);
   ++drawn_;
