@@ -51,13 +51,15 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   const double firm = std::clamp((input.grip - kHeld) / (kFirm - kHeld), 0.0, 1.0);
   instrument.hold = state.holding ? float(firm * firm * (3 - 2 * firm)) : 0.f;
   // A dent as deep as Hertz's contact has it for a tip of 3 mm in tissue of some 10 kPa, up to what stays a dent.
-  constexpr double kDeepest = 4e-3, kSoft = 0.15;  // m, at scale 1; N
+  constexpr double kDeepest = 4e-3, kSoft = 0.3;  // m, at scale 1; N
   const double force = state.force.norm();
   if (state.inContact && force > 0)
     instrument.press = toGlm(-kDeepest * instrument.scale * (1 - std::exp(-force / kSoft)) / force * state.force);
   // The picture shows the proxy: an instrument never enters the tissue, its device may. The proxy is a sphere, the jaws
   // reach to its far side along the shaft.
-  instrument.press *= 1 - instrument.hold;
+  // What a grip pulls at does not give way.
+  const bool pulls = state.holding && glm::dot(instrument.press, instrument.worldFromTool * glm::vec3(0, 0, 1)) > 0;
+  instrument.press *= pulls ? 0.f : 1 - instrument.hold;
   instrument.tip =
       toGlm(state.proxy - tool.settings.radius * (input.worldFromTool * Eigen::Vector3d::UnitZ())) + instrument.press;
   picture.instruments.push_back(instrument);

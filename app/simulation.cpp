@@ -117,7 +117,7 @@ void Simulation::advanceDynamics() {
   world_.readFrame(current_);
   // Without tools nobody feels the surface; a servo that runs elsewhere waits for it all the same.
   if (isAwaited_ || !loaded_->trajectories.empty())
-    servo_->commit(previous_, current_, record_.tools[ticksPerFrame_], &report.toolImpulse);
+    servo_->commit(previous_, current_, record_.tools[ticksPerFrame_], &report.toolImpulse, isAwaited_ ? 1 : 0);
   times_.dynamics = stepped - start;
   times_.surface = wallSeconds() - stepped;
   ++frame_;

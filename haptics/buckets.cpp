@@ -267,13 +267,14 @@ const BlendedSurface& Buckets::surface() const {
 
 void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to,
                      const std::array<std::vector<Vector3d>, 3>& stepsBefore,
-                     const std::array<std::vector<Vector3d>, 2>& toolForce) {
+                     const std::array<std::vector<Vector3d>, 2>& toolForce, double toolForceAge) {
   BlendedSurface& surface = data_->surface;
   assert(stepsBefore[0].size() == surface.from.size());
   copyNodes(from, surface.from);
   copyNodes(to, surface.to);
   surface.duration = to.time - from.time;
   surface.toolForce = toolForce;
+  surface.toolForceAge = toolForceAge;
   surface.steps[2] = stepsBefore[1];
   surface.steps[1] = stepsBefore[0];
   for (std::size_t n = 0; n < surface.from.size(); ++n) surface.steps[0][n] = surface.to[n] - surface.from[n];

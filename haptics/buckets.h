@@ -31,8 +31,9 @@ struct BlendedSurface {
   std::array<std::vector<Eigen::Vector3d>, 3> steps;
   double duration = 0;  // s, between the two frames
   // N, by each tool on what it touched, means over the frame between `from` and `to`, and over the one before; empty:
-  // not known.
+  // not known. Blended between them, so many frames old.
   std::array<std::vector<Eigen::Vector3d>, 2> toolForce;
+  double toolForceAge = 1.5;
 
   Eigen::Vector3d node(int n, double alpha) const { return blendPoint(from[n], to[n], alpha); }
   // What a node moves within one frame at its present velocity, m; continuous from frame to frame.
@@ -73,7 +74,7 @@ class Buckets {
   // Bounding spheres are renewed around both frames; Embree's bounds only by refitNear().
   void commit(const DynamicsFrame& from, const DynamicsFrame& to,
               const std::array<std::vector<Eigen::Vector3d>, 3>& stepsBefore,
-              const std::array<std::vector<Eigen::Vector3d>, 2>& toolForce = {});
+              const std::array<std::vector<Eigen::Vector3d>, 2>& toolForce = {}, double toolForceAge = 1.5);
   // Renews Embree's bounds in the buckets within largestRadius + `distance` (m) of `centre`. Buckets that are left out
   // are searched triangle by triangle, with the same result.
   void refitNear(const Eigen::Vector3d& centre, double distance);

@@ -32,7 +32,8 @@ struct Tool {
   Vector3d lastFelt = Vector3d::Zero();  // unit; along which it was felt
   double largestPush = 0;                // N, of the coupling's spring during this contact
   DeviceMotion motion;                   // in this contact or grip
-  double clampScale = 1;                 // of the force and of the springs, at the last tick
+  double estimate = 0;                   // N, of the push at the last tick, before it was kept to the tissue's
+  double springScale = 1;                // of the springs handed over: less than 1 beyond forceMax
   int ticks = 0;                         // in this frame
   bool isLeaving = false;
 };
@@ -92,23 +93,23 @@ static std::span<const ProxyContact> touchedContacts(const Tool& tool) {
   return proxy.inContact() ? std::span(proxy.contacts).first(proxy.contactCount) : std::span(&tool.lastContact, 1);
 }
 
-// A push, as far as the dynamics can have it by now: what the tissue gave one and a half frames ago, give or take what
-// it can have changed since. Where a stiff tool meets limp tissue, a place that is off by a tenth of a millimetre is
-// several times the force.
+// A push, as far as the dynamics can have it by now: what the tissue gave some frames ago, give or take what it can
+// have changed since. Where a stiff tool meets limp tissue, a place that is off by a tenth of a millimetre is several
+// times the force.
 static double keptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal, const Tool& tool,
                            double push) {
   if (surface.toolForce[0].empty()) return push;
   const Vector3d force = blendPoint(surface.toolForce[1][tool.index], surface.toolForce[0][tool.index], alpha);
   const double given = std::max(0.0, -force.dot(normal));
-  const double since = pushSince(surface, alpha, touchedContacts(tool), normal, tool.settings.stiffness, tool.motion);
+  const double since = pushSince(surface, alpha, touchedContacts(tool), normal, tool.settings, tool.motion);
   return std::clamp(push, std::max(0.0, given - since), given + since);
 }
 
 // Coulomb's, about the unit vector `axis`.
 static Vector3d withinCone(const Vector3d& force, const Vector3d& axis, double friction) {
   const Vector3d across = tangential(force, axis);
-  const double along = force.dot(axis), size = across.norm(), most = friction * std::max(0.0, along);
-  return size > most ? Vector3d(along * axis + most / size * across) : force;
+  const double along = std::max(0.0, force.dot(axis)), size = across.norm(), most = friction * along;
+  return along * axis + (size > most ? most / size : 1) * across;
 }
 
 // The coupling of a contact that pushes, or that the tool is leaving: along the normal the spring, negative once the
@@ -130,8 +131,8 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   tool.motion.way[0] += std::max(way.dot(normal), -std::max(0.0, depth)) * normal;  // from where it touched
   const Vector3d motion = motionForce(
       tool, contactMotion(surface, alpha, touchedContacts(tool), normal, tool.settings.stiffness, tool.motion));
-  const double estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
-  const double push = keptToTissue(surface, alpha, normal, tool, estimate);
+  tool.estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
+  const double push = keptToTissue(surface, alpha, normal, tool, tool.estimate);
   return proxy.slipping
              ? Vector3d(push * normal)
              : withinCone(push * normal + tangential(motion, normal), tool.lastFelt, tool.settings.staticFriction);
@@ -165,8 +166,10 @@ static void followLeaving(const BlendedSurface& surface, double alphaBefore, dou
 static void record(const Vector3d& force, Tool& tool, ToolState& state) {
   const double size = force.norm();
   state.clamped = size > tool.settings.forceMax;
-  tool.clampScale = state.clamped ? tool.settings.forceMax / size : 1;
-  state.force = tool.clampScale * force;
+  state.force = state.clamped ? Vector3d(tool.settings.forceMax / size * force) : force;
+  // By the estimate, for what the tissue gives has followed softer springs before.
+  const double most = std::max(size, tool.estimate);
+  tool.springScale = most > tool.settings.forceMax ? tool.settings.forceMax / most : 1;
   state.device = tool.device.position;
   state.proxy = tool.proxy.centre;
   state.holding = !tool.grip.held.empty();
@@ -198,6 +201,7 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
 static bool feelGrip(const BlendedSurface& surface, double alpha, const Vector3d& way, Tool& tool, ToolState& state) {
   if (tool.grip.held.empty()) return false;
   tool.motion.way[0] += way;
+  tool.estimate = 0;
   const Vector3d force = heldForce(surface, alpha, tool);
   if (std::min(force.norm(), tool.settings.forceMax) > tool.settings.gripForceMax) {
     letSlip(tool.grip);
@@ -253,17 +257,18 @@ bool Servo::beginFrame() {
 // ---- Dynamics' side --------------------------------------------------------------------------------------
 
 void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<ToolState>& tools,
-                   const std::vector<Vector3d>* toolImpulse) {
+                   const std::vector<Vector3d>* toolImpulse, int framesLate) {
   constexpr double kTravel = 0.02;  // m that a tool moves in a frame at 1 m/s and 50 Hz
   if (toolImpulse != nullptr) {
     auto& [last, before] = data_->toolForce;
+    const bool isFirst = last.empty();
     before = last;
     last.assign(data_->tools.size(), Vector3d::Zero());
-    before.resize(last.size(), Vector3d::Zero());
     for (std::size_t k = 0; k < toolImpulse->size(); ++k) last[k] = (*toolImpulse)[k] / (to.time - from.time);
+    if (isFirst) before = last;  // a tool may start in contact
   }
   Buckets& buckets = data_->surfaces.writing();
-  buckets.commit(from, to, data_->steps, data_->toolForce);
+  buckets.commit(from, to, data_->steps, data_->toolForce, 1.5 + framesLate);
   data_->steps = buckets.surface().steps;
   for (const ToolState& tool : tools) buckets.refitNear(tool.proxy, (tool.device - tool.proxy).norm() + kTravel);
   data_->surfaces.publish();
@@ -315,8 +320,8 @@ static void handOverContact(const BlendedSurface& surface, const Tool& tool, int
   spring.anchor = contact.point + stretch * contact.normal + drag;
   spring.anchorVelocity = path.velocity;
   spring.outward = contact.normal;
-  spring.stiffness = tool.clampScale * settings.stiffness * share;
-  spring.damping = tool.clampScale * settings.damping * share;
+  spring.stiffness = tool.springScale * settings.stiffness * share;
+  spring.damping = tool.springScale * settings.damping * share;
   spring.slides = proxy.slipping;
   spring.friction = settings.dynamicFriction;
 }
@@ -372,8 +377,8 @@ static void handOverGrip(const BlendedSurface& surface, const Tool& tool, int in
     node.node = held.node - surface.firstNode[body];
     node.anchor = target;
     node.anchorVelocity = (target - heldTarget(start, held)) / frameDuration;
-    node.stiffness = tool.clampScale * tool.settings.stiffness * share;
-    node.damping = tool.clampScale * tool.settings.damping * share;
+    node.stiffness = tool.springScale * tool.settings.stiffness * share;
+    node.damping = tool.springScale * tool.settings.damping * share;
   }
 }
 

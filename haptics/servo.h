@@ -23,8 +23,8 @@ struct ToolState {
   Eigen::Vector3d device = Eigen::Vector3d::Zero();  // m
   // m, centre of the proxy sphere; while holding it rides on the held patch
   Eigen::Vector3d proxy = Eigen::Vector3d::Zero();
-  // N, on the hand, clamped: stiffness (proxy + its shading - device) + damping; while holding, the sum of the held
-  // nodes' springs
+  // N, on the hand, clamped: stiffness (proxy + its shading - device) + damping, the push kept to what the tissue gave;
+  // while holding, the sum of the held nodes' springs
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   bool inContact = false;
   bool holding = false;
@@ -46,9 +46,10 @@ class Servo {
 
   // Dynamics' side, after each dynamics frame: the two frames to blend next, `from` being the `to` of the last commit.
   // `tools` is about where the tools are: Embree's bounds are renewed near them. `toolImpulse` is what they gave in
-  // this frame (FrameReport, N s); null: not known, and no force is kept to it. Contents are copied.
+  // this frame (FrameReport, N s); null: not known, and no force is kept to it. It answers what tools did `framesLate`
+  // frames earlier than in logical time. Contents are copied.
   void commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<ToolState>& tools,
-              const std::vector<Eigen::Vector3d>* toolImpulse = nullptr);
+              const std::vector<Eigen::Vector3d>* toolImpulse = nullptr, int framesLate = 0);
 
   // The rest is the servo's side; none of it allocates or locks.
 

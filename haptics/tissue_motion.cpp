@@ -58,12 +58,12 @@ double contactGive(const BlendedSurface& surface, std::span<const ProxyContact> 
   return shares > 0 ? sum / (shares * shares) : 0;
 }
 
-}  // namespace
-
 // m, of the point that is touched, within a frame at its present velocity.
 Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyContact& contact) {
   return blendPoint(meanOver(surface, contact, surface.steps[1]), meanOver(surface, contact, surface.steps[0]), alpha);
 }
+
+}  // namespace
 
 void beginContact(const BlendedSurface& surface, double alpha, const ProxyContact& contact, const Vector3d& normal,
                   double stiffness, DeviceMotion& device) {
@@ -111,22 +111,22 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
 }
 
 double pushSince(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
-                 const Vector3d& normal, double stiffness, const DeviceMotion& device) {
-  constexpr double kFrames = 1.5;
+                 const Vector3d& normal, const ToolSettings& tool, const DeviceMotion& device) {
   Vector3d step = Vector3d::Zero();
   double shares = 0;
   for (const ProxyContact& contact : contacts) {
     step += contact.share * contactStep(surface, alpha, contact);
     shares += contact.share;
   }
-  double way = 0, frames = kFrames;  // of the device
-  for (int k = 0; frames > 0; ++k) {
+  double way = 0, frames = surface.toolForceAge;  // of the device
+  for (std::size_t k = 0; frames > 0 && k < device.way.size(); ++k) {
     const double within = std::min(frames, k == 0 ? alpha : 1.0);
     way += (k == 0 ? 1 : within) * std::abs(normal.dot(device.way[k]));
     frames -= within;
   }
-  const double longer = std::max(way, kFrames / shares * std::abs(normal.dot(step)));
-  return stiffness * (1 - followedPart(stiffness, contactGive(surface, contacts))) * longer;
+  const double longer = std::max(way, surface.toolForceAge / shares * std::abs(normal.dot(step)));
+  const double yields = followedPart(tool.stiffness, contactGive(surface, contacts));
+  return (1 - yields) * (tool.stiffness * longer + tool.damping * std::abs(normal.dot(device.velocity)));
 }
 
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,

@@ -42,10 +42,10 @@ struct TissueMotion {
 TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
                            const Eigen::Vector3d& normal, double stiffness, const DeviceMotion& device);
 
-// N: by how much a push along `normal` can differ from what it was one and a half frames ago, by what device and tissue
-// went since and the stiffness of both in series.
+// N: by how much a push along `normal` can differ from what it was BlendedSurface::toolForceAge ago: by what device and
+// tissue went since and the stiffness of tool and tissue in series, and by the tool's damper.
 double pushSince(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
-                 const Eigen::Vector3d& normal, double stiffness, const DeviceMotion& device);
+                 const Eigen::Vector3d& normal, const ToolSettings& tool, const DeviceMotion& device);
 
 // Mean over what a grip holds.
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,

@@ -213,7 +213,7 @@ void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
   glClearColor(0.02f, 0.01f, 0.01f, 1);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   if (picture.view == ViewKind::model) model.drawBackdrop();
-  const auto beyond = [&view](int side) { return int(std::lround(float(side) * 0.5f * (view.overscan - 1))); };
+  const auto beyond = [&view](int side) { return int(float(side) * 0.5f * (view.overscan - 1)); };
   const int x = beyond(fineWidth), y = beyond(fineHeight);
   glViewport(-x, -y, fineWidth + 2 * x, fineHeight + 2 * y);
   if (view.round) tissue.drawMask(view);

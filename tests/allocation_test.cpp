@@ -77,10 +77,10 @@ TEST(Servo, AllocatesNothingOnItsSide) {
     }
     servo.handOver(0.02, loads);
     allocated += allocations - before;
-    body.advance(loads, 0.02, 200);
+    const std::vector<Eigen::Vector3d> impulses{body.advance(loads, 0.02, 200)};
     last = now;
     now = body.frame();
-    servo.commit(last, now, servo.tools());
+    servo.commit(last, now, servo.tools(), &impulses);
   }
   EXPECT_TRUE(contact && held && slipped);
   EXPECT_EQ(allocated, 0);

@@ -184,6 +184,36 @@ TEST(Servo, PressingSoftTissueHasNoForceStepsAndOneContact) {
   EXPECT_EQ(changes, 2);
 }
 
+// // Live, too, where the tissue answers a frame later: what the hand is kept to must not be taken for newer than it
+// is.
+TEST(Servo, StrokesOnSoftTissueNeverGiveEnergy) {
+  for (const bool live : {false, true}) {
+    ToolRun run = pressing(0.1);
+    run.live = live;
+    run.device = [](double t) { return deviceAt({0.012, 0.004, 0.0545 - 0.008 * (1 - std::cos(8 * t))}); };
+    double most = 0, largest = 0;
+    run.run(2.4, [&](double, const ToolState& tool) {
+      most = std::max(most, tool.energy);
+      largest = std::max(largest, tool.force.norm());
+    });
+    EXPECT_GT(largest, 0.3) << live;
+    EXPECT_LT(most, 1e-5) << live;  // J
+  }
+}
+
+TEST(Servo, APressBeyondForceMaxIsClampedForHandAndTissue) {
+  ToolRun run = pressing(0.05);
+  run.tool.forceMax = 0.1;
+  run.device = [](double t) { return deviceAt({0.012, 0.004, 0.0585 - std::min(0.016, 0.02 * t)}); };
+  ToolState last;
+  run.run(2, [&](double, const ToolState& tool) {
+    ASSERT_LE(tool.force.norm(), 0.1 * (1 + 1e-12));
+    last = tool;
+  });
+  EXPECT_TRUE(last.clamped);
+  EXPECT_LT((run.body.advance(run.loads, 0.02, 200) / 0.02 + last.force).norm(), 0.05 * last.force.norm());
+}
+
 // However the device swings about where it sticks, it feels no more across than static friction carries.
 TEST(Servo, StickingForceStaysWithinTheFrictionCone) {
   const TouchShape shape = plate(10, 0.03, thickness, 5);

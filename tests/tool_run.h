@@ -21,10 +21,12 @@ struct ToolRun {
   double bodyImpulseLength = 0;                           // N s, sum over frames of its size
   bool blend = true;                                      // false: every tick at the newest frame
   std::vector<double> give{};                             // TouchableBody::give
+  bool live = false;                                      // what was handed over waits for a frame
 
   void run(double duration, const std::function<void(double time, const ToolState&)>& each = {}) {
     const double frameDuration = ticksPerFrame * tickDuration;
     DynamicsFrame last = body.frame(), now = last;
+    Loads earlier;
     Servo servo({{body.shape, give}}, {tool}, tickDuration, now, {device(0)});
     const int frames = int(std::lround(duration / frameDuration));
     for (int frame = 0; frame < frames; ++frame) {
@@ -35,13 +37,14 @@ struct ToolRun {
         if (each) each(time, servo.tools()[0]);
       }
       servo.handOver(frameDuration, loads);
-      const Eigen::Vector3d impulse = body.advance(loads, frameDuration, 200);
+      const Eigen::Vector3d impulse = body.advance(live ? earlier : loads, frameDuration, 200);
+      earlier = loads;
       bodyImpulse += impulse;
       bodyImpulseLength += impulse.norm();
       last = now;
       now = body.frame();
       const std::vector<Eigen::Vector3d> impulses{impulse};
-      servo.commit(last, now, servo.tools(), &impulses);
+      servo.commit(last, now, servo.tools(), &impulses, live ? 1 : 0);
       servo.beginFrame();
     }
   }
