@@ -33,8 +33,8 @@ struct Camera {
 };
 
 // Cameras of scenes are set up for 16:9. A much narrower picture, a half of a split one or one held upright, is to show
-// three quarters of that from side to side: so much more from top to bottom, and the endoscope's round picture is so much
-// smaller.
+// three quarters of that from side to side: so much more from top to bottom, and the endoscope's round picture is so
+// much smaller.
 float widening(float aspect);
 
 // Light scattered by air or water: it fills the background, reaches what the lamp does not, and veils what is far away:

@@ -150,7 +150,7 @@ void requireComplete(const XmlElement& root, const RecordingMap& map) {
   if (!grip.where.empty() && layout.grip.empty())
     refuse(grip, "", "there is no grip column, expected one in <columns>");
   if (layout.rate > 0 && units.find("time")) refuse(units, "time", "there is a rate, expected no unit of time");
-  const auto splitsTime = [](const RecordingColumns& columns) { return columns.time.size() == 2; };
+  const auto splitsTime = [](const RecordingColumns& of) { return of.time.size() == 2; };
   if (std::any_of(map.layouts.begin(), map.layouts.end(), splitsTime) && units.find("time"))
     refuse(units, "time", "times are in columns of seconds and nanoseconds, expected no unit of time");
   if (map.writeState && !columns.where.empty()) refuse(columns, "", "map=\"sofa\" is no table, expected none");

@@ -119,10 +119,10 @@ double settle(WorldData& d, const SettlingSpring& s, Vector3d& force) {
   for (int i = 0; i < p.count; ++i) v += p.weights[i] * nodeVelocity(d, p.nodes[i], s.hosts[i]);
   const Vector3d wanted = p.stiffness * (p.anchor - s.place - h * v) + p.damping * (p.anchorVelocity - v);
   Vector3d next = force + (wanted - force) / (1 + gain * s.mobility);
-  if (p.outward != nullptr) next -= std::max(0.0, next.dot(*p.outward)) * *p.outward;
-  if (p.slides) {
-    const double push = -next.dot(*p.outward);
-    next = dragOf(s, v, force, push, h) - push * *p.outward;
+  if (p.outward != nullptr) {
+    const Vector3d& n = *p.outward;
+    const double along = next.dot(n), push = std::max(0.0, -along);
+    next = p.slides ? Vector3d(dragOf(s, v, force, push, h) - push * n) : Vector3d(next - std::max(0.0, along) * n);
   }
   const Vector3d change = next - force;
   addImpulse(d, s, h * change);
