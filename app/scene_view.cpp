@@ -55,11 +55,11 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   const double force = state.force.norm();
   if (state.inContact && force > 0)
     instrument.press = toGlm(-kDeepest * instrument.scale * (1 - std::exp(-force / kSoft)) / force * state.force);
-  // The picture shows the proxy: an instrument never enters the tissue, its device may. The proxy is a sphere, the jaws
-  // reach to its far side along the shaft.
   // What a grip pulls at does not give way.
   const bool pulls = state.holding && glm::dot(instrument.press, instrument.worldFromTool * glm::vec3(0, 0, 1)) > 0;
   instrument.press *= pulls ? 0.f : 1 - instrument.hold;
+  // The picture shows the proxy: an instrument never enters the tissue, its device may. The proxy is a sphere, the jaws
+  // reach to its far side along the shaft.
   instrument.tip =
       toGlm(state.proxy - tool.settings.radius * (input.worldFromTool * Eigen::Vector3d::UnitZ())) + instrument.press;
   picture.instruments.push_back(instrument);

@@ -21,13 +21,12 @@ static void holdPatch(const BlendedSurface& surface, double alpha, const Proxy& 
   const std::array<int, 3>& touched = surface.triangles[contact.triangle];
   const int body = surface.bodyOfNode[touched[0]];
   const Eigen::Quaterniond toolFromWorld = device.worldFromTool.conjugate();
-  const Eigen::Vector3d felt = proxy.centre + proxy.shading;
   for (int n = surface.firstNode[body]; n < int(surface.from.size()) && surface.bodyOfNode[n] == body; ++n) {
     const Eigen::Vector3d x = surface.node(n, alpha);
     const bool isTouched = std::find(touched.begin(), touched.end(), n) != touched.end();
     if (!isTouched && (x - contact.point).norm() > gripRadius) continue;
     assert(grip.held.size() < grip.held.capacity());
-    grip.held.push_back({n, toolFromWorld * (x - felt)});
+    grip.held.push_back({n, toolFromWorld * (x - device.position)});
   }
   grip.give = heldGive(surface, grip);
 }

@@ -20,9 +20,8 @@ struct Grip {
 };
 
 // Opens or closes by the sample's grip (closed above 0.5). Closing in contact holds every node of the touched body
-// within gripRadius of the contact point, and at least the three of the touched triangle. A node's offset is measured
-// from where the proxy is felt, not from the device: the springs then start with exactly the force that the contact
-// had. `grip.held` must have room for every node of the surface: nothing is allocated here.
+// within gripRadius of the contact point, and at least the three of the touched triangle, where they are: the springs
+// are slack then. `grip.held` must have room for every node of the surface: nothing is allocated here.
 void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
                 double gripRadius, Grip& grip);
 

@@ -96,12 +96,12 @@ static std::span<const ProxyContact> touchedContacts(const Tool& tool) {
 // A push, as far as the dynamics can have it by now: what the tissue gave some frames ago, give or take what it can
 // have changed since. Where a stiff tool meets limp tissue, a place that is off by a tenth of a millimetre is several
 // times the force.
-static double keptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal, const Tool& tool,
-                           double push) {
+static double keptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal,
+                           const TissueMotion& tissue, const Tool& tool, double push) {
   if (surface.toolForce[0].empty()) return push;
   const Vector3d force = blendPoint(surface.toolForce[1][tool.index], surface.toolForce[0][tool.index], alpha);
   const double given = std::max(0.0, -force.dot(normal));
-  const double since = pushSince(surface, alpha, touchedContacts(tool), normal, tool.settings, tool.motion);
+  const double since = pushSince(surface, alpha, tissue, normal, tool.settings, tool.motion);
   return std::clamp(push, std::max(0.0, given - since), given + since);
 }
 
@@ -129,10 +129,11 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   const double spring = tool.settings.stiffness * depth;
   tool.largestPush = std::max(tool.largestPush, spring);
   tool.motion.way[0] += std::max(way.dot(normal), -std::max(0.0, depth)) * normal;  // from where it touched
-  const Vector3d motion = motionForce(
-      tool, contactMotion(surface, alpha, touchedContacts(tool), normal, tool.settings.stiffness, tool.motion));
+  const TissueMotion tissue =
+      contactMotion(surface, alpha, touchedContacts(tool), normal, tool.settings.stiffness, tool.motion);
+  const Vector3d motion = motionForce(tool, tissue);
   tool.estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
-  const double push = keptToTissue(surface, alpha, normal, tool, tool.estimate);
+  const double push = keptToTissue(surface, alpha, normal, tissue, tool, tool.estimate);
   return proxy.slipping
              ? Vector3d(push * normal)
              : withinCone(push * normal + tangential(motion, normal), tool.lastFelt, tool.settings.staticFriction);
@@ -301,7 +302,7 @@ static double comeOff(const Proxy& proxy, const ProxyContact& contact) {
 // is the contact point: anchor = device + (contact point - proxy). Its tangential part is limited to what friction
 // carries; where the contact slips the spring slides. Beyond forceMax all springs are softer, so that the tissue feels
 // no more than the hand: nearer anchors would be as stiff against what the tissue moves within the frame.
-static void handOverContact(const BlendedSurface& surface, const Tool& tool, int index, const Path& path,
+static void handOverContact(const BlendedSurface& surface, const Tool& tool, const Path& path,
                             const ProxyContact& contact, double share, Loads& out) {
   const ToolSettings& settings = tool.settings;
   const Proxy& proxy = tool.proxy;
@@ -313,7 +314,7 @@ static void handOverContact(const BlendedSurface& surface, const Tool& tool, int
   const auto& nodes = surface.triangles[contact.triangle];
   const int body = surface.bodyOfNode[nodes[0]], first = surface.firstNode[body];
   ToolSpring& spring = out.toolSprings.emplace_back();
-  spring.tool = index;
+  spring.tool = tool.index;
   spring.body = body;
   spring.nodes = {nodes[0] - first, nodes[1] - first, nodes[2] - first};
   spring.weights = {contact.weights.x(), contact.weights.y(), contact.weights.z()};
@@ -344,7 +345,7 @@ static double makeUpFor(const Proxy& proxy, const Path& path, const std::vector<
 // sum_j s_j c_j with c_i = n_i . p. Spring i is compressed by D c_i only, so its stiffness is k s_i / (c_i sum_j s_j
 // c_j); k s_i alone would lose cos^2 of the groove's angle. Bounded, so that a wedge does not ask for ever smaller
 // substeps.
-static void handOverContacts(const BlendedSurface& surface, double alpha, const Tool& tool, int index, const Path& path,
+static void handOverContacts(const BlendedSurface& surface, double alpha, const Tool& tool, const Path& path,
                              std::vector<ProxyContact>& contacts, Loads& out) {
   patchContacts(surface, alpha, tool.proxy, tool.patch, contacts);
   Vector3d push = Vector3d::Zero();
@@ -356,14 +357,14 @@ static void handOverContacts(const BlendedSurface& surface, double alpha, const 
   for (const ProxyContact& contact : contacts) meanCosine += contact.share * cosine(contact);
   const double stiffer = makeUpFor(tool.proxy, path, contacts);
   for (const ProxyContact& contact : contacts)
-    handOverContact(surface, tool, index, path, contact, stiffer * contact.share / (cosine(contact) * meanCosine), out);
-  if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, index, path, tool.lastContact, 1, out);
+    handOverContact(surface, tool, path, contact, stiffer * contact.share / (cosine(contact) * meanCosine), out);
+  if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.lastContact, 1, out);
 }
 
 // Every held node pulled to where the tool wants it, by an equal share of the tool's stiffness: pulling is as stiff as
 // pushing.
-static void handOverGrip(const BlendedSurface& surface, const Tool& tool, int index, const Path& path,
-                         double frameDuration, Loads& out) {
+static void handOverGrip(const BlendedSurface& surface, const Tool& tool, const Path& path, double frameDuration,
+                         Loads& out) {
   const double share = 1.0 / double(tool.grip.held.size());
   const int body = surface.bodyOfNode[tool.grip.held.front().node];
   ToolSample end = tool.device, start = tool.deviceAtFrameStart;
@@ -372,7 +373,7 @@ static void handOverGrip(const BlendedSurface& surface, const Tool& tool, int in
   for (const HeldOffset& held : tool.grip.held) {
     const Vector3d target = heldTarget(end, held);
     HeldNode& node = out.heldNodes.emplace_back();
-    node.tool = index;
+    node.tool = tool.index;
     node.body = body;
     node.node = held.node - surface.firstNode[body];
     node.anchor = target;
@@ -387,13 +388,12 @@ void Servo::handOver(double frameDuration, Loads& out) const {
   out.toolSprings.clear();
   out.heldNodes.clear();
   const BlendedSurface& surface = data_->surfaces.reading().surface();
-  for (std::size_t k = 0; k < data_->tools.size(); ++k) {
-    const Tool& tool = data_->tools[k];
+  for (const Tool& tool : data_->tools) {
     const Path path = devicePath(tool, frameDuration, data_->tickDuration);
     if (!tool.grip.held.empty())
-      handOverGrip(surface, tool, int(k), path, frameDuration, out);
+      handOverGrip(surface, tool, path, frameDuration, out);
     else
-      handOverContacts(surface, data_->alpha, tool, int(k), path, data_->contacts, out);
+      handOverContacts(surface, data_->alpha, tool, path, data_->contacts, out);
   }
 }
 

@@ -107,26 +107,20 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
   const double part = followedPart(stiffness, contactGive(surface, contacts));
   const Vector3d answered = wayOfStep(device, alpha);
   const Vector3d beyond = latestWay(device, alpha) - answered, faster = device.velocity - answered / surface.duration;
-  return {step + part * normal.dot(beyond) * normal, step / surface.duration + part * normal.dot(faster) * normal};
+  return {step + part * normal.dot(beyond) * normal, step / surface.duration + part * normal.dot(faster) * normal, step,
+          part};
 }
 
-double pushSince(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
-                 const Vector3d& normal, const ToolSettings& tool, const DeviceMotion& device) {
-  Vector3d step = Vector3d::Zero();
-  double shares = 0;
-  for (const ProxyContact& contact : contacts) {
-    step += contact.share * contactStep(surface, alpha, contact);
-    shares += contact.share;
-  }
+double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Vector3d& normal,
+                 const ToolSettings& tool, const DeviceMotion& device) {
   double way = 0, frames = surface.toolForceAge;  // of the device
   for (std::size_t k = 0; frames > 0 && k < device.way.size(); ++k) {
     const double within = std::min(frames, k == 0 ? alpha : 1.0);
     way += (k == 0 ? 1 : within) * std::abs(normal.dot(device.way[k]));
     frames -= within;
   }
-  const double longer = std::max(way, surface.toolForceAge / shares * std::abs(normal.dot(step)));
-  const double yields = followedPart(tool.stiffness, contactGive(surface, contacts));
-  return (1 - yields) * (tool.stiffness * longer + tool.damping * std::abs(normal.dot(device.velocity)));
+  const double longer = std::max(way, surface.toolForceAge * std::abs(normal.dot(tissue.step)));
+  return (1 - tissue.followed) * (tool.stiffness * longer + tool.damping * std::abs(normal.dot(device.velocity)));
 }
 
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,

@@ -35,6 +35,9 @@ void startFrame(DeviceMotion& device);
 struct TissueMotion {
   Eigen::Vector3d lead = Eigen::Vector3d::Zero();      // m, by now ahead of the blended surface
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s, by now
+  // Of touched tissue: what it moves within a frame, m, and the part of the device's way by which it follows.
+  Eigen::Vector3d step = Eigen::Vector3d::Zero();
+  double followed = 0;
 };
 
 // Mean over contacts that share a push along `normal`, by a device of this stiffness (N/m). The steps are in all
@@ -44,8 +47,8 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
 
 // N: by how much a push along `normal` can differ from what it was BlendedSurface::toolForceAge ago: by what device and
 // tissue went since and the stiffness of tool and tissue in series, and by the tool's damper.
-double pushSince(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
-                 const Eigen::Vector3d& normal, const ToolSettings& tool, const DeviceMotion& device);
+double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Eigen::Vector3d& normal,
+                 const ToolSettings& tool, const DeviceMotion& device);
 
 // Mean over what a grip holds.
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,

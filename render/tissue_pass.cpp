@@ -125,7 +125,7 @@ void TissuePass::drawMask(const Viewpoint& view) {
     const float a = 6.2831853f * float(k) / kMaskSegments;
     const glm::vec2 d(std::cos(a), std::sin(a));
     // A little outside the rim, which the post-process draws; the polygon's sides cut the corners by 0.05 %.
-    strip.push_back(2.004f * rimOuter(view.aspect) * d / glm::vec2(view.aspect, 1));
+    strip.push_back(2.004f * view.rim * d / glm::vec2(view.aspect, 1));
     strip.push_back(3.f * d);
   }
   glUseProgram(maskProgram_);

@@ -208,7 +208,7 @@ namespace {
 
 Surroundings makeSurroundings(const Viewpoint& view, const Light& light, const LightView& lightView,
                               const HazeField* haze, float time) {
-  const float corner = view.round ? 2 * rimOuter(view.aspect) : 1.6f * std::sqrt(1 + view.aspect * view.aspect);
+  const float corner = view.round ? 2 * view.rim : 1.6f * std::sqrt(1 + view.aspect * view.aspect);
   const float cone = std::atan(corner * view.tangent);
   Surroundings s{view, light, lightView, haze, time, std::cos(0.40f * cone), std::cos(std::min(1.07f * cone, 1.5f))};
   if (!haze) return s;

@@ -63,7 +63,7 @@ float widening(float aspect) {
 }
 
 float vignetteAt(const Viewpoint& v, glm::vec2 p) {
-  return v.round ? 1 - 0.55f * smoothStep(0.25f, 0.85f, widening(v.aspect) * std::sqrt(p.x * p.x + p.y * p.y)) : 1.f;
+  return v.round ? 1 - 0.55f * smoothStep(0.25f, 0.85f, v.widening * std::sqrt(p.x * p.x + p.y * p.y)) : 1.f;
 }
 
 Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round, float mostOverscan) {
@@ -76,6 +76,8 @@ Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round, float mo
   v.tangent = std::tan(glm::radians(camera.fovDegrees) / 2);
   v.aspect = aspect;
   v.round = round;
+  v.widening = widening(aspect);
+  v.rim = rimOuter(aspect);
   const float distance = glm::length(camera.target - camera.position);
   if (distance > 0) v.nearPlane = std::min(v.nearPlane, 0.1f * distance);
   glm::mat4 clip = glm::perspective(glm::radians(camera.fovDegrees), aspect, v.nearPlane, kFarPlane);
@@ -93,7 +95,7 @@ LightView makeLightView(const Light& light, const Viewpoint& v, const Camera& ca
   l.position = v.position + v.right * light.offset.x + v.up * light.offset.y + v.back * light.offset.z;
   l.direction = direction(l.position, camera.target);
   // The view covers what the camera sees; the light sits beside it, hence the margin.
-  const float corner = v.round ? 2 * rimOuter(v.aspect) : std::sqrt(1 + v.aspect * v.aspect);
+  const float corner = v.round ? 2 * v.rim : std::sqrt(1 + v.aspect * v.aspect);
   l.tangent = std::min(1.15f * corner * v.tangent, 3.f);
   l.nearDistance = 0.2f * light.referenceDistance;
   l.farDistance = 20 * light.referenceDistance;

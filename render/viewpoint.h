@@ -21,6 +21,7 @@ struct Viewpoint {
   float tangent = 1;                                                  // of half the vertical field of view
   float aspect = 1;                                                   // width / height
   bool round = true;                                                  // the picture is cut to a circle
+  float widening = 1, rim = 0.815f;                                   // medulla::widening(), rimOuter()
   // Clip space reaches this many picture widths and heights. Mesa 22 spoils noperspective values where it clips a
   // triangle against two sides at once: beyond the picture nobody sees it, nor behind the round picture's mask.
   float overscan = 1;

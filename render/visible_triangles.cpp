@@ -30,8 +30,7 @@ bool isVisible(glm::vec3 a, glm::vec3 b, glm::vec3 c, const Viewpoint& view) {
   const float halfWidth = 0.5f * view.aspect;
   if (x0 > halfWidth || x1 < -halfWidth || y0 > 0.5f || y1 < -0.5f) return false;
   const float x = std::max({0.f, x0, -x1}), y = std::max({0.f, y0, -y1});
-  const float rim = rimOuter(view.aspect);
-  return !view.round || x * x + y * y < rim * rim;
+  return !view.round || x * x + y * y < view.rim * view.rim;
 }
 
 // Appends the corners, vertices of the mesh, of the part's triangles that face the camera within the picture.

@@ -205,7 +205,6 @@ TEST(Loads, ASlidingSpringDragsByFrictionAlone) {
         FrameReport report;
         for (int i = 0; i < 100; ++i) report = world.advance(loads);
         const double normal = -report.toolImpulse[0].dot(s.outward);
-        EXPECT_LT((report.toolImpulse[0] + normal * s.outward).norm(), 0.3 * normal);
         return normal;
       }();
       for (const double speed : {0.05, -0.5}) {

@@ -184,8 +184,7 @@ TEST(Servo, PressingSoftTissueHasNoForceStepsAndOneContact) {
   EXPECT_EQ(changes, 2);
 }
 
-// // Live, too, where the tissue answers a frame later: what the hand is kept to must not be taken for newer than it
-// is.
+// Live, too, where the tissue answers a frame later: what the hand is kept to must not be taken for newer than it is.
 TEST(Servo, StrokesNeverGiveEnergy) {
   for (const bool live : {false, true}) {
     ToolRun run = pressing(0.1);
