@@ -41,6 +41,30 @@ TEST(DrivenSphere, IsOnItsPathAtEveryFrame) {
   }
 }
 
+// Shaken aside and across by its first sphere, a tube turns it, unless its orientation is held, too.
+TEST(DrivenSphere, TurnsAsFarAsItsFreedomSays) {
+  for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit}) {
+    for (const FixedFreedom freedom : {FixedFreedom::translation, FixedFreedom::all}) {
+      BodyDescription b = tube(SurfaceMode::skin);
+      b.driven = {{.sphere = 0, .freedom = freedom, .axis = {0, 3, 4}, .amplitude = 0.01}};
+      WorldSettings settings;
+      settings.integrator = integrator;
+      World world(settings, {b});
+      const Quad rest = world.data().spheres.orientation[0];
+      double farthest = 0;
+      for (int frame = 0; frame < 60; ++frame) {
+        world.advance({});
+        const Quad now = world.data().spheres.orientation[0];
+        for (int k = 0; k < 4; ++k) farthest = std::max(farthest, std::abs(now.v[k] - rest.v[k]));
+      }
+      if (freedom == FixedFreedom::all)
+        EXPECT_EQ(farthest, 0);
+      else
+        EXPECT_GT(farthest, 0.1);
+    }
+  }
+}
+
 TEST(DrivenSphere, StaysWhereItIsWhileBodiesSettle) {
   BodyDescription b = tube(SurfaceMode::full);
   DrivenSphere drive;

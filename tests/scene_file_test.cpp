@@ -56,6 +56,7 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(body.driven[0].frequency, 2);
   EXPECT_EQ(body.driven[0].phase, 0.5);
   EXPECT_EQ(body.driven[0].velocity, Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(body.driven[0].freedom, FixedFreedom::all);
   EXPECT_EQ(s.bodies[1].tissue.young, Tissue().young);
   EXPECT_EQ(s.bodies[1].modelPath, folder + "/second.model.xml");
 }

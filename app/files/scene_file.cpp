@@ -137,11 +137,15 @@ NodeChoice readNodeChoice(const XmlElement& e, const std::vector<std::string>& o
   return choice;
 }
 
+FixedFreedom readFreedom(const XmlElement& e, FixedFreedom without) {
+  const bool translation = without == FixedFreedom::translation;
+  return readChoice(e, "dof", {"all", "translation"}, translation) == 0 ? FixedFreedom::all : FixedFreedom::translation;
+}
+
 void readFixations(const XmlElement& body, const std::string& scenePath, SceneBody& out) {
   std::set<int> taken;
   for (const XmlElement* fix : childrenOf(body, "fix")) {
-    const bool all = readChoice(*fix, "dof", {"all", "translation"}, 0) == 0;
-    const FixedFreedom freedom = all ? FixedFreedom::all : FixedFreedom::translation;
+    const FixedFreedom freedom = readFreedom(*fix, FixedFreedom::all);
     const NodeChoice nodes = readNodeChoice(*fix, {"spheres"}, scenePath);
     if (!fix->find("spheres")) {
       out.fixes.push_back({fix->line, nodes, freedom});
@@ -192,6 +196,7 @@ std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::v
     d.frequency = readNumber(*drive, "frequency", d.frequency, positive);
     d.phase = readNumber(*drive, "phase", d.phase);
     d.velocity = readVector(*drive, "velocity", d.velocity);
+    d.freedom = readFreedom(*drive, d.freedom);
     out.push_back(d);
   }
   return out;

@@ -25,7 +25,7 @@ const XmlRules& sceneRules() {
        {"position", "orientation", "links", "surface", "reference"},
        {{"fix", 0, many}, {"drive", 0, many}, {"load", 0, many}, {"links", 0, 1}, {"neighbours", 0, 1}}},
       {"fix", {}, {"sphere", "spheres", "box", "plane", "vertices", "dof"}, {}},
-      {"drive", {"sphere", "axis", "amplitude", "frequency"}, {"phase", "velocity"}, {}},
+      {"drive", {"sphere", "axis", "amplitude", "frequency"}, {"phase", "velocity", "dof"}, {}},
       {"load", {}, {"force", "from", "to", "box", "sphere", "plane", "vertices", "file"}, {}},
       {"links", {}, {"select", "elongation", "flexion", "torsion"}, {}},
       {"neighbours", {"names"}, {}, {}},

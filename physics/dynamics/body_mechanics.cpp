@@ -234,13 +234,14 @@ BodyMechanics bodyMechanics(const BodyDescription& body) {
   BodyMechanics out;
   out.moves.assign(body.model->spheres.size(), true);
   out.turns = out.moves;
-  for (const FixedSphere& f : body.fixed) {
-    out.moves[f.sphere] = false;
-    if (f.freedom == FixedFreedom::all) out.turns[f.sphere] = false;
-  }
+  const auto hold = [&](const auto& held) {
+    out.moves[held.sphere] = false;
+    if (held.freedom == FixedFreedom::all) out.turns[held.sphere] = false;
+  };
+  std::for_each(body.fixed.begin(), body.fixed.end(), hold);
+  std::for_each(body.driven.begin(), body.driven.end(), hold);
   out.nodeMoves.assign(body.model->restNodes.size(), true);
   for (const int node : body.fixedNodes) out.nodeMoves[node] = false;
-  for (const DrivenSphere& driven : body.driven) out.moves[driven.sphere] = false;
   if (isIdentified(body)) {
     out.identifiedLinks = identifiedStiffness(body);
     out.identifiedStrains = identifiedStrains(body);

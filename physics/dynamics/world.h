@@ -51,10 +51,12 @@ struct FixedSphere {
 };
 
 // A sphere led along a path, whatever pulls at it: rest + velocity t + ramp(t) amplitude sin(2 pi frequency t + phase)
-// along the axis, where the ramp rises smoothly from 0 to 1 over the first period. It still turns freely (paper 6: the
-// dolphin's head). The whole body starts at `velocity`.
+// along the axis, where the ramp rises smoothly from 0 to 1 over the first period. It turns freely, or, where `freedom`
+// is all, keeps its orientation: whatever is led by one sphere alone and beats hard rolls about its way otherwise, for
+// nothing rights it. The whole body starts at `velocity`. Paper 6: the dolphin's head.
 struct DrivenSphere {
   int sphere = 0;
+  FixedFreedom freedom = FixedFreedom::translation;
   Eigen::Vector3d axis = Eigen::Vector3d::UnitY();     // world; any length but 0
   double amplitude = 0;                                // m, >= 0
   double frequency = 1;                                // Hz, > 0
