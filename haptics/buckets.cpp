@@ -291,7 +291,7 @@ static void visitNear(List& buckets, const std::vector<Quad>& bounds, const Vect
   const Lanes3 from{splat(centre.x()), splat(centre.y()), splat(centre.z())};
   for (std::size_t first = 0; first < buckets.size(); first += 4) {
     Lanes radius;
-    const Lanes3 away = gather(bounds[first], bounds[first + 1], bounds[first + 2], bounds[first + 3], radius) - from;
+    const Lanes3 away = gatherFour(bounds, first, radius) - from;
     const Lanes reach = radius + splat(distance);
     const int far = _mm256_movemask_pd(isLess(reach * reach, dot(away, away)));
     for (std::size_t k = 0; far != 15 && k < 4 && first + k < buckets.size(); ++k)

@@ -53,8 +53,7 @@ void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& pro
     contact.triangle = entry.triangle;
     contact.weights = entry.weights / entry.share;
     contact.share = entry.share / patch.total;
-    const Triangle t = surface.triangle(entry.triangle, alpha);
-    contact.point = contact.weights.x() * t.a + contact.weights.y() * t.b + contact.weights.z() * t.c;
+    contact.point = pointAt(surface.triangle(entry.triangle, alpha), contact.weights);
     const Eigen::Vector3d outward = proxy.centre - contact.point;
     const double distance = outward.norm();
     if (!(distance > 0)) continue;  // the point lies in the proxy's centre: no direction to push it

@@ -6,7 +6,7 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-static const double cosineOfCrease = 0.7316888688738209;  // cos 0.75
+constexpr double cosineOfCrease = 0.7316888688738209;  // cos 0.75
 
 static Vector3d doubleArea(const Triangle& t) {
   return (t.b - t.a).cross(t.c - t.a);

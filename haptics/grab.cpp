@@ -41,25 +41,4 @@ void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy,
   if (closes && proxy.inContact()) holdPatch(surface, alpha, proxy, device, gripRadius, grip);
 }
 
-Eigen::Vector3d meanHeldGap(const BlendedSurface& surface, double alpha, const ToolSample& device, const Grip& grip) {
-  assert(!grip.held.empty());
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const HeldOffset& held : grip.held) sum += surface.node(held.node, alpha) - heldTarget(device, held);
-  return sum / double(grip.held.size());
-}
-
-Eigen::Vector3d meanHeldStep(const BlendedSurface& surface, double alpha, const Grip& grip) {
-  assert(!grip.held.empty());
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const HeldOffset& held : grip.held) sum += surface.nodeStep(held.node, alpha);
-  return sum / double(grip.held.size());
-}
-
-Eigen::Vector3d meanHeldLead(const BlendedSurface& surface, double alpha, const Grip& grip) {
-  assert(!grip.held.empty());
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const HeldOffset& held : grip.held) sum += surface.nodeLead(held.node, alpha);
-  return sum / double(grip.held.size());
-}
-
 }  // namespace medulla

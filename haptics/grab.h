@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cassert>
 #include <vector>
 
 #include "haptics/proxy.h"
@@ -36,10 +37,13 @@ inline Eigen::Vector3d heldTarget(const ToolSample& device, const HeldOffset& he
   return device.position + device.worldFromTool * held.offset;
 }
 
-// Mean over the held nodes of node minus target, m: the springs share the tool's stiffness equally, so stiffness times
-// this is the force on the tool. And the means of their steps and leads (BlendedSurface).
-Eigen::Vector3d meanHeldGap(const BlendedSurface& surface, double alpha, const ToolSample& device, const Grip& grip);
-Eigen::Vector3d meanHeldStep(const BlendedSurface& surface, double alpha, const Grip& grip);
-Eigen::Vector3d meanHeldLead(const BlendedSurface& surface, double alpha, const Grip& grip);
+// Mean of `of(held)`, m, over what is held.
+template <class Of>
+Eigen::Vector3d meanOverHeld(const Grip& grip, const Of& of) {
+  assert(!grip.held.empty());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const HeldOffset& held : grip.held) sum += of(held);
+  return sum / static_cast<double>(grip.held.size());
+}
 
 }  // namespace medulla

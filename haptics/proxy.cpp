@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -234,17 +235,13 @@ void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool
 
 // ---- The surface moves -----------------------------------------------------------------------------------
 
-static Vector3d weighted(const Triangle& triangle, const Vector3d& weights) {
-  return weights.x() * triangle.a + weights.y() * triangle.b + weights.z() * triangle.c;
-}
-
 // The mean motion of what the proxy touches. Without it a still tool feels nothing of a surface that moves through it.
 static Vector3d carriedBy(const Buckets& buckets, double alpha, const Proxy& proxy) {
   Vector3d motion = Vector3d::Zero();
   for (int k = 0; k < proxy.contactCount; ++k) {
     const ProxyContact& contact = proxy.contacts[k];
-    motion += contact.share *
-              (weighted(buckets.surface().triangle(contact.triangle, alpha), contact.weights) - contact.point);
+    motion +=
+        contact.share * (pointAt(buckets.surface().triangle(contact.triangle, alpha), contact.weights) - contact.point);
   }
   return motion;
 }
@@ -260,7 +257,7 @@ static Vector3d notPassedOver(const Buckets& buckets, double alphaBefore, double
     for (const int t : buckets.near(0.5 * (start + end), 0.5 * (end - start).norm() + standOff)) {
       const Triangle before = buckets.surface().triangle(t, alphaBefore), now = buckets.surface().triangle(t, alpha);
       const TrianglePoint closest = closestPoint(before, start);
-      const Vector3d adjusted = start + weighted(now, closest.weights) - closest.point;
+      const Vector3d adjusted = start + pointAt(now, closest.weights) - closest.point;
       SweepHit hit;
       if (!sweepSphere(adjusted, end - adjusted, radius, now, 1, hit)) continue;
       const Vector3d outside = adjusted + hit.t * (end - adjusted) + standOff * hit.normal;
@@ -324,7 +321,7 @@ void followSurface(const Buckets& buckets, double alphaBefore, double alpha, dou
   proxy.surfaceMotion = proxy.centre - start;
   for (int k = 0; k < proxy.contactCount; ++k) {
     ProxyContact& contact = proxy.contacts[k];
-    contact.point = weighted(buckets.surface().triangle(contact.triangle, alpha), contact.weights);
+    contact.point = pointAt(buckets.surface().triangle(contact.triangle, alpha), contact.weights);
   }
 }
 
@@ -335,7 +332,8 @@ void followSurface(const Buckets& buckets, double alphaBefore, double alpha, dou
 static double windingShare(const Triangle& triangle, const Vector3d& p) {
   const Vector3d a = triangle.a - p, b = triangle.b - p, c = triangle.c - p;
   const double la = a.norm(), lb = b.norm(), lc = c.norm();
-  return std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) / (2 * M_PI);
+  return std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) /
+         (2 * std::numbers::pi);
 }
 
 const ProxyContact& Proxy::mainContact() const {

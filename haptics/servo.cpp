@@ -139,8 +139,12 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
              : withinCone(push * normal + tangential(motion, normal), tool.lastFelt, tool.settings.staticFriction);
 }
 
+// The springs share the tool's stiffness equally.
 static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Tool& tool) {
-  return tool.settings.stiffness * meanHeldGap(surface, alpha, tool.device, tool.grip) +
+  const auto gap = [&](const HeldOffset& held) -> Vector3d {
+    return surface.node(held.node, alpha) - heldTarget(tool.device, held);
+  };
+  return tool.settings.stiffness * meanOverHeld(tool.grip, gap) +
          motionForce(tool, heldMotion(surface, alpha, tool.grip, tool.settings.stiffness, tool.motion));
 }
 
@@ -157,9 +161,7 @@ static void followLeaving(const BlendedSurface& surface, double alphaBefore, dou
     }
     tool.isLeaving = true;
   } else if (tool.isLeaving) {
-    const Triangle triangle = surface.triangle(tool.lastContact.triangle, alpha);
-    const Vector3d& w = tool.lastContact.weights;
-    tool.lastContact.point = w.x() * triangle.a + w.y() * triangle.b + w.z() * triangle.c;
+    tool.lastContact.point = pointAt(surface.triangle(tool.lastContact.triangle, alpha), tool.lastContact.weights);
     tool.isLeaving = (tool.proxy.centre - tool.lastContact.point).norm() <= 2 * tool.settings.radius;
   }
 }

@@ -16,6 +16,10 @@ struct TrianglePoint {
   Eigen::Vector3d weights;  // barycentric: point = weights.x a + weights.y b + weights.z c, each in 0..1, sum 1
 };
 
+inline Eigen::Vector3d pointAt(const Triangle& t, const Eigen::Vector3d& weights) {
+  return weights.x() * t.a + weights.y() * t.b + weights.z() * t.c;
+}
+
 TrianglePoint closestPoint(const Triangle& triangle, const Eigen::Vector3d& p);
 
 struct SweepHit {

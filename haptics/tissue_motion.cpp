@@ -67,11 +67,7 @@ Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyCon
 
 void beginContact(const BlendedSurface& surface, double alpha, const ProxyContact& contact, const Vector3d& normal,
                   double stiffness, DeviceMotion& device) {
-  device.since = alpha;
-  device.sinceBefore = 0;
-  device.early.setZero();
-  device.earlyBefore.setZero();
-  device.way.fill(Vector3d::Zero());
+  device = {.velocity = device.velocity, .since = alpha};
   const double part = followedPart(stiffness, contactGive(surface, {&contact, 1}));
   if (!(part > 0)) return;
   for (int k = 0; k < 3; ++k)
@@ -80,16 +76,11 @@ void beginContact(const BlendedSurface& surface, double alpha, const ProxyContac
 }
 
 void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness, DeviceMotion& device) {
-  device.since = device.sinceBefore = 0;
-  device.early.setZero();
-  device.earlyBefore.setZero();
-  device.way.fill(Vector3d::Zero());
+  device = {.velocity = device.velocity};
   const double part = followedPart(stiffness, grip.give);
   if (!(part > 0)) return;
-  for (int k = 0; k < 3; ++k) {
-    for (const HeldOffset& held : grip.held) device.way[k + 1] += surface.steps[k][held.node];
-    device.way[k + 1] /= part * static_cast<double>(grip.held.size());
-  }
+  for (int k = 0; k < 3; ++k)
+    device.way[k + 1] = meanOverHeld(grip, [&](const HeldOffset& held) { return surface.steps[k][held.node]; }) / part;
   device.way[0] = wayOfLead(device, alpha) - (1 - alpha) * device.way[1];
 }
 
@@ -129,8 +120,9 @@ TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip&
   const double part = followedPart(stiffness, grip.give);
   const Vector3d beyond = latestWay(device, alpha) - wayOfLead(device, alpha);
   const Vector3d faster = device.velocity - wayOfStep(device, alpha) / surface.duration;
-  return {meanHeldLead(surface, alpha, grip) + part * beyond,
-          meanHeldStep(surface, alpha, grip) / surface.duration + part * faster};
+  const Vector3d lead = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeLead(h.node, alpha); });
+  const Vector3d step = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeStep(h.node, alpha); });
+  return {lead + part * beyond, step / surface.duration + part * faster};
 }
 
 }  // namespace medulla

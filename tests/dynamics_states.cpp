@@ -77,7 +77,7 @@ Momentum momentum(const WorldData& d) {
 double elastic(WorldData& d) {
   runStage(d, evaluateLinks);
   runStage(d, evaluateAttachments);
-  return linkEnergy(d) + surfaceEnergy(d);
+  return medulla::elasticEnergy(d);
 }
 
 void expectForcesAreMinusGradient(WorldData& d, double tolerance) {

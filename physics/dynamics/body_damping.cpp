@@ -24,7 +24,7 @@ RigidMotion rigidMotionOf(const Spheres& s, const std::vector<double>& ownShare,
   const Lanes reference = load(s.position[r.firstSphere]), zero = splat(0);
   Lanes first = zero, momentum = zero, angularMomentum = zero, squares = zero, products = zero;
   double mass = 0;
-  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+  for (const int i : spheresOf(r)) {
     const double m = ownShare[i] * s.groups[i / 4].mass[i % 4];
     const Lanes x = load(s.position[i]) - reference, mx = splat(m) * x, v = load(s.velocity[i]);
     mass += m;
@@ -63,7 +63,7 @@ void dampBodies(WorldData& d, const Batch& batch) {
     if (r.massDamping == 0) continue;
     const double lost = 1 - 1 / (1 + d.substep * r.massDamping);
     const auto slow = [&](const auto& rigidAt) {
-      for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+      for (const int i : spheresOf(r)) {
         const Lanes v = load(s.velocity[i]);
         store(s.velocity[i], fma(splat(-lost * ownShare[i]), v - rigidAt(i), v));
       }

@@ -11,9 +11,14 @@
 
 #include "physics/dynamics/identified_mechanics.h"
 #include "physics/model/attachment.h"
+#include "physics/model/mass_properties.h"
 #include "physics/model/mesh_topology.h"
 
 namespace medulla {
+
+void require(bool condition, const std::string& message) {
+  if (!condition) throw std::runtime_error(message);
+}
 
 namespace {
 
@@ -41,10 +46,6 @@ constexpr double kLayerThicknessOverDepth = 1.0 / 60;
 // The nodes' masses are taken off the spheres they hang on, but never so that less than this share of a sphere's own
 // mass and inertia is left: coarse cells may carry more surface than they hold.
 constexpr double kSmallestRemainder = 0.1;
-
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::runtime_error(message);
-}
 
 void checkDescription(const BodyDescription& body) {
   require(body.model != nullptr, "it has no model");
@@ -172,10 +173,6 @@ void setSurfaceStiffness(const BodyDescription& body, BodyMechanics& out) {
   });
 }
 
-Matrix3d inertiaOf(const Matrix3d& secondMoment) {
-  return secondMoment.trace() * Matrix3d::Identity() - secondMoment;
-}
-
 // Nearest matrix with no eigenvalue below `floor`.
 Matrix3d raised(const Matrix3d& a, double floor) {
   Eigen::SelfAdjointEigenSolver<Matrix3d> eigen;
@@ -220,10 +217,10 @@ void setMasses(const BodyDescription& body, BodyMechanics& out) {
   takeNodeMasses(m, out, mass, moment);
   for (std::size_t i = 0; i < mass.size(); ++i) {
     out.sphereMass.push_back(std::max(mass[i], kSmallestRemainder * wholeMass[i]));
-    const Matrix3d whole = inertiaOf(wholeMoment[i]);
+    const Matrix3d whole = inertia(wholeMoment[i]);
     const double smallest = Eigen::SelfAdjointEigenSolver<Matrix3d>(whole, Eigen::EigenvaluesOnly).eigenvalues()[0];
     require(smallest > 0, fmt::format("its model's sphere {} has no inertia: expected a positive second moment", i));
-    out.sphereInertia.push_back(raised(inertiaOf(moment[i]), kSmallestRemainder * smallest));
+    out.sphereInertia.push_back(raised(inertia(moment[i]), kSmallestRemainder * smallest));
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "physics/dynamics/link_mechanics.h"
@@ -8,6 +9,9 @@
 
 // A body's masses, stiffnesses and dampings from its tissue and its model's geometry (physics/README.md). Model frame.
 namespace medulla {
+
+// Throws std::runtime_error with this message, to which whoever knows the body adds its name.
+void require(bool condition, const std::string& message);
 
 struct LinkStrains {  // what an identified link's measures add to the strains of the cells of its two frames
   Vector6d at0, at1;

@@ -14,7 +14,7 @@ namespace {
 
 // N, of the four nodes of group g under `felt` (m/s2).
 MEDULLA_INLINE Lanes3 weightOf(const WorldData& d, const Lanes3& felt, int g) {
-  return _mm256_loadu_pd(&d.nodes.mass[4 * g]) * felt;
+  return loadFour(d.nodes.mass, 4 * g) * felt;
 }
 
 MEDULLA_INLINE void place(WorldData& d, const Anchor& anchor, int g) {
@@ -99,7 +99,7 @@ void takeWeightOffSpheres(WorldData& d) {
     for (const int b : batch.bodies) {
       const BodyRange& r = d.ranges[b];
       const Lanes felt = load(s.felt[b]);
-      for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+      for (const int i : spheresOf(r)) {
         const double carried = d.spheres.groups[i / 4].mass[i % 4] - s.spheres[i].mass;
         store(s.weight[2 * i], fnma(splat(carried), felt, load(s.weight[2 * i])));
       }
@@ -149,7 +149,7 @@ void feelGravity(WorldData& d) {
     for (std::size_t b = 0; b < d.bodies.size(); ++b) {
       const BodyRange& r = d.ranges[b];
       Lanes sum = splat(0);
-      for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+      for (const int i : spheresOf(r)) {
         Lanes gained = load(d.spheres.velocity[i]) - load(s.velocityBefore[i]);
         gained[3] = 1;
         sum = fma(splat(d.spheres.groups[i / 4].mass[i % 4] - s.spheres[i].mass), gained, sum);

@@ -11,9 +11,9 @@ void placeBalls(WorldData& d) {
   ContactData& c = d.contact;
   for (std::size_t i = 0; i < s.position.size(); i += 4) {
     Lanes w, radius;
-    const Lanes3 q = gather(s.orientation[i], s.orientation[i + 1], s.orientation[i + 2], s.orientation[i + 3], w);
-    const Lanes3 rest = gather(c.restBall[i], c.restBall[i + 1], c.restBall[i + 2], c.restBall[i + 3], radius);
-    const Lanes3 frame = gather(s.position[i], s.position[i + 1], s.position[i + 2], s.position[i + 3]);
+    const Lanes3 q = gatherFour(s.orientation, i, w);
+    const Lanes3 rest = gatherFour(c.restBall, i, radius);
+    const Lanes3 frame = gatherFour(s.position, i);
     const Lanes3 centre = frame + rotate(rotationOf(q, w), rest);
     storeFour(centre - frame, c.arm, i);
     storeFour(centre, radius, c.ball, i);

@@ -38,10 +38,9 @@ void prepareSpheres(WorldData& d) {
     const std::size_t i = 4 * g;
     ContactSphere* out = &d.contact.spheres[i];
     Lanes w;
-    const Lanes3 q = gather(s.orientation[i], s.orientation[i + 1], s.orientation[i + 2], s.orientation[i + 3], w);
+    const Lanes3 q = gatherFour(s.orientation, i, w);
     const Rotation r = rotationOf(q, w);
-    const Lanes3 momentum =
-        gather(s.angularMomentum[i], s.angularMomentum[i + 1], s.angularMomentum[i + 2], s.angularMomentum[i + 3]);
+    const Lanes3 momentum = gatherFour(s.angularMomentum, i);
     const auto put = [out](const Lanes3& a, Quad& (*place)(ContactSphere&)) {
       scatter(a, splat(0), place(out[0]), place(out[1]), place(out[2]), place(out[3]));
     };

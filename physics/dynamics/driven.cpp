@@ -25,10 +25,10 @@ Lanes pathAt(const SphereDrive& drive, double time) {
 }  // namespace
 
 // The path's secant rather than its derivative: the sphere stays on the path whatever the substep.
-void driveSpheres(WorldData& d, double time) {
+void driveSpheres(WorldData& d, double time, double duration) {
   for (const SphereDrive& drive : d.drives)
     store(d.spheres.velocity[drive.sphere],
-          (pathAt(drive, time) - load(d.spheres.position[drive.sphere])) / splat(d.substep));
+          (pathAt(drive, time) - load(d.spheres.position[drive.sphere])) / splat(duration));
 }
 
 // Linear drag per mass, solved implicitly, so that no drag is too much for a step. A driven sphere is dragged too, and

@@ -16,10 +16,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::runtime_error(message);
-}
-
 void checkNetwork(const SoftBodyModel& m) {
   const IdentifiedNetwork& n = *m.identified;
   require(n.frames.size() == m.spheres.size() && n.skin.size() == m.restNodes.size(),

@@ -34,7 +34,7 @@ void add(HostPoint& p, const CarriedFrame& frame, const Matrix3d& force, const M
 
 }  // namespace
 
-Vector3d placeOnFrames(const WorldData& d, int node) {
+Vector3d positionOnFrames(const WorldData& d, int node) {
   const Identified& s = d.identified;
   const SkinGroup& g = s.skin[s.ofNodeGroup[node / 4]];
   const SeenHost seen = see(s, s.hosts[g.host]);

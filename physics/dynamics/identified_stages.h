@@ -39,7 +39,7 @@ class FrameReturn {
 };
 
 // identified_node.cpp
-Eigen::Vector3d placeOnFrames(const WorldData&, int node);
+Eigen::Vector3d positionOnFrames(const WorldData&, int node);
 HostPoint hostPointOnFrames(const WorldData&, int node);
 
 }  // namespace medulla

@@ -90,7 +90,7 @@ void settleContact(const WorldData& d, const ImplicitData& s, const Contact& c, 
 }
 
 void settleTool(WorldData& d, const ImplicitData& s, const PointLoad& load, const StageLoads& stage, LoadRow* rows) {
-  const PointSpring p = pointSpring(d, *stage.loads, load.index, stage.remaining);
+  const PointSpring p = pointSpring(d, *stage.loads, load.index, stage.time.remaining);
   Vector3d x = Vector3d::Zero();
   for (int i = 0; i < p.count; ++i) x += p.weights[i] * nodePosition(d, p.nodes[i]);
   const Vector3d rate = ratesOf(s, rows);
@@ -113,11 +113,9 @@ void settleTool(WorldData& d, const ImplicitData& s, const PointLoad& load, cons
 }
 
 void addDeadLoads(const WorldData& d, ImplicitData& s, double time) {
-  if (d.frame < 0) return;
   for (const NodeForce& load : d.deadLoads) {
-    const double size = load.force.norm();
-    if (time < load.from || !(size > 0)) continue;
-    const double share = time < load.to ? (time - load.from) / (load.to - load.from) : 1;
+    const double size = load.force.norm(), share = shareAt(d, load, time);
+    if (!(share * size > 0)) continue;
     LoadRow row;
     row.first = static_cast<int>(s.rowQuad.size());
     addNodeTerms(d, s, load.node, hostPoint(d, load.node), load.force / size);
@@ -136,7 +134,7 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   s.loads.clear();
   for (std::size_t k = 0; k < d.contact.contacts.size(); ++k) addContactRows(d, s, k);
   for (std::size_t k = 0; k < d.loadForces.size(); ++k) {
-    const PointSpring p = pointSpring(d, *stage.loads, k, stage.remaining);
+    const PointSpring p = pointSpring(d, *stage.loads, k, stage.time.remaining);
     std::array<HostPoint, 3> hosts;
     for (int i = 0; i < p.count; ++i) hosts[i] = hostPoint(d, p.nodes[i]);
     addRows(s, false, k, p.outward != nullptr ? *p.outward : Vector3d::UnitX(), [&](const Vector3d& axis) {
@@ -151,7 +149,7 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
       settleTool(d, s, s.loads[k], stage, rows);
     }
   }
-  addDeadLoads(d, s, stage.end);
+  addDeadLoads(d, s, stage.time.end);
   for (const LoadRow& row : s.rows) {
     if (row.impulse == 0) continue;
     for (int k = row.first; k < row.end; ++k) {

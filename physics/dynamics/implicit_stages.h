@@ -1,6 +1,7 @@
 #pragma once
 
 #include "physics/dynamics/implicit_data.h"
+#include "physics/dynamics/stages.h"
 
 // The stages of an implicit step, in their order. All work on the state as it stands in WorldData.
 namespace medulla {
@@ -25,7 +26,7 @@ void addCarriedMass(const WorldData& d, const std::vector<double>& mass, std::ve
 // implicit_loads.cpp: contacts, tools and dead loads at the present motion.
 struct StageLoads {
   const Loads* loads = nullptr;
-  double end = 0, remaining = 0;  // s: when the stage ends; from there to the frame's end
+  StepTime time;  // of the stage
 };
 void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& loads);  // rows, and their part of the residual
 
@@ -53,12 +54,12 @@ void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y);  //
 // Conjugate gradients: A change = -residual, to `tolerance` of the residual. Returns the iterations.
 using Operator = void (*)(WorldData& d, ImplicitData& s, const Motion& x, Motion& y);
 int solveSystem(WorldData& d, ImplicitData& s, double tolerance, Operator apply);
-void addRows(const ImplicitData& s, const Motion& x, Motion& y);  // y += the loads' part of A x
+void applyRows(const ImplicitData& s, const Motion& x, Motion& y);  // y += the loads' part of A x
 double product(const Motion& a, const Motion& b);
 void addScaled(double f, const Motion& b, Motion& a);  // a += f b
 void hold(const std::vector<Quad>& freedom, Motion& m);
 
 // implicit_step.cpp: one substep; positions, velocities, momenta and the tools' impulses.
-void stepImplicitly(WorldData& d, const Loads& loads, double remaining, std::vector<Eigen::Vector3d>& toolImpulse);
+void stepImplicitly(WorldData& d, const Loads& loads, const StepTime& time, std::vector<Eigen::Vector3d>& toolImpulse);
 
 }  // namespace medulla

@@ -28,7 +28,7 @@ struct Orientation {
 
 Orientation gatherOrientations(const std::vector<Quad>& q, std::size_t i) {
   Orientation out;
-  out.q = gather(q[i], q[i + 1], q[i + 2], q[i + 3], out.w);
+  out.q = gatherFour(q, i, out.w);
   return out;
 }
 
@@ -127,7 +127,7 @@ void balanceForces(WorldData& d, const ImplicitData& s, Motion& out) {
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
     const std::size_t k = 2 * static_cast<std::size_t>(d.spheres.count) + 4 * g;
     const Lanes3 gained = gatherFour(s.motion, k) - gatherFour(s.start.motion, k) - fallen;
-    storeFour(_mm256_loadu_pd(&d.nodes.mass[4 * g]) * gained - t * d.nodes.force[g], out, k);
+    storeFour(loadFour(d.nodes.mass, 4 * g) * gained - t * d.nodes.force[g], out, k);
   }
 }
 
@@ -169,17 +169,12 @@ void differentiate(WorldData& d, ImplicitData& s, const Motion& x, Motion& y) {
   balanceForces(d, s, y);
   s.motion = s.kept;
   for (std::size_t i = 0; i < y.size(); ++i) store(y[i], splat(1 / share) * (load(y[i]) - load(s.balance[i])));
-  addRows(s, x, y);
+  applyRows(s, x, y);
   hold(s.freedom, y);
 }
 
 void leadDriven(WorldData& d, ImplicitData& s, double end) {
-  if (d.drives.empty()) return;
-  // driveSpheres() gives the velocity that reaches the path in one substep; here in one stage.
-  const double substep = d.substep;
-  d.substep = s.duration;
-  driveSpheres(d, end);
-  d.substep = substep;
+  driveSpheres(d, end, s.duration);
   for (const SphereDrive& drive : d.drives) s.motion[2 * drive.sphere] = d.spheres.velocity[drive.sphere];
 }
 
@@ -198,7 +193,7 @@ double search(WorldData& d, ImplicitData& s, const StageLoads& stage, double bef
 }
 
 // From the present state, which `s.start` holds, with its momenta there. False where the iteration does not settle.
-bool runStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
+bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   constexpr int kIterations = 20;
   constexpr double kSolved = 0.03, kNear = 0.3;
   constexpr double kLeastAcceleration = 1e-5;  // m/s2, of all masses
@@ -208,7 +203,7 @@ bool runStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
     notePenetration(d.contact);
   }
   s.motion = s.start.motion;
-  leadDriven(d, s, stage.end);
+  leadDriven(d, s, stage.time.end);
   place(d, s, s.duration);
   double left = evaluateResidual(d, s, stage);
   const double enough = share * left + s.duration * kLeastAcceleration * std::sqrt(s.totalMass);
@@ -271,11 +266,6 @@ double kineticEnergy(const WorldData& d, const ImplicitData& s) {
   return 0.5 * kinetic;
 }
 
-// At the state of the last evaluateForces().
-double elasticEnergy(const WorldData& d) {
-  return linkEnergy(d) + surfaceEnergy(d);
-}
-
 // J: what gravity, loads, contacts and paths give in the last stage, for the time of the whole step.
 double workOf(const WorldData& d, const ImplicitData& s) {
   double sum = s.workOfPaths;
@@ -318,10 +308,6 @@ void addToolImpulses(const WorldData& d, double time, std::vector<Vector3d>& imp
   for (std::size_t k = 0; k < impulses.size(); ++k) impulses[k] += time * d.loadForces[k];
 }
 
-struct StepTime {
-  double end, remaining;  // s: when it ends; from there to the frame's end
-};
-
 // Both stages from s.before. False where one does not settle or energy comes from nowhere; the state is of no account
 // then.
 bool attempt(WorldData& d, ImplicitData& s, std::size_t level, const Loads& loads, const StepTime& time,
@@ -333,11 +319,11 @@ bool attempt(WorldData& d, ImplicitData& s, std::size_t level, const Loads& load
   bool settled = true;
   s.toolImpulses.assign(d.loadForces.size(), Vector3d::Zero());
   if (late > 0) {
-    settled = runStage(d, s, {&loads, time.end - late, time.remaining + late});
+    settled = solveStage(d, s, {&loads, {time.end - late, time.remaining + late}});
     addToolImpulses(d, late, s.toolImpulses);
     beginSecondStage(d, s, late);
   }
-  if (settled || level > kMustSettle) settled = runStage(d, s, {&loads, time.end, time.remaining});
+  if (settled || level > kMustSettle) settled = solveStage(d, s, {&loads, time});
   addToolImpulses(d, s.duration, s.toolImpulses);
   if (!settled && level <= kMustSettle) return false;
   visitAngularMomenta(d, s, [&](int i, Lanes momentum) { store(d.spheres.angularMomentum[i], momentum); });
@@ -391,9 +377,8 @@ void advanceBy(WorldData& d, std::size_t level, const Loads& loads, const StepTi
 
 }  // namespace
 
-void stepImplicitly(WorldData& d, const Loads& loads, double remaining, std::vector<Vector3d>& toolImpulse) {
-  const double end = static_cast<double>(d.frame + 1) * d.settings.frameDuration - remaining;
-  advanceBy(d, 0, loads, {end, remaining}, toolImpulse);
+void stepImplicitly(WorldData& d, const Loads& loads, const StepTime& time, std::vector<Vector3d>& toolImpulse) {
+  advanceBy(d, 0, loads, time, toolImpulse);
 }
 
 }  // namespace medulla

@@ -64,7 +64,7 @@ void applySurface(const WorldData& d, ImplicitData& s, const Quad* x) {
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
     const Lanes3 own = gatherFour(displaced, 4 * g);
     const Lanes3 edges = pullOfEdges(d.springs, d.nodes.groups.data(), displaced.data(), own, g);
-    storeFour(fnma(h2, edges, _mm256_loadu_pd(&s.pull[4 * g]) * own), s.given, 4 * g);
+    storeFour(fnma(h2, edges, loadFour(s.pull, 4 * g) * own), s.given, 4 * g);
   }
   applyPressure(d, s);
 }
@@ -158,8 +158,7 @@ static void setMasses(const WorldData& d, ImplicitData& s) {
   for (int i = 0; i < d.spheres.count; i += 4) {
     const Spheres& from = d.spheres;
     Lanes w;
-    const Lanes3 q =
-        gather(from.orientation[i], from.orientation[i + 1], from.orientation[i + 2], from.orientation[i + 3], w);
+    const Lanes3 q = gatherFour(from.orientation, i, w);
     const Rotation r = rotationOf(q, w);
     const Lanes(&inertia)[6] = s.inertia[i / 4].entry;
     const Lanes mass = from.groups[i / 4].mass;
@@ -207,11 +206,11 @@ void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y) {
     negate(s.given);
     returnImpulses(d, s.given, y);
   }
-  addRows(s, x, y);
+  applyRows(s, x, y);
   hold(s.freedom, y);
 }
 
-void addRows(const ImplicitData& s, const Motion& x, Motion& y) {
+void applyRows(const ImplicitData& s, const Motion& x, Motion& y) {
   for (const LoadRow& row : s.rows) {
     if (row.weight == 0) continue;
     double rate = 0;

@@ -192,13 +192,16 @@ void layOutDeadLoads(WorldData& d) {
   }
 }
 
+double shareAt(const WorldData& d, const NodeForce& load, double time) {
+  if (d.frame < 0 || time < load.from) return 0;
+  return time < load.to ? (time - load.from) / (load.to - load.from) : 1;
+}
+
 // A constant force bounds no step: explicit, and by the same way to the hosts of a skin as the tools' forces.
 void applyDeadLoads(WorldData& d, double time) {
-  if (d.frame < 0) return;
   for (const NodeForce& load : d.deadLoads) {
-    if (time < load.from) continue;
-    const double share = time < load.to ? (time - load.from) / (load.to - load.from) : 1;
-    addNodeImpulse(d, load.node, hostPoint(d, load.node), d.substep * share * load.force);
+    const double share = shareAt(d, load, time);
+    if (share > 0) addNodeImpulse(d, load.node, hostPoint(d, load.node), d.substep * share * load.force);
   }
 }
 

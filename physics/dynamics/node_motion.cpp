@@ -11,7 +11,7 @@ using Eigen::Vector3d;
 
 Vector3d nodePosition(const WorldData& d, int node) {
   if (!isSkin(d, node)) return vectorAt(d.nodes.position, node);
-  if (d.identified.ofNodeGroup[node / 4] >= 0) return placeOnFrames(d, node);
+  if (d.identified.ofNodeGroup[node / 4] >= 0) return positionOnFrames(d, node);
   const GroupHost host = d.nodes.groupHosts[node / 4];
   const NodeGroup& group = d.nodes.groups[node / 4];
   const Anchor anchor =

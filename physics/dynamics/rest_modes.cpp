@@ -9,6 +9,7 @@
 
 #include "physics/dynamics/identified_mechanics.h"
 #include "physics/dynamics/rest_model.h"
+#include "physics/model/mass_properties.h"
 #include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
@@ -31,7 +32,7 @@ CellMasses cellMasses(const BodyDescription& body) {
   for (std::size_t i = 0; i < body.model->spheres.size(); ++i) {
     const SphereCell s = sphereCell(body, static_cast<int>(i));
     out.mass.push_back(body.tissue.density * s.volume);
-    out.inertia.push_back(body.tissue.density * (s.secondMoment.trace() * Matrix3d::Identity() - s.secondMoment));
+    out.inertia.push_back(body.tissue.density * inertia(s.secondMoment));
   }
   return out;
 }

@@ -210,8 +210,17 @@ void setVector(Array& groups, std::uint32_t i, const Eigen::Vector3d& a) {
 }
 // The four that begin at i between an array of quads and lanes.
 template <class Array>
+Lanes3 gatherFour(const Array& q, std::size_t i, Lanes& fourth) {
+  return gather(q[i], q[i + 1], q[i + 2], q[i + 3], fourth);
+}
+template <class Array>
 Lanes3 gatherFour(const Array& q, std::size_t i) {
-  return gather(q[i], q[i + 1], q[i + 2], q[i + 3]);
+  Lanes unused;
+  return gatherFour(q, i, unused);
+}
+template <class Array>
+Lanes loadFour(const Array& numbers, std::size_t i) {
+  return _mm256_loadu_pd(&numbers[i]);
 }
 template <class Array>
 void storeFour(const Lanes3& v, Lanes fourth, Array& q, std::size_t i) {

@@ -40,19 +40,17 @@ void countStillFrames(WorldData& d, const std::vector<char>& busy) {
     }
     rest.stillFrames = busy[b] ? 0 : 1;
     const BodyRange& r = d.ranges[b];
-    for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i)
-      d.stillPlace[i] = {d.spheres.position[i], d.spheres.orientation[i]};
+    for (const int i : spheresOf(r)) d.stillPlace[i] = {d.spheres.position[i], d.spheres.orientation[i]};
   }
 }
 
-// Bodies that something outside acts on.
-std::vector<char> busyBodies(const WorldData& d, const Loads& loads) {
-  std::vector<char> busy(d.bodies.size(), 0);
-  for (std::size_t b = 0; b < d.bodies.size(); ++b)
-    if (!d.bodies[b].driven.empty() || !d.bodies[b].deadLoads.empty()) busy[b] = 1;
-  for (const ToolSpring& t : loads.toolSprings) busy[t.body] = 1;
-  for (const HeldNode& held : loads.heldNodes) busy[held.body] = 1;
-  return busy;
+// Bodies that tools or dead loads act on.
+std::vector<char> loadedBodies(const WorldData& d, const Loads& loads) {
+  std::vector<char> loaded(d.bodies.size(), 0);
+  for (std::size_t b = 0; b < loaded.size(); ++b) loaded[b] = !d.bodies[b].deadLoads.empty();
+  for (const ToolSpring& t : loads.toolSprings) loaded[t.body] = 1;
+  for (const HeldNode& held : loads.heldNodes) loaded[held.body] = 1;
+  return loaded;
 }
 
 // Per body, the first body of its island: those that contacts join.
@@ -68,7 +66,7 @@ std::vector<int> islandsOf(const WorldData& d, const std::vector<CarriedImpulse>
 }
 
 void stop(WorldData& d, const BodyRange& r) {
-  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i)
+  for (const int i : spheresOf(r))
     d.spheres.velocity[i] = d.spheres.angularMomentum[i] = d.spheres.angularVelocity[i] = {};
   for (const int i : r.node) setVector(d.nodes.velocity, i, Eigen::Vector3d::Zero());
 }
@@ -175,7 +173,7 @@ void listAwake(WorldData& d) {
     ++a.bodies;
     Batch& batch = a.batches[r.batch];
     batch.bodies.push_back(static_cast<int>(b));
-    for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+    for (const int i : spheresOf(r)) {
       batch.spheres.push_back(i);
       addGroup(batch.sphereGroups, i);
     }
@@ -200,13 +198,9 @@ void listAwake(WorldData& d) {
 }
 
 void frameLoadedSkins(WorldData& d, const Loads& loads) {
-  std::vector<char> loaded(d.bodies.size(), 0);
-  for (const ToolSpring& t : loads.toolSprings) loaded[t.body] = 1;
-  for (const HeldNode& held : loads.heldNodes) loaded[held.body] = 1;
-  for (std::size_t b = 0; b < loaded.size(); ++b) {
-    if (!d.bodies[b].deadLoads.empty()) loaded[b] = 1;
+  std::vector<char> loaded = loadedBodies(d, loads);
+  for (std::size_t b = 0; b < loaded.size(); ++b)
     if (d.bodies[b].surface != SurfaceMode::skin) loaded[b] = 0;
-  }
   if (loaded == d.awake.loadedSkins) return;
   d.awake.loadedSkins = std::move(loaded);
   listAwake(d);
@@ -219,7 +213,10 @@ void layOutRest(WorldData& d) {
 
 void fallAsleep(WorldData& d, const Loads& loads) {
   if (d.settings.integrator == Integrator::implicit || d.settings.sleepAfter == 0 || d.awake.bodies == 0) return;
-  countStillFrames(d, busyBodies(d, loads));
+  std::vector<char> busy = loadedBodies(d, loads);
+  for (std::size_t b = 0; b < busy.size(); ++b)
+    if (!d.bodies[b].driven.empty()) busy[b] = 1;
+  countStillFrames(d, busy);
   const double enough = d.settings.sleepAfter / d.settings.frameDuration;
   const auto isTired = [enough](const Rest& r) { return !r.asleep && r.stillFrames > enough; };
   if (std::none_of(d.rest.begin(), d.rest.end(), isTired)) return;

@@ -22,9 +22,8 @@ MEDULLA_INLINE void orient(Turning& t) {
 
 Turning readTurning(const Spheres& s, std::size_t i) {
   Turning t;
-  t.q = gather(s.orientation[i], s.orientation[i + 1], s.orientation[i + 2], s.orientation[i + 3], t.w);
-  t.momentum =
-      gather(s.angularMomentum[i], s.angularMomentum[i + 1], s.angularMomentum[i + 2], s.angularMomentum[i + 3]);
+  t.q = gatherFour(s.orientation, i, t.w);
+  t.momentum = gatherFour(s.angularMomentum, i);
   orient(t);
   return t;
 }
@@ -57,7 +56,7 @@ void stepNodes(Nodes& n, const std::vector<int>& groups, const Quad& gravity, do
   const Lanes zero = splat(0);
   const Lanes3 fall = splat(h) * splat(gravity);
   for (const int g : groups) {
-    const Lanes perMass = _mm256_loadu_pd(&n.inverseMass[4 * g]), moves = isLess(zero, perMass);
+    const Lanes perMass = loadFour(n.inverseMass, 4 * g), moves = isLess(zero, perMass);
     const Lanes3 falling{_mm256_and_pd(moves, fall.x), _mm256_and_pd(moves, fall.y), _mm256_and_pd(moves, fall.z)};
     put(fma(splat(h) * perMass, n.force[g], n.velocity[g] + falling), n.velocity[g]);
   }

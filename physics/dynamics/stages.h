@@ -7,6 +7,11 @@
 // substep's beginning; velocities follow, then loads from tools and contact, then positions (semi-implicit Euler).
 namespace medulla {
 
+// s, of a substep or of a stage of an implicit one: when it ends, and from there to the frame's end.
+struct StepTime {
+  double end = 0, remaining = 0;
+};
+
 // link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
 void evaluateLinks(WorldData&, const Batch&);
 // The same without the frames that no node asks for within a substep; forces of such links are in their slots then.
@@ -22,11 +27,12 @@ void dragVelocities(WorldData&, const Batch&);  // driven.cpp: the medium's resi
 void stepVelocities(WorldData&, const Batch&);  // spheres and nodes
 // loads.cpp: dead loads as they are at `time`, the substep's end (s).
 void applyDeadLoads(WorldData&, double time);
-// driven.cpp: driven spheres get the velocity that takes them to their path at `time`, the substep's end (s).
-void driveSpheres(WorldData&, double time);
+// How much of such a load acts at `time` (s), 0 to 1: none while bodies settle.
+double shareAt(const WorldData&, const NodeForce& load, double time);
+// driven.cpp: driven spheres get the velocity that takes them within `duration` (s) to their path at `time` (s).
+void driveSpheres(WorldData&, double time, double duration);
 // loads.cpp: tool springs and held nodes, implicitly against the velocities of this substep, so that their stiffness
-// does not bound the step. `remaining` is the time (s) from the substep's end to the frame's. Adds N s to
-// `toolImpulse`.
+// does not bound the step. Adds N s to `toolImpulse`.
 void applyLoads(WorldData&, const Loads& loads, double remaining, std::vector<Eigen::Vector3d>& toolImpulse);
 // contact_find.cpp: impulses between bodies, and on bodies from static shapes, against the velocities of this substep.
 void resolveContacts(WorldData&);
@@ -83,5 +89,8 @@ void refreshAngularVelocities(WorldData&);
 // J: elastic energies of the current state.
 double linkEnergy(const WorldData&);
 double surfaceEnergy(const WorldData&);  // edges, attachments and pressure; of the last evaluateAttachments()
+inline double elasticEnergy(const WorldData& d) {
+  return linkEnergy(d) + surfaceEnergy(d);
+}
 
 }  // namespace medulla

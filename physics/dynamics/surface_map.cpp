@@ -117,7 +117,7 @@ void addSquare(const Lanes* row, Lanes weight, Lanes* sum) {
 }
 
 Lanes massesOf(const std::vector<double>& mass, int g) {
-  return _mm256_loadu_pd(&mass[4 * g]);
+  return loadFour(mass, 4 * g);
 }
 
 }  // namespace

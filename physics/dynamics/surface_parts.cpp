@@ -33,9 +33,9 @@ void layOutGive(WorldData& d) {
   SurfaceParts& s = d.surface;
   s.give.resize(d.nodes.dynamicEnd / 4);
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
-    const Lanes moves = isLess(splat(0), _mm256_loadu_pd(&d.nodes.inverseMass[4 * g]));
+    const Lanes moves = isLess(splat(0), loadFour(d.nodes.inverseMass, 4 * g));
     const Lanes give = _mm256_and_pd(moves, splat(1) / select(moves, d.nodes.groups[g].stiffness, splat(1)));
-    s.give[g] = {give, give * _mm256_loadu_pd(&d.nodes.mass[4 * g])};
+    s.give[g] = {give, give * loadFour(d.nodes.mass, 4 * g)};
   }
 }
 
@@ -195,7 +195,7 @@ std::vector<WholeMotion> wholeMotions(const WorldData& d) {
   std::vector<WholeMotion> out(d.bodies.size());
   for (const Batch& batch : d.awake.batches) {
     for (const int b : batch.bodies) {
-      for (int i = d.ranges[b].firstSphere; i < d.ranges[b].firstSphere + d.ranges[b].sphereCount; ++i) {
+      for (const int i : spheresOf(d.ranges[b])) {
         addMass(d.spheres.groups[i / 4].mass[i % 4], vectorOf(d.spheres.position[i]), vectorOf(d.spheres.velocity[i]),
                 out[b]);
         out[b].angular += vectorOf(d.spheres.angularMomentum[i]);
@@ -214,7 +214,7 @@ std::vector<WholeMotion> wholeMotions(const WorldData& d) {
 void addMotion(WorldData& d, int body, const Vector3d& velocity, const Vector3d& spin, const Vector3d& centre) {
   const BodyRange& r = d.ranges[body];
   const auto at = [&](const Vector3d& x) { return Vector3d(velocity + spin.cross(x - centre)); };
-  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+  for (const int i : spheresOf(r)) {
     store(d.spheres.velocity[i], load(d.spheres.velocity[i]) + load(quadOf(at(vectorOf(d.spheres.position[i])))));
     d.spheres.angularVelocity[i] = quadOf(vectorOf(d.spheres.angularVelocity[i]) + spin);
     d.spheres.angularMomentum[i] = quadOf(vectorOf(d.spheres.angularMomentum[i]) + inertiaOf(d, i) * spin);
@@ -267,7 +267,7 @@ double measureShifts(WorldData& d, std::size_t part) {
   Lanes squared = splat(0);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const Lanes3 off = gatherFour(d.nodes.displaced, 4 * g) - hangingAt(d, gravity, splat(pressure), g);
-    const Lanes isNode = isLess(splat(0), _mm256_loadu_pd(&d.nodes.mass[4 * g]));  // pads drift
+    const Lanes isNode = isLess(splat(0), loadFour(d.nodes.mass, 4 * g));  // pads drift
     storeFour(off, d.surface.shift, 4 * g);
     if (g >= d.surface.parts[part].firstChoice) squared = larger(squared, _mm256_and_pd(isNode, dot(off, off)));
   }
@@ -285,7 +285,7 @@ double balanceShifts(WorldData& d, std::size_t part) {
     const NodeGroup& group = d.nodes.groups[g];
     const Lanes3 alone = gatherFour(d.nodes.displaced, 4 * g) - gatherFour(s.shift, 4 * g);
     const Lanes3 pull = pullOfEdges(d.springs, d.nodes.groups.data(), d.nodes.displaced.data(), alone, g);
-    const Lanes moves = isLess(zero, _mm256_loadu_pd(&d.nodes.inverseMass[4 * g]));
+    const Lanes moves = isLess(zero, loadFour(d.nodes.inverseMass, 4 * g));
     const Lanes perForce = _mm256_and_pd(moves, splat(1) / (group.stiffness + group.edges));
     const Lanes3 shift = yielding(d, g, perForce, perForce * pull);
     storeFour(shift, s.shift, 4 * g);

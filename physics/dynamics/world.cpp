@@ -60,12 +60,17 @@ void applyForces(WorldData& d, const Batch& batch) {
   useWholeStageArrays(d, batch);
 }
 
-// What joins bodies to tools and to each other; `remaining` is the time (s) from the substep's end to the frame's.
-void applyLoadsAndContacts(WorldData& d, const Loads& loads, double remaining, FrameReport& report) {
-  const double end = static_cast<double>(d.frame + 1) * d.settings.frameDuration - remaining;
-  applyDeadLoads(d, end);
-  driveSpheres(d, end);
-  applyLoads(d, loads, remaining, report.toolImpulse);
+// Of the k-th substep of the present frame, from 1.
+StepTime timeOfSubstep(const WorldData& d, int k) {
+  const double remaining = (d.substeps - k) * d.substep;
+  return {static_cast<double>(d.frame + 1) * d.settings.frameDuration - remaining, remaining};
+}
+
+// What joins bodies to tools and to each other.
+void applyLoadsAndContacts(WorldData& d, const Loads& loads, const StepTime& time, FrameReport& report) {
+  applyDeadLoads(d, time.end);
+  driveSpheres(d, time.end, d.substep);
+  applyLoads(d, loads, time.remaining, report.toolImpulse);
   resolveContacts(d);
 }
 
@@ -77,7 +82,7 @@ void stepFrameExplicitly(WorldData& d, const Loads& loads, FrameReport& report) 
           stepPositions(world, batch);
           applyForces(world, batch);
         });
-    applyLoadsAndContacts(d, loads, (d.substeps - k) * d.substep, report);
+    applyLoadsAndContacts(d, loads, timeOfSubstep(d, k), report);
   }
   runStage(d, stepPositions);
 }
@@ -85,7 +90,7 @@ void stepFrameExplicitly(WorldData& d, const Loads& loads, FrameReport& report) 
 void stepFrameImplicitly(WorldData& d, const Loads& loads, FrameReport& report) {
   for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k) {
     runStage(d, dragVelocities);
-    stepImplicitly(d, loads, (d.substeps - k) * d.substep, report.toolImpulse);
+    stepImplicitly(d, loads, timeOfSubstep(d, k), report.toolImpulse);
   }
 }
 
@@ -96,22 +101,10 @@ Lanes zeroIfFinite(Lanes a) {
   return splat(0) * (splat(kOverflow) * a);
 }
 
-bool isFinite(const WorldData& d) {
-  const Lanes zero = splat(0);
-  Lanes3 nodes{zero, zero, zero};
-  for (const std::vector<Lanes3>* all : {&d.nodes.position, &d.nodes.velocity})
-    for (const Lanes3& a : *all) nodes = nodes + Lanes3{zeroIfFinite(a.x), zeroIfFinite(a.y), zeroIfFinite(a.z)};
-  Lanes sum = nodes.x + nodes.y + nodes.z;
-  for (const std::vector<Quad>* all :
-       {&d.spheres.position, &d.spheres.velocity, &d.spheres.orientation, &d.spheres.angularMomentum})
-    for (const Quad& q : *all) sum = sum + zeroIfFinite(load(q));
-  return sumOfLanes(sum) == 0;
-}
-
 bool isFinite(const WorldData& d, const BodyRange& r) {
   Lanes sum = splat(0);
   const auto add = [&sum](const Quad& q) { sum = sum + zeroIfFinite(load(q)); };
-  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+  for (const int i : spheresOf(r)) {
     add(d.spheres.position[i]);
     add(d.spheres.velocity[i]);
     add(d.spheres.orientation[i]);
@@ -125,9 +118,8 @@ bool isFinite(const WorldData& d, const BodyRange& r) {
 }
 
 void requireFinite(const WorldData& d, double time) {
-  if (isFinite(d)) return;
   for (std::size_t b = 0; b < d.ranges.size(); ++b) {
-    if (isFinite(d, d.ranges[b])) continue;
+    if (d.rest[b].asleep || isFinite(d, d.ranges[b])) continue;
     const std::string cause =
         d.settings.integrator == Integrator::explicitEuler && d.substep > d.stableSubstep
             ? fmt::format(
@@ -271,7 +263,7 @@ Energies World::energies() const {
   runStage(*data_, evaluateAttachments);
   const WorldData& d = *data_;
   Energies e;
-  e.elastic = linkEnergy(d) + surfaceEnergy(d);
+  e.elastic = elasticEnergy(d);
   const Eigen::Vector3d g = vectorOf(d.gravity);
   for (int i = 0; i < d.spheres.count; ++i) {
     const double mass = d.spheres.groups[i / 4].mass[i % 4];
@@ -329,7 +321,7 @@ std::uint64_t World::stateHash() const {
   };
   hash.add(time());
   for (const BodyRange& r : d.ranges) {
-    for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) {
+    for (const int i : spheresOf(r)) {
       add(d.spheres.position[i], 3);
       add(d.spheres.velocity[i], 3);
       add(d.spheres.orientation[i], 4);

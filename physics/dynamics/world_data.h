@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <ranges>
 #include <vector>
 
 #include "physics/dynamics/contact_data.h"
@@ -212,6 +213,9 @@ struct BodyRange {
   bool held = false;       // some sphere is fixed: deformation is motion against it rather than against a rigid motion
   int batch = 0;           // bodies of different batches share no group of spheres or links
 };
+inline auto spheresOf(const BodyRange& r) {
+  return std::views::iota(r.firstSphere, r.firstSphere + r.sphereCount);
+}
 
 // ---- SurfaceMode::contact: the nodes of a host move by themselves, or they are carried and their mass is the
 // spheres'.
