@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "tests/dynamics_states.h"
 #include "tests/synthetic_model.h"
 
@@ -36,6 +38,37 @@ TEST(Link, ForcesAreMinusTheEnergyGradient) {
     const double angle = seed <= 4 ? 0.2 : 1.0;  // rad about each axis: up to 100 degrees between ends
     shake(world.data(), seed, angle, 0.004, 0);
     expectForcesAreMinusGradient(world.data(), 1e-6);
+  }
+}
+
+// A flat ribbon's link, thirty-six times as stiff about one axis as about the other, hardly minds being twisted: bent
+// besides, it must mind at every twist, and as much again after a whole turn.
+TEST(Link, BendingCostsEnergyWhateverTheTwist) {
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(2, 0.03, 0.01, 4, 6)), 5e3);
+  auto model = std::make_shared<SoftBodyModel>(*b.model);
+  for (LinkSection& s : model->links[0].sections) s.bendingMomentU *= 36;
+  b.model = model;
+  b.surface = SurfaceMode::skin;
+  b.factors.torsion = 1e-9;
+  Random random(7);
+  for (int trial = 0; trial < 20; ++trial) {
+    World world(weightless(), {b});
+    WorldData& d = world.data();
+    const Vector3d line = (vectorOf(d.spheres.position[1]) - vectorOf(d.spheres.position[0])).normalized();
+    const Vector3d bend0 = 0.1 * line.cross(random.vector()), bend1 = 0.1 * line.cross(random.vector());
+    const double straight = elastic(d);
+    turnBy(d, 0, bend0);
+    double untwisted = 0;
+    for (int step = 0; step <= 36; ++step) {
+      const Quaterniond twisted = orientation(d, 1);
+      turnBy(d, 1, bend1);
+      const double energy = elastic(d) - straight;
+      if (step == 0) untwisted = energy;
+      EXPECT_GT(energy, 1e-3 * untwisted) << "twisted by " << 10 * step << " degrees";
+      if (step == 36) EXPECT_NEAR(energy, untwisted, 1e-6 * untwisted);
+      setOrientation(d, 1, twisted);
+      turnBy(d, 1, 2 * std::numbers::pi / 36 * line);
+    }
   }
 }
 

@@ -10,9 +10,8 @@ namespace medulla {
 // through the attachments of their nodes.
 std::vector<int> spheresHeldBy(const SoftBodyModel& model, const std::vector<int>& fixedNodes);
 
-// Spheres whose cells lie behind a patch of the identified network, but for a rest: finite elements have no cells
-// there, and such a frame gives way by no more than the penalty that holds the patch. Its link to the patch would set
-// the step of the whole body, for a motion of no account.
+// Spheres whose cells lie almost wholly behind a patch. Finite elements have no cells there, so such a frame is held by
+// the patch's penalty alone, and its link would dictate the whole body's step without moving anything visible.
 std::vector<int> spheresBehindPatches(const IdentifiedNetwork& network);
 
 }  // namespace medulla

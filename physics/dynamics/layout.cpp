@@ -65,8 +65,8 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
     g.flexionU1[lane] = stiffness.flexionU.end1;
     g.flexionV1[lane] = stiffness.flexionV.end1;
     g.torsion[lane] = stiffness.torsion;
-    g.couple[lane] = 0.5 * (stiffness.flexionV.couple + stiffness.flexionU.couple);
-    g.coupleDifference[lane] = 0.5 * (stiffness.flexionV.couple - stiffness.flexionU.couple);
+    g.coupleU[lane] = stiffness.flexionU.couple;
+    g.coupleV[lane] = stiffness.flexionV.couple;
     // The rest of the group becomes copies without stiffness, overwritten by the links that follow.
     for (int l = lane; l < 4; ++l) {
       g.sphere0[l] = static_cast<std::uint32_t>(firstSphere + link.sphere0);

@@ -126,20 +126,49 @@ MEDULLA_INLINE Flexion damped(const Flexion& q, const Flexion& rate, Lanes relax
   return {fma(relaxation, rate.a, q.a), fma(relaxation, rate.b, q.b)};
 }
 
-// The two ends' flexions as vectors across the line: their product in space is that of the components, end 1's turned
-// back by the twist. It couples the ends whatever the twist; of unequal stiffnesses about U and V half the difference
-// acts between components as they stand, for want of a plane that both ends share.
-//   energy = 1/2 sum k a^2 + ... + c (cos (a0 a1 + b0 b1) + sin (b0 a1 - a0 b1)) + d (a0 a1 - b0 b1)
-MEDULLA_INLINE Flexion momentsAt0(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1) {
-  const Lanes a = m.cosine * q1.a - m.sine * q1.b, b = fma(m.sine, q1.a, m.cosine * q1.b);
-  return {fma(l.flexionV0, q0.a, fma(l.couple, a, l.coupleDifference * q1.a)),
-          fma(l.flexionU0, q0.b, l.couple * b - l.coupleDifference * q1.b)};
+// Components of a flexion in axes turned about the line by the angle of this cosine and sine.
+MEDULLA_INLINE Flexion turned(const Flexion& q, Lanes cosine, Lanes sine) {
+  return {fma(sine, q.b, cosine * q.a), fnma(sine, q.a, cosine * q.b)};
 }
-MEDULLA_INLINE Flexion momentsAt1(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1) {
-  const Lanes a = fma(m.sine, q0.b, m.cosine * q0.a), b = m.cosine * q0.b - m.sine * q0.a;
-  return {fma(l.flexionV1, q1.a, fma(l.couple, a, l.coupleDifference * q0.a)),
-          fma(l.flexionU1, q1.b, l.couple * b - l.coupleDifference * q0.b)};
+
+// A beam bends in planes that both ends share: in axes midway between theirs, half the twist from either. With A and B
+// the flexions' components there
+//   energy = 1/2 (kV0 A0^2 + kV1 A1^2) + cV A0 A1 + 1/2 (kU0 B0^2 + kU1 B1^2) + cU B0 B1,
+// positive whatever the twist and the same after a whole turn of it. Rejected: each end's own stiffnesses in its own
+// axes and the coupling between them, which is negative from some twist on where U and V differ (30 degrees of a flat
+// ribbon's link). Springs know no coupling and keep to their ends' axes.
+struct Bending {
+  Flexion still0, still1;      // in the middle's axes
+  Flexion moments0, moments1;  // derivatives of the energy, in the ends' own
+};
+
+MEDULLA_INLINE Flexion momentsInMiddle(Lanes ownV, Lanes ownU, const LinkGroup& l, const Flexion& own,
+                                       const Flexion& other) {
+  return {fma(ownV, own.a, l.coupleV * other.a), fma(ownU, own.b, l.coupleU * other.b)};
 }
+
+// `q` are the flexions that the moments answer to, with what damps them; `still` those of the present pose.
+MEDULLA_INLINE Bending bend(const LinkGroup& l, Lanes twist, const Flexion& q0, const Flexion& q1,
+                            const Flexion& still0, const Flexion& still1) {
+  Bending b{still0, still1, {l.flexionV0 * q0.a, l.flexionU0 * q0.b}, {l.flexionV1 * q1.a, l.flexionU1 * q1.b}};
+  if (!l.hasBeams) return b;
+  Lanes cosine, sine;
+  cosineSine(splat(0.5) * l.beam * twist, cosine, sine);
+  const Lanes back = splat(0) - sine;
+  const Flexion m0 = turned(q0, cosine, sine), m1 = turned(q1, cosine, back);
+  b.still0 = turned(still0, cosine, sine);
+  b.still1 = turned(still1, cosine, back);
+  b.moments0 = turned(momentsInMiddle(l.flexionV0, l.flexionU0, l, m0, m1), cosine, back);
+  b.moments1 = turned(momentsInMiddle(l.flexionV1, l.flexionU1, l, m1, m0), cosine, sine);
+  return b;
+}
+
+// Derivative of that energy by the twist: d A0 = B0 / 2, d B0 = -A0 / 2, and end 1's the other way round.
+MEDULLA_INLINE Lanes bendingTorque(const LinkGroup& l, const Flexion& q0, const Flexion& q1) {
+  const Lanes own = (l.flexionV0 - l.flexionU0) * (q0.a * q0.b) - (l.flexionV1 - l.flexionU1) * (q1.a * q1.b);
+  return splat(0.5) * l.beam * fma(l.coupleU + l.coupleV, q1.a * q0.b - q0.a * q1.b, own);
+}
+
 // Beyond kFoldAngle the mean of the two stiffnesses acts on what is left to 180 degrees instead of on the flexion:
 // energy k (g^2 - (a^2 + b^2) / 2) with g = kFoldAngle, in value and slope the same there, k g^2 at 180. The difference
 // of the stiffnesses and the coupling are left as they are.
@@ -152,10 +181,6 @@ double foldEnergy(const LinkEnd& e, const Flexion& still, Lanes stiffnesses, int
   const double squared = still.a[lane] * still.a[lane] + still.b[lane] * still.b[lane];
   const Lanes both = _mm256_and_pd(e.angle.folded, stiffnesses);
   return 0.5 * both[lane] * (kFoldAngle * kFoldAngle - squared);
-}
-
-MEDULLA_INLINE Lanes couplingTorque(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1) {
-  return l.couple * (m.cosine * (q0.b * q1.a - q0.a * q1.b) - m.sine * fma(q0.a, q1.a, q0.b * q1.b));
 }
 
 // Neo-Hookean, incompressible: EA/3 (x - 1/x^2) at the stretch x, of stiffness EA at rest. Shorter than
@@ -213,17 +238,17 @@ MEDULLA_INLINE void evaluate(const LinkGroup& link, const Spheres& spheres, Quad
   const Flexion still0 = flexionOf(m.end0), still1 = flexionOf(m.end1);
   const Flexion q0 = damped(still0, flexionRate(m.end0, e.nRate, e.s0.angularVelocity, m.n), link.relaxation);
   const Flexion q1 = damped(still1, flexionRate(m.end1, e.nRate, e.s1.angularVelocity, m.n), link.relaxation);
-  Flexion moments0 = momentsAt0(link, m, q0, q1), moments1 = momentsAt1(link, m, q0, q1);
-  fold(m.end0, still0, link.flexionU0 + link.flexionV0, moments0);
-  fold(m.end1, still1, link.flexionU1 + link.flexionV1, moments1);
-  const Lanes3 bend0 = flexionGradient(m.end0, moments0), bend1 = flexionGradient(m.end1, moments1);
-  const Lanes3 bend = bend0 + bend1;
-  const Lanes3 across = fnma(dot(bend, m.n), m.n, bend);
+  Bending b = bend(link, m.twist, q0, q1, still0, still1);
+  fold(m.end0, still0, link.flexionU0 + link.flexionV0, b.moments0);
+  fold(m.end1, still1, link.flexionU1 + link.flexionV1, b.moments1);
+  const Lanes3 bend0 = flexionGradient(m.end0, b.moments0), bend1 = flexionGradient(m.end1, b.moments1);
+  const Lanes3 both = bend0 + bend1;
+  const Lanes3 across = fnma(dot(both, m.n), m.n, both);
   e.force1 = (splat(0) - tension) * m.n - m.inverseLength * across;
   e.torque0 = cross(m.n, bend0);
   e.torque1 = cross(m.n, bend1);
-  e.twistMoment =
-      fma(link.torsion, fma(link.relaxation, e.spin1 - e.spin0, m.twist), couplingTorque(link, m, still0, still1));
+  e.twistMoment = link.torsion * fma(link.relaxation, e.spin1 - e.spin0, m.twist);
+  if (link.hasBeams) e.twistMoment = e.twistMoment + bendingTorque(link, b.still0, b.still1);
 }
 
 void evaluateGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwoundTwist, LinkFrame& f) {
@@ -350,7 +375,8 @@ double linkEnergy(const WorldData& d) {
         measure(link, gatherSpheres(d.spheres, link.sphere0, link.restArm0, link.hasArms),
                 gatherSpheres(d.spheres, link.sphere1, link.restArm1, link.hasArms), load(d.links.unwoundTwist[g]));
     const Flexion q0 = flexionOf(m.end0), q1 = flexionOf(m.end1);
-    const Flexion m0 = momentsAt0(link, m, q0, q1), m1 = momentsAt1(link, m, q0, q1);
+    const Bending b = bend(link, m.twist, q0, q1, q0, q1);
+    const Flexion &m0 = b.moments0, &m1 = b.moments1;
     const Lanes twice = q0.a * m0.a + q0.b * m0.b + q1.a * m1.a + q1.b * m1.b + link.torsion * m.twist * m.twist;
     const int lanes = std::min(4, d.links.count - 4 * static_cast<int>(g));
     for (int lane = 0; lane < lanes; ++lane) sum += energyOf(link, m, q0, q1, twice, lane);

@@ -39,10 +39,6 @@ MEDULLA_INLINE EndRows endRows(const LinkGroup& g, const Spheres& s, const std::
   return {lineGradient(f, e.a), lineGradient(f, e.b), cross(e.a, f.n), cross(e.b, f.n)};
 }
 
-MEDULLA_INLINE Lanes3 combined(Lanes a, const Lanes3& x, Lanes b, const Lanes3& y, Lanes c, const Lanes3& z) {
-  return fma(c, z, fma(b, y, a * x));
-}
-
 // Slope and value of the tension: link_force.cpp.
 void elongationLaw(const LinkGroup& g, Lanes length, Lanes& slope, Lanes& tension) {
   const Lanes one = splat(1), third = splat(1.0 / 3);
@@ -55,32 +51,23 @@ void elongationLaw(const LinkGroup& g, Lanes length, Lanes& slope, Lanes& tensio
   tension = g.elongation * fma(g.beam, hyper - linear, linear);
 }
 
-// Stiffnesses between the flexions of the two ends, times `damped`. Turned by the twist, a coupling larger than that
-// between unlike stiffnesses would not be positive.
-struct Couples {
-  Lanes a, b, sine;
-};
-
-MEDULLA_INLINE Couples couplesOf(const LinkGroup& g, const LinkPose& f, Lanes damped) {
-  const Lanes largest = squareRoot(_mm256_min_pd(g.flexionU0 * g.flexionV1, g.flexionV0 * g.flexionU1));
-  const Lanes couple = select(isLess(largest, g.couple), largest, g.couple);
-  Lanes cosine, sine;
-  cosineSine(f.twist, cosine, sine);
-  return {damped * (couple * cosine + g.coupleDifference), damped * (couple * cosine - g.coupleDifference),
-          damped * couple * sine};
+// In axes turned about the line: link_force.cpp, `turned`.
+MEDULLA_INLINE EndRows turned(const EndRows& e, Lanes cosine, Lanes sine) {
+  const auto a = [&](const Lanes3& ofA, const Lanes3& ofB) { return fma(sine, ofB, cosine * ofA); };
+  const auto b = [&](const Lanes3& ofA, const Lanes3& ofB) { return fnma(sine, ofA, cosine * ofB); };
+  return {a(e.lineA, e.lineB), b(e.lineA, e.lineB), a(e.turnA, e.turnB), b(e.turnA, e.turnB)};
 }
 
 // What flexions and torsion add.
 MEDULLA_INLINE void addTurning(const LinkGroup& g, const LinkPose& f, const Spheres& s, Lanes damped, LinkBlocks& m) {
-  const EndRows e0 = endRows(g, s, g.sphere0, f), e1 = endRows(g, s, g.sphere1, f);
-  const Couples c = couplesOf(g, f, damped);
-  const Lanes minusSine = splat(0) - c.sine;
+  Lanes cosine, sine;  // of half the twist: a beam's ends bend in axes midway between theirs
+  cosineSine(splat(0.5) * g.beam * f.twist, cosine, sine);
+  const EndRows e0 = turned(endRows(g, s, g.sphere0, f), cosine, sine),
+                e1 = turned(endRows(g, s, g.sphere1, f), cosine, splat(0) - sine);
   const Lanes a0 = damped * g.flexionV0, b0 = damped * g.flexionU0, a1 = damped * g.flexionV1,
-              b1 = damped * g.flexionU1, twist = damped * g.torsion;
-  const Lanes3 ofA0 = combined(a0, e0.lineA, c.a, e1.lineA, minusSine, e1.lineB);
-  const Lanes3 ofB0 = combined(b0, e0.lineB, c.sine, e1.lineA, c.b, e1.lineB);
-  const Lanes3 ofA1 = combined(a1, e1.lineA, c.a, e0.lineA, c.sine, e0.lineB);
-  const Lanes3 ofB1 = combined(b1, e1.lineB, minusSine, e0.lineA, c.b, e0.lineB);
+              b1 = damped * g.flexionU1, ca = damped * g.coupleV, cb = damped * g.coupleU, twist = damped * g.torsion;
+  const Lanes3 ofA0 = fma(ca, e1.lineA, a0 * e0.lineA), ofB0 = fma(cb, e1.lineB, b0 * e0.lineB);
+  const Lanes3 ofA1 = fma(ca, e0.lineA, a1 * e1.lineA), ofB1 = fma(cb, e0.lineB, b1 * e1.lineB);
   const Lanes3 lineTwist = lineGradient(f, f.spinLever0 - f.spinLever1), ofTwist = twist * lineTwist;
   const Lanes3 spin0 = splat(-1) * f.spinAxis0;
   addOuter(e0.lineA, ofA0, m.line);
@@ -100,8 +87,8 @@ MEDULLA_INLINE void addTurning(const LinkGroup& g, const LinkPose& f, const Sphe
   addOuter(a1 * e1.turnA, e1.turnA, m.turn1);
   addOuter(b1 * e1.turnB, e1.turnB, m.turn1);
   addOuter(twist * f.spinAxis1, f.spinAxis1, m.turn1);
-  addOuter(e0.turnA, fma(c.a, e1.turnA, minusSine * e1.turnB), m.between);
-  addOuter(e0.turnB, fma(c.sine, e1.turnA, c.b * e1.turnB), m.between);
+  addOuter(ca * e0.turnA, e1.turnA, m.between);
+  addOuter(cb * e0.turnB, e1.turnB, m.between);
   addOuter(twist * spin0, f.spinAxis1, m.between);
 }
 

@@ -50,7 +50,7 @@ struct DeadLoad {
   double from = 0, to = 1;                          // s, from <= to
 };
 
-// `whole` shared out over the nodes by the area that each stands for; its own node is of no account.
+// `whole` shared out over the nodes by the area that each stands for; its own node is ignored.
 std::vector<DeadLoad> spreadLoad(const SoftBodyModel& model, const std::vector<int>& nodes, const DeadLoad& whole);
 
 struct Loads {

@@ -239,7 +239,7 @@ void fallAsleep(WorldData& d, const Loads& loads) {
   d.contact.listsAreOld = true;
 }
 
-// No effect on the awake.
+// Wakes the body and its island; does nothing if it is awake.
 static void wake(WorldData& d, int body) {
   if (!d.rest[body].asleep) return;
   const std::vector<int> island = islandsOf(d, d.contact.resting);

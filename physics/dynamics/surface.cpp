@@ -31,7 +31,7 @@ template <class Visit>
 MEDULLA_INLINE void visitLink(const WorldData& d, int link, const Visit& visit) {
   LinkHost host = linkHost(d, link);
   if (host.isBeam) {
-    host.isBeam = true;  // for the compiler, which does not see that it is
+    host.isBeam = true;  // tells the compiler that it is constant here: the inlined loop does not test it
     visit(host);
   } else {
     host.isBeam = false;

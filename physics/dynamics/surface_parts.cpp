@@ -18,8 +18,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Of the body's mean radius, besides what weight sinks nodes by, which edges share out: a part whose nodes edges would
-// shift by more joins.
+// A carried part starts to move when its edges would shift a node by more than this share of the body's mean radius,
+// plus the node's sag under its weight.
 constexpr double kUnrest = 0.002;
 constexpr double kQuiet = 0.5;    // of that: nodes nearer are at rest
 constexpr int kQuietFrames = 10;  // a fifth of a second at 50 Hz: several periods of a node on its attachment

@@ -75,7 +75,7 @@ struct LinkGroup {  // constants of four links
   Lanes elongation, torsion;            // N/m, N m/rad
   Lanes flexionU0, flexionV0;           // N m/rad about U, about V, at the end on sphere 0
   Lanes flexionU1, flexionV1;           // on sphere 1
-  Lanes couple, coupleDifference;       // N m/rad between the ends: mean over U and V, and half of V less U
+  Lanes coupleU, coupleV;               // between the ends
   Lanes beam;                           // 1, or 0: a spring, linear along, whose nodes keep to its chord
   bool hasBeams;                        // some link of the four is one
   Lanes thinning;                       // twice the Poisson's ratio that what hangs on a beam follows
