@@ -42,26 +42,29 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   // proportion.
   constexpr double kThinnest = 1.5e-3, kThickest = 7e-3;  // m
   instrument.scale = float(tool.settings.radius / std::clamp(tool.settings.radius, kThinnest, kThickest));
-  // A grip of 0.5 is where the jaws meet tissue and hold it.
-  constexpr double kOpenJaw = 0.38, kClosedJaw = 0.03;  // rad
-  instrument.jawAngle = float(kClosedJaw + (kOpenJaw - kClosedJaw) * std::max(0.0, 1 - 2 * input.grip));
   instrument.touching = state.inContact || state.holding;
-  // Over the grip's last part, a few pictures long: tissue would jump into and out of the jaws else.
+  // A grip of 0.5 is where the jaws meet tissue and hold it. Over the grip's last part, a few pictures long, they close
+  // on it and it rises between them: it would jump into and out of the jaws else.
   constexpr double kHeld = 0.5, kFirm = 0.95;
   const double firm = std::clamp((input.grip - kHeld) / (kFirm - kHeld), 0.0, 1.0);
+  constexpr double kOpenJaw = 0.38, kHoldingJaw = 0.11, kClosedJaw = 0.03;  // rad
+  const double closed = std::min(input.grip / kHeld, 1.0);
+  instrument.jawAngle = float(kOpenJaw + (kHoldingJaw - kOpenJaw) * closed + (kClosedJaw - kHoldingJaw) * firm);
   instrument.hold = state.holding ? float(firm * firm * (3 - 2 * firm)) : 0.f;
   // A dent as deep as Hertz's contact has it for a tip of 3 mm in tissue of some 10 kPa, up to what stays a dent.
-  constexpr double kDeepest = 4e-3, kSoft = 0.3;  // m, at scale 1; N
+  constexpr double kDeepest = 4e-3, kSoft = 0.15;  // m, at scale 1; N
   const double force = state.force.norm();
   if (state.inContact && force > 0)
     instrument.press = toGlm(-kDeepest * instrument.scale * (1 - std::exp(-force / kSoft)) / force * state.force);
   // What a grip pulls at does not give way.
   const bool pulls = state.holding && glm::dot(instrument.press, instrument.worldFromTool * glm::vec3(0, 0, 1)) > 0;
-  instrument.press *= pulls ? 0.f : 1 - instrument.hold;
-  // The picture shows the proxy: an instrument never enters the tissue, its device may. The proxy is a sphere, the jaws
-  // reach to its far side along the shaft.
+  if (pulls) instrument.press = glm::vec3(0);
+  // The picture shows the proxy: an instrument never enters the tissue, its device may. What holds is drawn where the
+  // hand is: its proxy hangs on the tissue, and the instrument would jump when it lets go. The proxy is a sphere, the
+  // jaws reach to its far side along the shaft.
+  const Eigen::Vector3d& centre = state.holding ? state.device : state.proxy;
   instrument.tip =
-      toGlm(state.proxy - tool.settings.radius * (input.worldFromTool * Eigen::Vector3d::UnitZ())) + instrument.press;
+      toGlm(centre - tool.settings.radius * (input.worldFromTool * Eigen::Vector3d::UnitZ())) + instrument.press;
   picture.instruments.push_back(instrument);
 }
 
@@ -131,8 +134,12 @@ SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Rende
       throw inputError(scene.path, line, error.what());
     }
   };
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    add(scene.bodies[b].line, shapeOf(loaded.models[b]->renderSurface, rest.bodies[b].nodes, scene.bodies[b].look));
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const SceneBody& body = scene.bodies[b];
+    SurfaceShape shape = shapeOf(loaded.models[b]->renderSurface, rest.bodies[b].nodes, body.look);
+    shape.travels = body.fixed.empty() && body.fixedNodes.empty();
+    add(body.line, std::move(shape));
+  }
   for (std::size_t s = 0; s < scene.statics.size(); ++s) {
     const SceneStatic& item = scene.statics[s];
     if (item.look.empty()) continue;

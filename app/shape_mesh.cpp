@@ -1,5 +1,6 @@
 #include "app/shape_mesh.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <numbers>
@@ -22,6 +23,10 @@ static void addPatch(TriangleMesh& mesh, const Vector3d& corner, const Vector3d&
   }
 }
 
+// Colour is per vertex: so many cells per metre show a look's pattern.
+constexpr double kCellsPerMetre = 64;
+constexpr int kFewestCells = 8, kMostCells = 96;
+
 // Faces share no vertices: edges stay sharp where normals are averaged at vertices.
 static TriangleMesh boxMesh(const Vector3d& size) {
   TriangleMesh mesh;
@@ -30,7 +35,9 @@ static TriangleMesh boxMesh(const Vector3d& size) {
       const int a = (axis + 1) % 3, b = (axis + 2) % 3;
       Vector3d u = size[a] * Vector3d::Unit(a), v = size[b] * Vector3d::Unit(b);
       if (side < 0) std::swap(u, v);
-      addPatch(mesh, 0.5 * (side * size[axis] * Vector3d::Unit(axis) - u - v), u, v, 8);
+      const int cells =
+          std::clamp(static_cast<int>(kCellsPerMetre * std::max(u.norm(), v.norm())), kFewestCells, kMostCells);
+      addPatch(mesh, 0.5 * (side * size[axis] * Vector3d::Unit(axis) - u - v), u, v, cells);
     }
   }
   return mesh;
@@ -66,7 +73,7 @@ TriangleMesh shapeMesh(const StaticShape& shape) {
   switch (shape.kind) {
     case StaticShape::Kind::plane: {
       TriangleMesh mesh;
-      addPatch(mesh, Vector3d(-0.5, 0, -0.5), Vector3d::UnitZ(), Vector3d::UnitX(), 32);
+      addPatch(mesh, Vector3d(-0.5, 0, -0.5), Vector3d::UnitZ(), Vector3d::UnitX(), static_cast<int>(kCellsPerMetre));
       return mesh;
     }
     case StaticShape::Kind::box:

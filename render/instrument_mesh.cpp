@@ -1,6 +1,7 @@
 #include "render/instrument_mesh.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace medulla {
@@ -45,12 +46,13 @@ class Builder {
     for (const std::uint32_t i : {a, b, c, a, c, d}) mesh_.index.push_back(i);
   }
   // A flat face with corners of its own.
-  void face(vec3 a, vec3 b, vec3 c, vec3 d, vec3 albedo, float openness) {
+  void face(const std::array<vec3, 4>& corner, vec3 albedo, const std::array<float, 4>& openness) {
+    const auto& [a, b, c, d] = corner;
     const vec3 n = glm::cross(b - a, d - a) + glm::cross(d - c, b - c);
     if (glm::dot(n, n) < 1e-24f) return;
-    const std::uint32_t ia = vertex(a, n, albedo, openness), ib = vertex(b, n, albedo, openness),
-                        ic = vertex(c, n, albedo, openness), id = vertex(d, n, albedo, openness);
-    quad(ia, ib, ic, id);
+    std::array<std::uint32_t, 4> i;
+    for (int k = 0; k < 4; ++k) i[k] = vertex(corner[k], n, albedo, openness[k]);
+    quad(i[0], i[1], i[2], i[3]);
   }
 
  private:
@@ -154,18 +156,20 @@ void addJaw(Builder& b, float side, float angle) {
     const float y0 = depth(t0, k % 2 == 0), y1 = depth(t1, k % 2 == 1);
     const vec3 p0 = place(-j0.halfWidth, y0, j0.z), p1 = place(j0.halfWidth, y0, j0.z),
                q0 = place(-j1.halfWidth, y1, j1.z), q1 = place(j1.halfWidth, y1, j1.z);
+    const auto openness = [](float t, float y) { return (y < kValley ? 0.9f : 0.3f) * (0.4f + 0.6f * t); };
+    const std::array<float, 2> open{openness(t0, y0), openness(t1, y1)};
     if (side > 0)
-      b.face(p0, q0, q1, p1, 0.65f * kSteel, 0.7f);
+      b.face({p0, q0, q1, p1}, 0.5f * kSteel, {open[0], open[1], open[1], open[0]});
     else
-      b.face(p0, p1, q1, q0, 0.65f * kSteel, 0.7f);
+      b.face({p0, p1, q1, q0}, 0.5f * kSteel, {open[0], open[0], open[1], open[1]});
     // Flank between the outer side's rim and the ridge.
     for (const float x : {-1.f, 1.f}) {
       const vec3 a = place(x * j0.halfWidth, kJawRim, j0.z), d = place(x * j1.halfWidth, kJawRim, j1.z);
       const vec3 e = x < 0 ? p0 : p1, f = x < 0 ? q0 : q1;
       if ((side > 0) == (x > 0))
-        b.face(a, e, f, d, 0.8f * kSteel, 0.85f);
+        b.face({a, e, f, d}, 0.8f * kSteel, {0.85f, open[0], open[1], 0.85f});
       else
-        b.face(a, d, f, e, 0.8f * kSteel, 0.85f);
+        b.face({a, d, f, e}, 0.8f * kSteel, {0.85f, 0.85f, open[1], open[0]});
     }
   }
 }

@@ -69,7 +69,7 @@ Look stomach() {
   l.glow = {0.42f, 0.11f, 0.065f};
   l.glowDepth = 0.005f;
   l.blood = 0.8f;
-  l.bloodless = {0.78f, 0.60f, 0.46f};
+  l.bloodless = {0.82f, 0.54f, 0.43f};
   l.roughness = 0.42f;
   l.wetRoughness = 0.14f;
   l.mottle = 0.55f;
@@ -178,6 +178,7 @@ Look dolphin() {
   // Fins and flukes are as dark as the back: they reach out farther to both sides than a body of their height.
   l.patches[2] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {0, -0.6f, 1}, 0.565f, 0.615f, 1};
   l.patches[3] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {0, -0.6f, -1}, -0.435f, -0.385f, 1};
+  l.patches[4] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {-1, 0, 0}, -0.20f, -0.14f, 1};  // flukes, between their tips
   l.wrap = {0.10f, 0.12f, 0.14f};
   l.roughness = 0.50f;
   l.wetRoughness = 0.30f;

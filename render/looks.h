@@ -38,7 +38,7 @@ struct Look {
   std::string name;
   glm::vec3 albedoLow{0.5f}, albedoHigh{0.5f};  // linear RGB; noise at mottleFrequency mixes between them
   float mottleFrequency = 22;                   // 1/m
-  std::array<Patch, 4> patches;
+  std::array<Patch, 5> patches;
   glm::vec3 wrap{0};         // 0..1 per channel: light that bleeds past the terminator (subsurface scattering)
   glm::vec3 glow{0};         // linear RGB: light that comes through where the tissue is thin
   float glowDepth = 0.004f;  // m of tissue that let 1/e of it through

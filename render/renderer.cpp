@@ -253,6 +253,7 @@ int Renderer::addSurface(SurfaceShape shape) {
   SceneMesh& m = data_->rest;
   MeshPart part;
   part.look = &findLook(shape.look);
+  part.travels = shape.travels;
   part.firstVertex = std::uint32_t(m.position.size());
   part.vertexCount = std::uint32_t(shape.restPositions.size());
   part.firstIndex = std::uint32_t(m.index.size());

@@ -20,6 +20,7 @@ struct SurfaceShape {
   std::string look;                                     // a name of lookNames()
   std::vector<glm::vec3> restPositions;                 // m, world at the start of the run
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
+  bool travels = false;  // leaves the place that it has at rest: ambient occlusion is its own alone
 };
 
 // The same surface in one picture. Static surfaces leave `positions` empty and are drawn as at rest.

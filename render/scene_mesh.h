@@ -13,7 +13,8 @@ namespace medulla {
 struct MeshPart {
   const Look* look = nullptr;
   std::uint32_t firstVertex = 0, vertexCount = 0, firstIndex = 0, indexCount = 0;
-  bool moving = false;  // drawn from given positions in this picture
+  bool moving = false;   // drawn from given positions in this picture
+  bool travels = false;  // SurfaceShape
   bool instrument = false;
 };
 

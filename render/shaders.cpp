@@ -125,7 +125,8 @@ float litAt(vec2 q, float z) {
   return mix(rows.x, rows.y, w.y);
 }
 
-// Taps on three turned squares and in the middle, evenly apart seen along any edge, or it shows steps. A rotation per
+// Taps on three turned squares and in the middle, evenly spread over the disc: on a ring, the shadows of shafts as thick
+// as it is wide have a dark line along their middle. A rotation per
 // pixel would hide their steps better but leaves a pattern. Most pixels agree on the two widest squares and are done (on
 // one, the shadows of thin tools fell to pieces): llvmpipe runs both sides of a branch but leaves a loop when all its
 // pixels do, so the squares are a loop whose length the compiler cannot know.
@@ -133,7 +134,7 @@ float softShadow(vec3 p, float r) {
   vec2 q = p.xy * SHADOW_HEIGHT;
   float sum = litAt(q, p.z), taps = 1.;
   for (int k = 0; k < squares; ++k) {
-    vec2 d = r * (k == 0 ? vec2(.24, .78) : k == 1 ? vec2(.40, .56) : vec2(.50, .30));
+    vec2 d = r * (k == 0 ? vec2(.82, .22) : k == 1 ? vec2(.52, .34) : vec2(.31, .10));
     sum += litAt(q + d, p.z) + litAt(q - d, p.z) + litAt(q + vec2(-d.y, d.x), p.z) + litAt(q + vec2(d.y, -d.x), p.z);
     taps += 4.;
     if (k > 0 && (sum == 0. || sum == taps)) break;
@@ -162,7 +163,7 @@ void main() {
 #if SHADE == 1
   float s = softShadow(vShadow.xyz / vShadow.w, vAmbient.w);
   // Light bleeds into the shadow's edge through the tissue, and red light farthest.
-  diffuse *= vec3(mix(s, mix(s, sqrt(s), .5) * (1. - BLEED) + BLEED, vHalfway.w), s, s);
+  diffuse *= vec3(mix(s, mix(s, s * (2. - s), .6) * (1. - BLEED) + BLEED, vHalfway.w), s, s);
 #ifndef DULL
   gloss *= s;
 #endif

@@ -93,34 +93,43 @@ struct Gathered {
   std::vector<float> through, totalThrough;  // inside: what comes through the tissue, and all
 };
 
-// Orthographic depth map of the scene seen against `direction`, and how much light each vertex gets along it: from
-// outside past what is in the way, from inside through it (Barre-Brisebois and Bouchard 2011, local thickness).
-void gatherDirection(const SceneMesh& mesh, vec3 centre, float radius, vec3 direction, DepthMap& map,
-                     std::vector<vec3>& texel, const std::vector<float>& perDepth, Gathered& sum) {
+using Parts = std::vector<const MeshPart*>;
+
+template <class Visit>
+void visitVertices(const Parts& parts, const Visit& visit) {
+  for (const MeshPart* part : parts)
+    for (std::size_t i = part->firstVertex; i < part->firstVertex + part->vertexCount; ++i) visit(i);
+}
+
+// Orthographic depth map of these parts seen against `direction`, and how much light each of their vertices gets along
+// it: from outside past what is in the way, from inside through it (Barre-Brisebois and Bouchard 2011, local
+// thickness).
+void gatherDirection(const SceneMesh& mesh, const Parts& parts, vec3 centre, float radius, vec3 direction,
+                     DepthMap& map, std::vector<vec3>& texel, const std::vector<float>& perDepth, Gathered& sum) {
   const vec3 aside = std::abs(direction.x) < 0.7f ? vec3(1, 0, 0) : vec3(0, 1, 0);
   const vec3 right = glm::normalize(glm::cross(aside, direction)), up = glm::cross(direction, right);
   const float scale = 0.5f / radius;
-  for (std::size_t i = 0; i < texel.size(); ++i) {
+  visitVertices(parts, [&](std::size_t i) {
     const vec3 p = mesh.position[i] - centre;
     texel[i] = {(glm::dot(p, right) * scale + 0.5f) * kMapSide, (glm::dot(p, up) * scale + 0.5f) * kMapSide,
                 0.5f - glm::dot(p, direction) * scale};
-  }
+  });
   map.clear();
-  for (const MeshPart& part : mesh.parts) {
-    if (!occludes(part)) continue;
-    for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3)
+  for (const MeshPart* part : parts) {
+    if (!occludes(*part)) continue;
+    for (std::uint32_t k = part->firstIndex; k < part->firstIndex + part->indexCount; k += 3)
       map.rasterize(texel[mesh.index[k]], texel[mesh.index[k + 1]], texel[mesh.index[k + 2]]);
   }
   const float bias = 2.5f / kMapSide;  // two and a half texels
-  for (std::size_t i = 0; i < texel.size(); ++i) {
+  visitVertices(parts, [&](std::size_t i) {
     const float cosine = glm::dot(mesh.normal[i], direction);
     if (cosine <= 0) {
-      if (perDepth[i] == 0) continue;
+      if (perDepth[i] == 0) return;
       const int x = int(texel[i].x), y = int(texel[i].y);
-      if (x < 0 || y < 0 || x >= kMapSide || y >= kMapSide) continue;
+      if (x < 0 || y < 0 || x >= kMapSide || y >= kMapSide) return;
       sum.totalThrough[i] -= cosine;
       sum.through[i] -= cosine * std::exp(-perDepth[i] * std::max(texel[i].z - map.at(x, y), 0.f));
-      continue;
+      return;
     }
     sum.total[i] += cosine;
     // Reading one texel along the normal keeps the surface from hiding itself at grazing angles.
@@ -128,7 +137,28 @@ void gatherDirection(const SceneMesh& mesh, vec3 centre, float radius, vec3 dire
               y = int(texel[i].y + 1.5f * glm::dot(mesh.normal[i], up));
     const bool outside = x < 0 || y < 0 || x >= kMapSide || y >= kMapSide;
     if (outside || texel[i].z - bias <= map.at(x, y)) sum.light[i] += cosine;
-  }
+  });
+}
+
+void gatherLight(const SceneMesh& mesh, const Parts& parts, Gathered& sum) {
+  Bounds bounds;
+  for (const MeshPart* part : parts)
+    if (occludes(*part)) {
+      const Bounds b = boundsOf(mesh, *part);
+      bounds.add(b.low);
+      bounds.add(b.high);
+    }
+  if (bounds.low.x > bounds.high.x) return;
+  const vec3 centre = 0.5f * (bounds.low + bounds.high);
+  const float radius = std::max(0.5f * glm::length(bounds.high - bounds.low), 1e-6f);
+  DepthMap map(kMapSide);
+  std::vector<vec3> texel(mesh.position.size());
+  std::vector<float> perDepth(mesh.position.size(), 0.f);  // of depths 0..1 of the map: how fast light fades in tissue
+  for (const MeshPart* part : parts)
+    if (part->look->glow != vec3(0) && occludes(*part))
+      std::fill_n(perDepth.begin() + part->firstVertex, part->vertexCount, 2 * radius / part->look->glowDepth);
+  for (int k = 0; k < kDirections; ++k)
+    gatherDirection(mesh, parts, centre, radius, spiralDirection(k), map, texel, perDepth, sum);
 }
 
 // Longest and shortest way on the texture per way on the triangle, over all directions.
@@ -197,29 +227,19 @@ void bakeAlbedo(SceneMesh& mesh, const MeshPart& part) {
   }
 }
 
+// What stays where it is shades its neighbours; what travels would leave its shade behind.
 void bakeOpenness(SceneMesh& mesh) {
-  Bounds bounds;
-  for (const MeshPart& part : mesh.parts)
-    if (occludes(part)) {
-      const Bounds b = boundsOf(mesh, part);
-      bounds.add(b.low);
-      bounds.add(b.high);
-    }
   const std::size_t n = mesh.position.size();
-  std::fill(mesh.openness.begin(), mesh.openness.end(), 1.f);
-  if (n == 0 || bounds.low.x > bounds.high.x) return;
-  const vec3 centre = 0.5f * (bounds.low + bounds.high);
-  const float radius = std::max(0.5f * glm::length(bounds.high - bounds.low), 1e-6f);
-  DepthMap map(kMapSide);
-  std::vector<vec3> texel(n);
   const std::vector<float> zero(n, 0.f);
   Gathered sum{zero, zero, zero, zero};
-  std::vector<float> perDepth = zero;  // of depths 0..1 of the map: how fast light fades in the tissue
-  for (const MeshPart& part : mesh.parts)
-    if (part.look->glow != vec3(0) && occludes(part))
-      std::fill_n(perDepth.begin() + part.firstVertex, part.vertexCount, 2 * radius / part.look->glowDepth);
-  for (int k = 0; k < kDirections; ++k)
-    gatherDirection(mesh, centre, radius, spiralDirection(k), map, texel, perDepth, sum);
+  Parts staying;
+  for (const MeshPart& part : mesh.parts) {
+    if (part.travels)
+      gatherLight(mesh, {&part}, sum);
+    else
+      staying.push_back(&part);
+  }
+  gatherLight(mesh, staying, sum);
   for (std::size_t i = 0; i < n; ++i) {
     mesh.openness[i] = sum.total[i] > 0 ? sum.light[i] / sum.total[i] : 1.f;
     mesh.thinness[i] = sum.totalThrough[i] > 0 ? sum.through[i] / sum.totalThrough[i] : 0.f;

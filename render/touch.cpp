@@ -19,21 +19,22 @@ void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part) {
 namespace {
 
 // x -> x + offset w, w = exp(-|narrow (x - centre)|^2), m and 1/m. A normal turns to n - grad w (offset . n) / (1 +
-// offset . grad w), up to length: the inverse transpose. What lies next to the centre loses its blood, over `blanched`
-// metres.
+// offset . grad w), up to length: the inverse transpose. What lies next to the centre, over `blanched` metres, loses
+// the share `pale` of its blood.
 struct Bump {
   glm::vec3 centre, offset;
   glm::mat3 narrow;
-  float blanched;  // 0: nothing does
+  float blanched, pale;
 };
 void displace(const MeshPart& part, const Bump& bump, SceneMesh& mesh) {
-  constexpr float kShade = 1.8f;  // share of the cavity's light lost, per slope
+  constexpr float kShade = 0.9f;  // share of the cavity's light lost, per slope
   for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
     const glm::vec3 d = mesh.position[i] - bump.centre, scaled = bump.narrow * d;
     const float q = glm::dot(scaled, scaled);
     if (q > 9) continue;
-    if (bump.blanched > 0)
-      mesh.blanch[i] = glm::mix(mesh.blanch[i], 1.f, std::exp(-glm::dot(d, d) / (bump.blanched * bump.blanched)));
+    if (bump.pale > 0)
+      mesh.blanch[i] =
+          glm::mix(mesh.blanch[i], 1.f, bump.pale * std::exp(-glm::dot(d, d) / (bump.blanched * bump.blanched)));
     const float w = std::exp(-q);
     const glm::vec3 gradient = (scaled * bump.narrow) * (-2 * w);
     const float along = glm::dot(bump.offset, mesh.normal[i]);
@@ -80,24 +81,28 @@ static void riseBetweenJaws(const Instrument& instrument, float blanched, SceneM
   if (!held.part) return;
   const glm::vec3 offset = instrument.tip + kBite * axis - held.position;
   const float around = std::max(instrument.scale * kWidth, 1.3f * glm::length(offset));
-  displace(*held.part, {held.position, instrument.hold * offset, glm::mat3(1 / around), blanched}, mesh);
+  displace(*held.part, {held.position, instrument.hold * offset, glm::mat3(1 / around), blanched, instrument.hold},
+           mesh);
   const float thickness = std::max(kFoldThickness, 0.8f * held.spacing / instrument.scale);  // else facets stand out
   const float wide = std::max(kFoldWidth, thickness);
   const glm::vec3 narrow(1 / wide, 1 / thickness, 1 / wide);
   glm::mat3 across = glm::mat3_cast(instrument.worldFromTool);  // a column per axis of the tool
   for (int k = 0; k < 3; ++k) across[k] *= narrow[k] / instrument.scale;
   const float upright = instrument.hold * std::max(glm::dot(held.normal, axis) / instrument.scale, 0.f);
-  displace(*held.part, {instrument.tip + kBite * axis, kFold * upright * axis, glm::transpose(across), 0}, mesh);
+  displace(*held.part, {instrument.tip + kBite * axis, kFold * upright * axis, glm::transpose(across), blanched, 0},
+           mesh);
 }
 
 // The simulation moves nodes a centimetre apart; this is what happens between them.
 void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
-  constexpr float kWidth = 0.0055f, kBlanchWidth = 0.0040f;
+  constexpr float kWidth = 0.0055f, kBlanchWidth = 0.0040f, kBloodless = 0.0025f;  // the last: deep enough for it
   const float width = instrument.scale * kWidth, blanched = instrument.scale * kBlanchWidth;
-  if (instrument.hold < 1)
+  const float pressed = 1 - instrument.hold,
+              pale = pressed * std::min(glm::length(instrument.press) / (instrument.scale * kBloodless), 1.f);
+  const Bump dent{instrument.tip - instrument.press, pressed * instrument.press, glm::mat3(1 / width), blanched, pale};
+  if (pressed > 0)
     for (const MeshPart& part : mesh.parts)
-      if (!part.instrument)
-        displace(part, {instrument.tip - instrument.press, instrument.press, glm::mat3(1 / width), blanched}, mesh);
+      if (!part.instrument) displace(part, dent, mesh);
   if (instrument.hold > 0) riseBetweenJaws(instrument, blanched, mesh);
 }
 

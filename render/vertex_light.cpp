@@ -12,7 +12,7 @@ using glm::vec3;
 
 // Light scattered by the cavity itself, where no haze is given; linear RGB: from below and from above, at grazing
 // surfaces, and the veil of moist air.
-constexpr vec3 kAmbientBelow(0.070f, 0.022f, 0.018f), kAmbientAbove(0.130f, 0.075f, 0.065f);
+constexpr vec3 kAmbientBelow(0.122f, 0.046f, 0.037f), kAmbientAbove(0.197f, 0.112f, 0.095f);
 constexpr vec3 kRimLight(0.10f, 0.045f, 0.035f), kVeil(0.085f, 0.022f, 0.016f);
 
 // Reflectance at normal incidence of a film of water, a little raised (Schlick 1994).
@@ -91,7 +91,9 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
   // Behind the horizon the shaders know shadow alone: light that wraps fades towards it, or triangles that lie across
   // would show as teeth. Of a lamp beside the lens the horizon is the outline, and nothing behind it is seen.
   if (s.light.position) out.direct *= smoothStep(kHorizon, 0.25f, cosine);
-  const vec3 sky = glm::mix(s.below, s.above, v.normal.y * 0.5f + 0.5f) * v.openness;
+  // In the cavity it comes from where the lamp shines, from around the lens: what lies in shadow keeps its form.
+  const float fromLens = s.light.position ? 1.f : 0.55f + 0.75f * std::max(glm::dot(v.normal, v.toEye), 0.f);
+  const vec3 sky = glm::mix(s.below, s.above, v.normal.y * 0.5f + 0.5f) * (v.openness * fromLens);
   // Light that came in elsewhere and leaves where the tissue is thin, most of it sideways.
   if (v.thinness > 0) {
     const float grazing = 1 - std::max(glm::dot(v.normal, v.toEye), 0.f);
@@ -180,12 +182,11 @@ Shade shadeVertex(const ShadowMap& shadow, vec3 texel, float spacing, const Shad
     look(ring);
   }
   out.shadowRadius = 2;
-  out.shadowBias = 0.0006f + 0.0011f * slope;
   if (blockers > 0) {
     const float gap = (texel.z - blockerDepth / blockers) / depthPerMetre;
     out.shadowRadius = std::min(1.2f + 0.03f * std::max(gap, 0.f) / metresPerTexel, 7.f);
-    out.shadowBias = 0.0007f + 1.8f * depthPerMetre * metresPerTexel * (out.shadowRadius + 0.7f) * slope;
   }
+  out.shadowBias = 0.0007f + 1.8f * depthPerMetre * metresPerTexel * (out.shadowRadius + 0.7f) * slope;
   if (cosine < kHorizon) return Shade::dark;
   return lit == tried ? Shade::lit : lit == 0 ? Shade::dark : Shade::edge;
 }
