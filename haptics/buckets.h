@@ -80,8 +80,8 @@ class Buckets {
   void refitNear(const Eigen::Vector3d& centre, double distance);
 
   // First touch of a sphere that moves from `centre` to `centre + motion` while the surface stands at alpha; of equal
-  // times the lowest triangle. `firstBucket`, the one touched last, is tried first: what it is changes the time that
-  // this takes alone. Finite input within toolReach is asserted: Embree would abort the process on NaN.
+  // times the lowest triangle. `firstBucket`, the one touched last, is tried first; it affects only speed, never the
+  // result. Finite input within toolReach is asserted: Embree would abort the process on NaN.
   bool sweep(const Eigen::Vector3d& centre, const Eigen::Vector3d& motion, double radius, double alpha, int firstBucket,
              SurfaceHit& hit) const;
 
