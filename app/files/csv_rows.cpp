@@ -51,14 +51,15 @@ char CsvRows::separatorOf(std::string_view text) {
 
 double CsvRows::number(std::size_t cell, std::string_view column) const {
   const std::optional<double> value = parseNumber<double>(cells_.at(cell));
-  if (!value) fail(fmt::format("column {} is {}, expected a finite number", column, quoted(cells_[cell])));
+  if (!value) fail(fmt::format("column {} is {}, expected a finite number", column, inQuotes(cells_[cell])));
   return *value;
 }
 
 int CsvRows::index(std::size_t cell, std::string_view column, std::size_t count) const {
   const std::optional<long long> value = parseNumber<long long>(cells_.at(cell));
   if (!value || *value < 0 || *value >= static_cast<long long>(count))
-    fail(fmt::format("column {} is {}, expected a whole number from 0 to {}", column, quoted(cells_[cell]), count - 1));
+    fail(fmt::format("column {} is {}, expected a whole number from 0 to {}", column, inQuotes(cells_[cell]),
+                     count - 1));
   return static_cast<int>(*value);
 }
 

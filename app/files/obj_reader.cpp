@@ -22,15 +22,15 @@ int corner(const TextLines& lines, std::string_view word, std::size_t vertices) 
   const long long given = lines.integer(word.substr(0, slash));
   for (const char c : word.substr(std::min(slash, word.size()))) {
     if (c != '/' && c != '-' && !std::isdigit(static_cast<unsigned char>(c))) {
-      lines.fail("expected a face corner v, v/vt, v//vn or v/vt/vn, found " + quoted(word));
+      lines.fail("expected a face corner v, v/vt, v//vn or v/vt/vn, found " + inQuotes(word));
     }
   }
   const long long count = static_cast<long long>(vertices);
   if (given == 0) lines.fail("vertex 0 in a face: OBJ counts from 1");
   if (given < -count)
-    lines.fail("vertex " + quoted(word) + " in a face, but only " + std::to_string(count) + " before");
+    lines.fail("vertex " + inQuotes(word) + " in a face, but only " + std::to_string(count) + " before");
   // A positive index may name a vertex further down: the caller checks it against the whole file.
-  if (given > std::numeric_limits<int>::max()) lines.fail("vertex " + quoted(word) + " out of range");
+  if (given > std::numeric_limits<int>::max()) lines.fail("vertex " + inQuotes(word) + " out of range");
   return static_cast<int>(given > 0 ? given - 1 : count + given);
 }
 

@@ -21,7 +21,7 @@ std::string_view afterKeyword(const TextLines& lines, std::string_view word) {
   const std::string_view suffix = off == std::string_view::npos ? word : word.substr(off + 3);
   const bool known = off != std::string_view::npos && prefix.find_first_not_of("STCN") == std::string_view::npos &&
                      (suffix.empty() || std::isdigit(static_cast<unsigned char>(suffix[0])));
-  if (!known) lines.fail("expected an OFF header, found " + quoted(word));
+  if (!known) lines.fail("expected an OFF header, found " + inQuotes(word));
   return suffix;
 }
 
@@ -51,7 +51,7 @@ Counts readHeader(TextLines& lines, std::size_t fileSize) {
 void readFace(const TextLines& lines, long long vertices, std::vector<int>& polygon) {
   const auto& words = lines.words();
   const long long corners = lines.integer(words[0]);
-  if (corners < 3) lines.fail("expected a face of at least 3 corners, found " + quoted(words[0]));
+  if (corners < 3) lines.fail("expected a face of at least 3 corners, found " + inQuotes(words[0]));
   if (corners > static_cast<long long>(words.size()) - 1) {
     lines.fail("the face announces " + std::to_string(corners) + " corners but lists " +
                std::to_string(words.size() - 1));

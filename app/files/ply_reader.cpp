@@ -142,7 +142,7 @@ Header readHeader(std::string_view bytes, const std::string& name) {
       const std::optional<int> count = parseNumber<int>(takeWord(words));
       if (!count || *count < 0)
         fail(fmt::format("expected element NAME COUNT, a count from 0 to {}", std::numeric_limits<int>::max()));
-      if (header.find(element)) fail(fmt::format("element {} stands twice", quoted(element)));
+      if (header.find(element)) fail(fmt::format("element {} stands twice", inQuotes(element)));
       header.elements.push_back({element, *count, {}});
     } else if (word == "property" && !header.elements.empty()) {
       const std::optional<Property> property = propertyOf(header.elements.back(), words);
@@ -151,7 +151,7 @@ Header readHeader(std::string_view bytes, const std::string& name) {
         fail("a property of this use stands twice in its element");
       header.elements.back().properties.push_back(*property);
     } else {
-      fail(fmt::format("{} is no line of a PLY header, expected element, property or end_header", quoted(word)));
+      fail(fmt::format("{} is no line of a PLY header, expected element, property or end_header", inQuotes(word)));
     }
   }
   throw inputError(name, header.lines, "the file ends within the header");
@@ -167,12 +167,12 @@ void requireEnough(const Header& header, const std::string& name) {
       least += header.form == Form::text ? 2 : sizeOf(p.count.value_or(p.type));
     const std::size_t count = static_cast<std::size_t>(element.count);
     if (count == 0) continue;
-    if (least == 0) throw inputError(name, 0, fmt::format("element {} has no property", quoted(element.name)));
+    if (least == 0) throw inputError(name, 0, fmt::format("element {} has no property", inQuotes(element.name)));
     if (count > left / least)
       throw inputError(name, 0,
                        fmt::format("the file ends too early: its header counts {} elements {}, more than the {} bytes "
                                    "behind it hold",
-                                   count, quoted(element.name), header.behind.size()));
+                                   count, inQuotes(element.name), header.behind.size()));
     left -= count * least;
   }
 }
@@ -195,21 +195,22 @@ class Values {
     }
   }
   void endRow() {
-    if (form_ == Form::text && !isBlank(row_)) fail(fmt::format("more numbers than a {} has", quoted(element_->name)));
+    if (form_ == Form::text && !isBlank(row_))
+      fail(fmt::format("more numbers than a {} has", inQuotes(element_->name)));
     if (form_ == Form::text) row_ = {};
   }
   // NaN where a word is no number: who needs it complains.
   double next(Scalar type) {
     if (form_ != Form::text) return nextBinary(type);
     const std::string_view word = takeWord(row_);
-    if (word.empty()) fail(fmt::format("fewer numbers than a {} has", quoted(element_->name)));
+    if (word.empty()) fail(fmt::format("fewer numbers than a {} has", inQuotes(element_->name)));
     return parseNumber<double>(word).value_or(std::numeric_limits<double>::quiet_NaN());
   }
   // From 0 to `last`.
   long long whole(Scalar type, long long last, const char* what) {
     const double value = next(type);
     if (!(value >= 0 && value <= static_cast<double>(last)) || value != std::floor(value))
-      fail(fmt::format("{} {} has {} {}, expected a whole number from 0 to {}", quoted(element_->name), number_, what,
+      fail(fmt::format("{} {} has {} {}, expected a whole number from 0 to {}", inQuotes(element_->name), number_, what,
                        value, last));
     return static_cast<long long>(value);
   }
@@ -234,7 +235,7 @@ class Values {
   static bool isBlank(std::string_view row) { return row.find_first_not_of(" \t\r") == std::string_view::npos; }
 
   [[noreturn]] void failAtEnd() const {
-    fail(fmt::format("the file ends after {} of {} elements {}", number_, element_->count, quoted(element_->name)));
+    fail(fmt::format("the file ends after {} of {} elements {}", number_, element_->count, inQuotes(element_->name)));
   }
 
   template <typename T>

@@ -149,7 +149,7 @@ std::vector<Row> readWriteState(std::string_view text, const std::string& name, 
   while (lines.next()) {
     const auto& words = lines.words();
     const std::string_view key = words[0];
-    if (key.back() != '=') lines.fail(fmt::format("expected T=, X= or another NAME=, found {}", quoted(key)));
+    if (key.back() != '=') lines.fail(fmt::format("expected T=, X= or another NAME=, found {}", inQuotes(key)));
     if (key == "T=") {
       if (!complete) lines.fail("a second T=, expected the X= of the first");
       if (words.size() != 2) lines.fail(fmt::format("{} numbers after T=, expected one", words.size() - 1));

@@ -204,7 +204,6 @@ std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::v
 
 LinkFactors readLinkFactors(const XmlElement& links) {
   LinkFactors out;
-  readChoice(links, "select", {"all"}, 0);
   out.elongation = readNumber(links, "elongation", out.elongation, positive);
   out.flexion = readNumber(links, "flexion", out.flexion, positive);
   out.torsion = readNumber(links, "torsion", out.torsion, positive);

@@ -27,7 +27,7 @@ const XmlRules& sceneRules() {
       {"fix", {}, {"sphere", "spheres", "box", "plane", "vertices", "dof"}, {}},
       {"drive", {"sphere", "axis", "amplitude", "frequency"}, {"phase", "velocity", "dof"}, {}},
       {"load", {}, {"force", "from", "to", "box", "sphere", "plane", "vertices", "file"}, {}},
-      {"links", {}, {"select", "elongation", "flexion", "torsion"}, {}},
+      {"links", {}, {"elongation", "flexion", "torsion"}, {}},
       {"neighbours", {"names"}, {}, {}},
       {"static",
        {"shape"},

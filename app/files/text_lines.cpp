@@ -40,13 +40,13 @@ bool TextLines::next() {
 
 double TextLines::number(std::string_view word) const {
   const std::optional<double> value = parseNumber<double>(word);
-  if (!value) fail("expected a finite number, found " + quoted(word));
+  if (!value) fail("expected a finite number, found " + inQuotes(word));
   return *value;
 }
 
 long long TextLines::integer(std::string_view word) const {
   const std::optional<long long> value = parseNumber<long long>(word);
-  if (!value) fail("expected an integer, found " + quoted(word));
+  if (!value) fail("expected an integer, found " + inQuotes(word));
   return *value;
 }
 
@@ -54,7 +54,7 @@ void TextLines::fail(const std::string& message) const {
   throw inputError(name_, line_, message);
 }
 
-std::string quoted(std::string_view word) {
+std::string inQuotes(std::string_view word) {
   constexpr std::size_t kLongest = 40;
   std::string out = "'";
   for (const char c : word.substr(0, kLongest)) out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;

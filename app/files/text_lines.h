@@ -36,6 +36,6 @@ class TextLines {
 };
 
 // A word as it may appear in an error message: shortened, and free of control characters.
-std::string quoted(std::string_view word);
+std::string inQuotes(std::string_view word);
 
 }  // namespace medulla

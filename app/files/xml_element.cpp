@@ -23,7 +23,7 @@ std::runtime_error complaint(const std::string& where, const std::string& messag
 }
 
 // In quotes, fit for one line of a terminal: no control characters and no megabytes.
-std::string quoted(std::string text) {
+std::string inQuotes(std::string text) {
   if (text.size() > 60) text = text.substr(0, 57) + "...";
   for (char& c : text) {
     if (static_cast<unsigned char>(c) < ' ') c = ' ';
@@ -108,7 +108,7 @@ XmlElement parseXml(const std::string& path) {
 
 std::string suggestion(const std::string& name, const std::vector<std::string>& known) {
   const std::string nearest = nearestName(name, known);
-  return nearest.empty() ? "; it has none" : "; did you mean " + quoted(nearest) + "?";
+  return nearest.empty() ? "; it has none" : "; did you mean " + inQuotes(nearest) + "?";
 }
 
 void checkAttributes(const XmlElement& element, const XmlRule& rule) {
@@ -116,11 +116,11 @@ void checkAttributes(const XmlElement& element, const XmlRule& rule) {
   known.insert(known.end(), rule.optional.begin(), rule.optional.end());
   for (const XmlAttribute& a : element.attributes) {
     if (std::find(known.begin(), known.end(), a.name) != known.end()) continue;
-    throw complaint(a.where, "<" + element.name + "> has no attribute " + quoted(a.name) + suggestion(a.name, known));
+    throw complaint(a.where, "<" + element.name + "> has no attribute " + inQuotes(a.name) + suggestion(a.name, known));
   }
   for (const std::string& name : rule.required) {
     if (!element.find(name))
-      throw complaint(element.where, "<" + element.name + "> lacks the attribute " + quoted(name));
+      throw complaint(element.where, "<" + element.name + "> lacks the attribute " + inQuotes(name));
   }
 }
 
@@ -128,7 +128,7 @@ void checkElement(const XmlElement& element, const XmlRules& rules) {
   const XmlRule& rule = ruleOf(rules, element.name);
   checkAttributes(element, rule);
   if (!rule.text && !element.text.empty()) {
-    throw complaint(element.where, "<" + element.name + "> holds text " + quoted(element.text) + ", expected none");
+    throw complaint(element.where, "<" + element.name + "> holds text " + inQuotes(element.text) + ", expected none");
   }
   std::vector<std::string> known;
   for (const XmlRule::Child& child : rule.children) known.push_back(child.name);
@@ -269,7 +269,7 @@ std::string nearestName(const std::string& name, const std::vector<std::string>&
 void refuse(const XmlElement& element, const std::string& attribute, const std::string& message) {
   const XmlAttribute* a = element.find(attribute);
   if (!a) throw complaint(element.where, "<" + element.name + ">: " + message);
-  throw complaint(a->where, "<" + element.name + "> " + attribute + "=" + quoted(a->value) + ": " + message);
+  throw complaint(a->where, "<" + element.name + "> " + attribute + "=" + inQuotes(a->value) + ": " + message);
 }
 
 double readNumber(const XmlElement& element, const std::string& attribute, double fallback, Range range) {
@@ -305,7 +305,7 @@ int readChoice(const XmlElement& element, const std::string& attribute, const st
     if (a->value == known[k]) return static_cast<int>(k);
   }
   std::string list;
-  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + quoted(name);
+  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + inQuotes(name);
   refuse(element, attribute, "unknown value; known: " + list);
 }
 
