@@ -8,10 +8,9 @@
 #include <memory>
 
 #include "app/commands/commands.h"
-#include "app/files/joined.h"
 #include "app/files/number_text.h"
 #include "app/files/output_file.h"
-#include "app/files/xml_element.h"
+#include "app/files/text.h"
 #include "app/interrupt.h"
 #include "app/verbs.h"
 #include "render/video_writer.h"

@@ -4,10 +4,10 @@
 #include <filesystem>
 
 #include "app/files/input_error.h"
-#include "app/files/joined.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/recording_file.h"
+#include "app/files/text.h"
 #include "app/files/trajectory_file.h"
 #include "app/files/vertex_file.h"
 #include "app/files/xml_element.h"
@@ -53,7 +53,7 @@ static std::string regionText(const NodeChoice& choice) {
 static std::string identifyingCommand(const SoftBodyModel& model, const SceneBody& body) {
   std::string out = model.settings.substr(0, model.settings.find(" --identify"));
   out += fmt::format(" --identify --poisson {}", body.tissue.poisson);
-  for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix {}", regionText(fix.nodes));
+  for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix {}", shellWord(regionText(fix.nodes)));
   return out;
 }
 

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "app/files/joined.h"
-#include "app/files/xml_element.h"
+#include "app/files/text.h"
 
 namespace medulla {
 

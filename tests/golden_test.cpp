@@ -54,13 +54,15 @@ TEST(Golden, AnotherPictureFailsWithItsDifferenceAndTheCommandThatRepeatsIt) {
           for (int c = 0; c < 3; ++c) image.pixels[4 * (std::size_t(y) * image.width + x) + c] = 0;
     writePng(folder / ("images/" + name), image, texts);
   }
-  const ProgramResult r = runProgram({"golden", scene, "--dir", folder / "images", "--failures", folder / "failures"});
+  const ProgramResult r =
+      runProgram({"golden", scene, "--dir", folder / "images", "--failures", folder / "failed pictures"});
   EXPECT_EQ(r.exitCode, 3) << r.out << r.err;
   EXPECT_NE(r.out.find("gallbladder_15 failed"), std::string::npos) << r.out;
-  EXPECT_NE(r.err.find("medulla golden "), std::string::npos) << r.err;
-  EXPECT_TRUE(std::filesystem::exists(folder / "failures/gallbladder_15_actual.png"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "failures/gallbladder_15_difference.png"));
-  const std::string report = readFile(folder / "failures/report.html");
+  EXPECT_NE(r.err.find("repeat with: medulla golden "), std::string::npos) << r.err;
+  EXPECT_NE(r.err.find(" --failures '" + folder / "failed pictures" + "'\n"), std::string::npos) << r.err;
+  EXPECT_TRUE(std::filesystem::exists(folder / "failed pictures/gallbladder_15_actual.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "failed pictures/gallbladder_15_difference.png"));
+  const std::string report = readFile(folder / "failed pictures/report.html");
   EXPECT_NE(report.find("1 of 5 golden images failed"), std::string::npos);
   for (const char* words :
        {"gallbladder_15", "over 16, PSNR", "FLIP 0.", "llvmpipe", "data:image/png;base64,iVBORw0KGgo"})

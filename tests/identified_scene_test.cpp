@@ -79,6 +79,11 @@ TEST_F(IdentifiedScene, WithoutItsNetworkPatchOrRatioItIsRefusedAndTheRightBuild
             "case.xml:3: body \"pear\" has identified links, and its model was identified with another part of its "
             "surface fixed" +
                 build + "0.45");
+  folder.write("held nodes.csv", "0\n");
+  EXPECT_EQ(refusal(scene("<fix vertices='held nodes.csv'/>")),
+            "case.xml:3: body \"pear\" has identified links, and its model was identified with another part of its "
+            "surface fixed" +
+                build + "0.45 --fix 'vertices=" + folder / "held nodes.csv" + "'");
   EXPECT_EQ(refusal(scene(kHeld, "pear.xml", 0.3)),
             "case.xml:3: body \"pear\" has identified links, and its model was identified for a Poisson's ratio of "
             "0.45" +

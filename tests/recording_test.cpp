@@ -202,6 +202,7 @@ TEST_F(Recording, EveryMistakeInTheFileIsNamedWithItsRow) {
       {"", xyz, "1 2 3\n1 1e999 3\n", "r.txt:2: column 2 is '1e999', expected a finite number"},
       {"", xyz, "1 2 30\n", "r.txt:1: position z is 30 m, expected within 20 m of the origin"},
       {"", named, "t,x,yy,z\n0,1,2,3\n", "r.txt:1: no column 'y'; did you mean"},
+      {"", named, "t,x,y\x1b[31m,z\n0,1,2,3\n", "r.txt:1: no column 'y'; did you mean 't'?"},
       {"", named, "0 1 2 3\n", "r.txt:1: column 't' is wanted, but the file has no header"},
       {"", named, "t x y z\n0 1 2 3\n0 1 2 3\n", "r.txt:3: time 0 s does not follow 0 s"},
       {"", named, "t x y z\n7 1 2 3\n6 1 2 3\n", "r.txt:3: time -1 s does not follow 0 s"},

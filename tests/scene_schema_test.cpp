@@ -6,6 +6,7 @@
 
 #include "app/files/recording_map.h"
 #include "app/files/scene_rules.h"
+#include "app/files/text.h"
 #include "app/files/xml_element.h"
 
 namespace medulla {

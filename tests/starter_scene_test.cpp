@@ -136,6 +136,8 @@ TEST(StarterScene, IsCheckedWhateverTheMeshIsCalled) {
     const std::string scene = made.out.substr(made.out.find("scene ") + 6);
     EXPECT_EQ(runProgram({"check", scene.substr(0, scene.find('\n'))}).out, "valid yes\n") << name;
   }
+  const std::string model = readFile(folder / "mine/my_organ.model.xml");
+  EXPECT_NE(model.find("settings=\"medulla build 'my organ.obj' --"), std::string::npos) << model.substr(0, 400);
 }
 
 TEST(Check, NamesFileAndLineOfWhatCannotRun) {

@@ -93,6 +93,7 @@ TEST(TrajectoryFile, EveryMistakeIsNamedWithItsLine) {
   expectComplaint(header, "file.csv: ", "no rows");
   expectComplaint("t[s],x[m],y[m],z[m],qw,qx,qy,qz\n" + good, "file.csv:1: ", "column grip is missing");
   expectComplaint("t[s],y[m],x[m],z[m],qw,qx,qy,qz,grip\n" + good, "file.csv:1: ", "column 2 is 'y[m]'");
+  expectComplaint("t[s],\x1b[31m,y[m],x[m],z[m],qw,qx,qy,qz,grip\n" + good, "file.csv:1: ", "column 2 is '?[31m'");
   expectComplaint("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,colour\n" + good, "file.csv:1: ", "'colour'");
   expectComplaint("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,fx[N]\n" + good, "file.csv:1: ", "10 columns");
   expectComplaint("0,0,0,0,1,0,0,0,0\n" + good, "file.csv:1: ", "column t[s] is missing");

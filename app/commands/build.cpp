@@ -10,6 +10,7 @@
 #include "app/files/model_file.h"
 #include "app/files/output_file.h"
 #include "app/files/report_file.h"
+#include "app/files/text.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
 #include "physics/dynamics/fixation.h"
@@ -40,14 +41,14 @@ struct BuildJob {
 // The command that repeats the build, file names without folders: the model is the same in whatever folder it is built,
 // and the same whether it is built alone or with others.
 std::string repeatingCommand(const BuildJob& job, const BuildOptions& options) {
-  std::string command =
-      fmt::format("medulla build {} {}", fs::path(job.meshPath).filename().string(), describeSettings(job.settings));
+  std::string command = fmt::format("medulla build {} {}", shellWord(fs::path(job.meshPath).filename().string()),
+                                    describeSettings(job.settings));
   if (options.unit != "m") command += " --unit " + options.unit;
-  if (!job.finePath.empty()) command += " --fine " + fs::path(job.finePath).filename().string();
+  if (!job.finePath.empty()) command += " --fine " + shellWord(fs::path(job.finePath).filename().string());
   if (options.identify) {
     const char* form = kLinkForms[static_cast<std::size_t>(options.identification.links)];
     command += fmt::format(" --identify --poisson {} --link-form {}", options.identification.poisson, form);
-    for (const FixedPatch& patch : job.model.identified->patches) command += " --fix " + patch.region;
+    for (const FixedPatch& patch : job.model.identified->patches) command += " --fix " + shellWord(patch.region);
   }
   return command;
 }
@@ -81,9 +82,7 @@ void warnOfCover(const BuildJob& job) {
 // All that was repaired and found in one line.
 void tellRepairs(const std::string& path, const std::vector<std::string>& notes) {
   if (notes.empty()) return;
-  std::string line;
-  for (const std::string& note : notes) line += (line.empty() ? "" : "; ") + note;
-  fmt::print(stderr, "{}: mesh repair: {}\n", path, line);
+  fmt::print(stderr, "{}: mesh repair: {}\n", path, joined(notes, "; "));
 }
 
 std::vector<BuildJob> jobsOf(const BuildOptions& options) {

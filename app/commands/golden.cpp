@@ -9,6 +9,7 @@
 #include "app/commands/commands.h"
 #include "app/files/golden_report.h"
 #include "app/files/output_file.h"
+#include "app/files/text.h"
 #include "app/interrupt.h"
 #include "render/flip.h"
 
@@ -180,10 +181,10 @@ GoldenResult compare(const Moment& moment, const std::string& goldenPath, const 
 }
 
 std::string repeatingCommand(const std::string& path, const GoldenOptions& options) {
-  std::string command = "medulla golden " + path;
-  if (!options.folder.empty()) command += " --dir " + options.folder;
+  std::string command = "medulla golden " + shellWord(path);
+  if (!options.folder.empty()) command += " --dir " + shellWord(options.folder);
   if (options.context != "auto") command += " --context " + options.context;
-  return command + " --failures " + options.failures;
+  return command + " --failures " + shellWord(options.failures);
 }
 
 void updateScene(const std::string& path, const GoldenOptions& options) {

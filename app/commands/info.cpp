@@ -6,6 +6,7 @@
 #include "app/commands/commands.h"
 #include "app/files/model_file.h"
 #include "app/files/recording_file.h"
+#include "app/files/text.h"
 #include "app/files/trajectory_file.h"
 #include "app/files/xml_element.h"
 #include "physics/dynamics/rest_modes.h"
@@ -85,10 +86,10 @@ void addFrequencies(const BodyDescription& body, std::vector<Result>& results) {
   constexpr int kShown = 5;
   constexpr std::size_t kMostSpheres = 200;  // 2 s; beyond, time grows with the cube
   if (body.model->spheres.size() > kMostSpheres) return;
-  std::string list;
-  for (const double f : naturalFrequencies(body, bodyMechanics(body), kShown))
-    list += fmt::format("{}{:.4g}", list.empty() ? "" : " ", f);
-  if (!list.empty()) results.push_back({fmt::format("body.{}.natural_frequencies", body.name), list, "Hz"});
+  std::vector<std::string> list;
+  for (const double f : naturalFrequencies(body, bodyMechanics(body), kShown)) list.push_back(fmt::format("{:.4g}", f));
+  if (!list.empty())
+    results.push_back({fmt::format("body.{}.natural_frequencies", body.name), joined(list, " "), "Hz"});
 }
 
 std::vector<Result> sceneResults(const LoadedScene& loaded) {

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <string_view>
 
 #include "app/commands/commands.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/output_file.h"
+#include "app/files/text.h"
 #include "app/starter_scene.h"
 #include "haptics/tool_input.h"
 
@@ -23,17 +23,6 @@ static std::string nameFrom(const std::string& meshPath) {
       name.begin(), name.end(), [](unsigned char c) { return !((c < 128 && std::isalnum(c)) || c == '_' || c == '-'); },
       '_');
   return name;
-}
-
-// Quoted where a shell would take it for several words or more.
-static std::string shellWord(const std::string& path) {
-  const bool plain = std::all_of(path.begin(), path.end(), [](unsigned char c) {
-    return (c < 128 && std::isalnum(c)) || std::string_view("/._-+,@%").find(static_cast<char>(c)) != std::string::npos;
-  });
-  if (plain) return path;
-  std::string out = "'";
-  for (const char c : path) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return out + "'";
 }
 
 // A tool starts outside of the body, not farther away than the body is large.

@@ -4,7 +4,7 @@
 
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
-#include "app/files/text_lines.h"
+#include "app/files/text.h"
 
 namespace medulla {
 

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "app/files/output_file.h"
+#include "app/files/text.h"
 
 extern char** environ;
 
@@ -81,7 +82,7 @@ void drawByGnuplot(const std::string& stem, const std::string& script) {
     writeText(picture, *svg);
   } else {
     fmt::print(stderr, "no {}: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {} > {}\n",
-               std::filesystem::path(picture).filename().string(), source, picture);
+               std::filesystem::path(picture).filename().string(), shellWord(source), shellWord(picture));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "app/files/output_file.h"
+#include "app/files/text.h"
 
 namespace medulla {
 
@@ -45,23 +46,6 @@ for (const box of document.querySelectorAll('.pictures')) {
 </script></body></html>
 )";
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else if (c == '"')
-      out += "&quot;";
-    else
-      out += c;
-  }
-  return out;
-}
-
 std::string base64(const std::vector<std::uint8_t>& bytes) {
   constexpr const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string out;
@@ -83,10 +67,10 @@ std::string figure(const Image& image, const std::string& caption) {
 
 std::string row(const GoldenResult& r) {
   const std::string name =
-      r.expected.pixels.empty() ? escaped(r.name) : fmt::format("<a href=\"#{0}\">{0}</a>", escaped(r.name));
+      r.expected.pixels.empty() ? escapedXml(r.name) : fmt::format("<a href=\"#{0}\">{0}</a>", escapedXml(r.name));
   return fmt::format("<tr><td>{}</td><td class=\"{}\">{}</td><td>{}</td><td>{}<br>{}</td></tr>\n", name,
-                     r.passed ? "passed" : "failed", r.passed ? "ok" : "failed", escaped(r.verdict),
-                     escaped(r.stored.renderer), escaped(r.stored.processor));
+                     r.passed ? "passed" : "failed", r.passed ? "ok" : "failed", escapedXml(r.verdict),
+                     escapedXml(r.stored.renderer), escapedXml(r.stored.processor));
 }
 
 }  // namespace
@@ -98,7 +82,7 @@ void writeGoldenReport(const std::string& path, const std::vector<GoldenResult>&
   file.write(fmt::format("<h1>{}</h1>\n<p>Drawn with {}<br>on {}</p>\n",
                          failed > 0 ? fmt::format("{} of {} golden images failed", failed, results.size())
                                     : fmt::format("{} golden images passed", results.size()),
-                         escaped(now.renderer), escaped(now.processor)));
+                         escapedXml(now.renderer), escapedXml(now.processor)));
   file.write("<table><tr><th>moment</th><th></th><th>difference</th><th>stored with</th></tr>\n");
   for (const GoldenResult& r : results) file.write(row(r));
   file.write("</table>\n");
@@ -107,8 +91,8 @@ void writeGoldenReport(const std::string& path, const std::vector<GoldenResult>&
     file.write(
         fmt::format("<h2 id=\"{0}\">{0} <span class=\"{1}\">{2}</span></h2>\n<p>{3}<br>{4}</p>\n"
                     "<div class=\"pictures\">\n",
-                    escaped(r.name), r.passed ? "passed" : "failed", r.passed ? "ok" : "failed", escaped(r.scene),
-                    escaped(r.verdict)));
+                    escapedXml(r.name), r.passed ? "passed" : "failed", r.passed ? "ok" : "failed", escapedXml(r.scene),
+                    escapedXml(r.verdict)));
     file.write(figure(r.expected, "expected"));
     file.write(figure(r.actual, "actual"));
     file.write(figure(amplifiedDifference(r.actual, r.expected, kGain), fmt::format("difference, {} times", kGain)));

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "app/files/model_rows.h"
+#include "app/files/text.h"
 #include "physics/model/symmetric_eigen.h"
 
 namespace medulla {

@@ -1,5 +1,7 @@
 #include "app/files/model_file.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cassert>
@@ -9,6 +11,7 @@
 #include "app/files/identified_part.h"
 #include "app/files/model_rows.h"
 #include "app/files/output_file.h"
+#include "app/files/text.h"
 #include "physics/model/mesh_topology.h"
 
 // The arrays of a model, one element each, one line of numbers per entry. The columns are those of the structs in
@@ -36,12 +39,6 @@ const XmlRules& modelRules() {
 }
 
 // ---- writing ----
-
-std::string hexadecimal(std::uint64_t value) {
-  char digits[17];
-  std::snprintf(digits, sizeof(digits), "%016llx", static_cast<unsigned long long>(value));
-  return digits;
-}
 
 void putVolumeModel(std::string& out, const SoftBodyModel& model) {
   putRows(out, "spheres", model.spheres.size(), [&](std::size_t k) {
@@ -214,8 +211,8 @@ void readRenderSurface(const std::string& path, const XmlElement& root, std::siz
 void writeModel(const std::string& path, const SoftBodyModel& model) {
   OutputFile file(path);
   std::string out = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
-  out += "<model version=\"" + std::to_string(formatVersion) + "\" name=\"" + escapedXml(model.name) +
-         "\" mesh_hash=\"" + hexadecimal(model.meshHash) + "\" settings=\"" + escapedXml(model.settings) + "\">\n";
+  out += fmt::format("<model version=\"{}\" name=\"{}\" mesh_hash=\"{:016x}\" settings=\"{}\">\n", formatVersion,
+                     escapedXml(model.name), model.meshHash, escapedXml(model.settings));
   putArray(out, "input_vertices", model.nodeOfInputVertex);
   putArray(out, "nodes", model.restNodes);
   putArray(out, "triangles", model.triangles);

@@ -15,8 +15,6 @@
 // The long arrays of a model file: an element each, a line of numbers per row.
 namespace medulla {
 
-std::string escapedXml(const std::string& text);
-
 // Appends numbers, vectors and arrays to the line that `out` ends with.
 template <typename T>
 void putValue(std::string& out, const T& value) {

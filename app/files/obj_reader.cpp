@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "app/files/input_error.h"
+#include "app/files/text.h"
 #include "app/files/text_lines.h"
 
 namespace medulla {

@@ -3,6 +3,7 @@
 #include <cctype>
 
 #include "app/files/input_error.h"
+#include "app/files/text.h"
 #include "app/files/text_lines.h"
 
 namespace medulla {

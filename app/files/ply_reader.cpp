@@ -13,6 +13,7 @@
 
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
+#include "app/files/text.h"
 #include "app/files/text_lines.h"
 
 namespace medulla {

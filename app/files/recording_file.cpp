@@ -10,6 +10,7 @@
 #include "app/files/csv_rows.h"
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
+#include "app/files/text.h"
 #include "app/files/text_file.h"
 #include "app/files/text_lines.h"
 #include "app/files/trajectory_file.h"
@@ -52,9 +53,9 @@ std::string locate(const ColumnChoice& choice, const std::vector<std::string>& h
     } else if (number) {
       return fmt::format("column {} is wanted, but there are {}", *number, count);
     } else if (header.empty()) {
-      return fmt::format("column '{}' is wanted, but the file has no header", column);
+      return fmt::format("column {} is wanted, but the file has no header", inQuotes(column));
     } else {
-      return fmt::format("no column '{}'; did you mean '{}'?", column, nearestName(column, header));
+      return fmt::format("no column {}; did you mean {}?", inQuotes(column), inQuotes(nearestName(column, header)));
     }
   }
   return "";

@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <sstream>
 
-#include "app/files/joined.h"
 #include "app/files/mesh_file.h"
 #include "app/files/placement.h"
+#include "app/files/text.h"
 
 namespace medulla {
 

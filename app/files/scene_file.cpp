@@ -7,11 +7,11 @@
 #include <sstream>
 #include <string_view>
 
-#include "app/files/joined.h"
 #include "app/files/mesh_file.h"
 #include "app/files/placement.h"
 #include "app/files/scene_overrides.h"
 #include "app/files/scene_rules.h"
+#include "app/files/text.h"
 #include "app/files/xml_element.h"
 #include "app/scene.h"
 #include "physics/content_hash.h"

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "app/files/scene_rules.h"
+#include "app/files/text.h"
 
 namespace medulla {
 

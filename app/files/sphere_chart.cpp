@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "app/files/joined.h"
 #include "app/files/output_file.h"
+#include "app/files/text.h"
 
 namespace medulla {
 

@@ -5,6 +5,7 @@
 
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
+#include "app/files/text.h"
 
 namespace medulla {
 
@@ -52,13 +53,6 @@ long long TextLines::integer(std::string_view word) const {
 
 void TextLines::fail(const std::string& message) const {
   throw inputError(name_, line_, message);
-}
-
-std::string inQuotes(std::string_view word) {
-  constexpr std::size_t kLongest = 40;
-  std::string out = "'";
-  for (const char c : word.substr(0, kLongest)) out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
-  return out + (word.size() > kLongest ? "...'" : "'");
 }
 
 }  // namespace medulla

@@ -35,7 +35,4 @@ class TextLines {
   std::vector<std::string_view> words_;
 };
 
-// A word as it may appear in an error message: shortened, and free of control characters.
-std::string inQuotes(std::string_view word);
-
 }  // namespace medulla

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "app/files/csv_rows.h"
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
+#include "app/files/text.h"
 #include "app/files/text_file.h"
 
 namespace medulla {
@@ -18,22 +20,25 @@ namespace medulla {
 static constexpr std::array<std::string_view, 12> columnNames = {"t[s]", "x[m]", "y[m]", "z[m]",  "qw",    "qx",
                                                                  "qy",   "qz",   "grip", "fx[N]", "fy[N]", "fz[N]"};
 static constexpr std::size_t requiredColumns = 9;
-static constexpr std::string_view requiredHeader = "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip";
 static constexpr double timeReach = 1e9;  // s; doubles still tell 1 us apart, and no difference overflows
 enum Column { time, x, y, z, qw, qx, qy, qz, grip, fx, fy, fz };
+
+static std::string requiredHeader() {
+  return joined(std::span(columnNames).first<requiredColumns>(), ",");
+}
 
 static void checkHeader(const std::vector<std::string_view>& cells, const std::string& name, int line) {
   for (std::size_t k = 0; k < requiredColumns; ++k)
     if (std::find(cells.begin(), cells.end(), columnNames[k]) == cells.end())
-      throw inputError(name, line, fmt::format("column {} is missing, expected {}", columnNames[k], requiredHeader));
+      throw inputError(name, line, fmt::format("column {} is missing, expected {}", columnNames[k], requiredHeader()));
   for (std::size_t k = 0; k < std::min(cells.size(), columnNames.size()); ++k)
     if (cells[k] != columnNames[k])
       throw inputError(
           name, line,
-          fmt::format("column {} is '{}', expected {}[,fx[N],fy[N],fz[N]]", k + 1, cells[k], requiredHeader));
+          fmt::format("column {} is {}, expected {}[,fx[N],fy[N],fz[N]]", k + 1, inQuotes(cells[k]), requiredHeader()));
   if (cells.size() != requiredColumns && cells.size() != columnNames.size())
     throw inputError(name, line,
-                     fmt::format("{} columns, expected {}[,fx[N],fy[N],fz[N]]", cells.size(), requiredHeader));
+                     fmt::format("{} columns, expected {}[,fx[N],fy[N],fz[N]]", cells.size(), requiredHeader()));
 }
 
 void addSample(Trajectory& trajectory, ToolSample sample, const std::string& name, int line) {
@@ -69,7 +74,7 @@ static ToolSample sampleOfRow(const std::vector<double>& row, const CsvRows& row
 Trajectory parseTrajectory(std::string_view text, const std::string& name) {
   Trajectory trajectory;
   CsvRows rows(text, name);
-  if (!rows.next()) throw inputError(name, 0, fmt::format("no header, expected {}", requiredHeader));
+  if (!rows.next()) throw inputError(name, 0, fmt::format("no header, expected {}", requiredHeader()));
   checkHeader(rows.cells(), name, rows.line());
   const std::size_t columns = rows.cells().size();
   std::vector<double> row;
@@ -90,9 +95,7 @@ Trajectory readTrajectory(const std::string& path) {
 }
 
 TrajectoryFile::TrajectoryFile(const std::string& path) : file_(path) {
-  std::string header;
-  for (const std::string_view column : columnNames) header.append(header.empty() ? "" : ",").append(column);
-  file_.write(header + "\n");
+  file_.write(joined(columnNames, ",") + "\n");
 }
 
 void TrajectoryFile::write(const ToolSample& sample, const Eigen::Vector3d& force) {

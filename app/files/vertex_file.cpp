@@ -9,7 +9,7 @@
 
 #include "app/files/csv_rows.h"
 #include "app/files/input_error.h"
-#include "app/files/joined.h"
+#include "app/files/text.h"
 #include "app/files/text_file.h"
 
 namespace medulla {

@@ -8,6 +8,7 @@
 
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
+#include "app/files/text.h"
 #include "app/files/text_file.h"
 
 namespace medulla {
@@ -20,15 +21,6 @@ std::string place(const std::string& path, int line) {
 
 std::runtime_error complaint(const std::string& where, const std::string& message) {
   return std::runtime_error(where + ": " + message);
-}
-
-// In quotes, fit for one line of a terminal: no control characters and no megabytes.
-std::string inQuotes(std::string text) {
-  if (text.size() > 60) text = text.substr(0, 57) + "...";
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < ' ') c = ' ';
-  }
-  return '"' + text + '"';
 }
 
 const char* describe(tinyxml2::XMLError error) {
@@ -108,7 +100,7 @@ XmlElement parseXml(const std::string& path) {
 
 std::string suggestion(const std::string& name, const std::vector<std::string>& known) {
   const std::string nearest = nearestName(name, known);
-  return nearest.empty() ? "; it has none" : "; did you mean " + inQuotes(nearest) + "?";
+  return nearest.empty() ? "; it has none" : "; did you mean " + inQuotes(nearest, '"') + "?";
 }
 
 void checkAttributes(const XmlElement& element, const XmlRule& rule) {
@@ -116,11 +108,12 @@ void checkAttributes(const XmlElement& element, const XmlRule& rule) {
   known.insert(known.end(), rule.optional.begin(), rule.optional.end());
   for (const XmlAttribute& a : element.attributes) {
     if (std::find(known.begin(), known.end(), a.name) != known.end()) continue;
-    throw complaint(a.where, "<" + element.name + "> has no attribute " + inQuotes(a.name) + suggestion(a.name, known));
+    throw complaint(a.where,
+                    "<" + element.name + "> has no attribute " + inQuotes(a.name, '"') + suggestion(a.name, known));
   }
   for (const std::string& name : rule.required) {
     if (!element.find(name))
-      throw complaint(element.where, "<" + element.name + "> lacks the attribute " + inQuotes(name));
+      throw complaint(element.where, "<" + element.name + "> lacks the attribute " + inQuotes(name, '"'));
   }
 }
 
@@ -128,7 +121,8 @@ void checkElement(const XmlElement& element, const XmlRules& rules) {
   const XmlRule& rule = ruleOf(rules, element.name);
   checkAttributes(element, rule);
   if (!rule.text && !element.text.empty()) {
-    throw complaint(element.where, "<" + element.name + "> holds text " + inQuotes(element.text) + ", expected none");
+    throw complaint(element.where,
+                    "<" + element.name + "> holds text " + inQuotes(element.text, '"') + ", expected none");
   }
   std::vector<std::string> known;
   for (const XmlRule::Child& child : rule.children) known.push_back(child.name);
@@ -236,40 +230,10 @@ const XmlRule& ruleOf(const XmlRules& rules, const std::string& element) {
   return *rule;
 }
 
-std::string nearestName(const std::string& name, const std::vector<std::string>& known) {
-  // Optimal string alignment distance, row by row.
-  const auto distance = [](const std::string& a, const std::string& b) {
-    std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
-    for (std::size_t i = 0; i <= a.size(); ++i) {
-      for (std::size_t j = 0; j <= b.size(); ++j) {
-        if (i == 0 || j == 0) {
-          d[i][j] = i + j;
-          continue;
-        }
-        d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
-        const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
-        if (swapped) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
-      }
-    }
-    return d[a.size()][b.size()];
-  };
-  const std::string wanted = name.substr(0, 200);  // nobody mistypes more; the table is quadratic
-  std::string best;
-  std::size_t fewest = std::numeric_limits<std::size_t>::max();
-  for (const std::string& candidate : known) {
-    const std::size_t edits = distance(wanted, candidate);
-    if (edits < fewest) {
-      fewest = edits;
-      best = candidate;
-    }
-  }
-  return best;
-}
-
 void refuse(const XmlElement& element, const std::string& attribute, const std::string& message) {
   const XmlAttribute* a = element.find(attribute);
   if (!a) throw complaint(element.where, "<" + element.name + ">: " + message);
-  throw complaint(a->where, "<" + element.name + "> " + attribute + "=" + inQuotes(a->value) + ": " + message);
+  throw complaint(a->where, "<" + element.name + "> " + attribute + "=" + inQuotes(a->value, '"') + ": " + message);
 }
 
 double readNumber(const XmlElement& element, const std::string& attribute, double fallback, Range range) {
@@ -305,7 +269,7 @@ int readChoice(const XmlElement& element, const std::string& attribute, const st
     if (a->value == known[k]) return static_cast<int>(k);
   }
   std::string list;
-  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + inQuotes(name);
+  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + inQuotes(name, '"');
   refuse(element, attribute, "unknown value; known: " + list);
 }
 

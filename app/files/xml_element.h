@@ -49,9 +49,6 @@ std::string rootElementOf(const std::string& path);
 
 const XmlRule& ruleOf(const XmlRules& rules, const std::string& element);  // asserts that there is one
 
-// The known name with the fewest edits (insert, delete, replace, swap neighbours), the first among equals; "" of none.
-std::string nearestName(const std::string& name, const std::vector<std::string>& known);
-
 // An interval that a value must lie in.
 struct Range {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+// Words and lists of words for those who read them: people, shells, XML.
+namespace medulla {
+
+// A word as it may appear in an error message: between marks, shortened, and on one line.
+std::string inQuotes(std::string_view word, char mark = '\'');
+
+// Quoted where a shell would take it for several words or more: for commands that are printed to be pasted.
+std::string shellWord(std::string_view word);
+
+// As an attribute's value, or between tags.
+std::string escapedXml(std::string_view text);
+
+// The known name with the fewest edits (insert, delete, replace, swap neighbours), the first among equals; "" of none.
+std::string nearestName(const std::string& name, const std::vector<std::string>& known);
+
+// "a, b, c". By hand: g++ 12 sees an overflow in fmt::join where there is none.
+template <class Names>
+std::string joined(const Names& names, std::string_view separator) {
+  std::string out;
+  for (const auto& name : names) {
+    if (!out.empty()) out += separator;
+    out += name;
+  }
+  return out;
+}
+
+}  // namespace medulla

@@ -1,0 +1,23 @@
+#include <gtest/gtest.h>
+
+#include "app/files/text.h"
+
+namespace medulla {
+
+TEST(Text, WordsInMessagesAreShortAndOnOneLine) {
+  EXPECT_EQ(inQuotes("word"), "'word'");
+  EXPECT_EQ(inQuotes("word", '"'), "\"word\"");
+  EXPECT_EQ(inQuotes("two\nlines\x1b[31m\x7f"), "'two lines?[31m?'");
+  EXPECT_EQ(inQuotes(std::string(1000, 'a')), "'" + std::string(60, 'a') + "...'");
+}
+
+TEST(Text, AShellTakesItForOneWord) {
+  EXPECT_EQ(shellWord("../scenes/liver-2_b.xml"), "../scenes/liver-2_b.xml");
+  EXPECT_EQ(shellWord("plane=0,-1,0,1.5e-05"), "plane=0,-1,0,1.5e-05");
+  EXPECT_EQ(shellWord("my organ.obj"), "'my organ.obj'");
+  EXPECT_EQ(shellWord("a;b"), "'a;b'");
+  EXPECT_EQ(shellWord("it's"), "'it'\\''s'");
+  EXPECT_EQ(shellWord(""), "''");
+}
+
+}  // namespace medulla
