@@ -63,6 +63,10 @@ int CsvRows::index(std::size_t cell, std::string_view column, std::size_t count)
   return static_cast<int>(*value);
 }
 
+void CsvRows::requireCells(std::size_t count, const std::string& expected) const {
+  if (cells_.size() != count) fail(fmt::format("{} columns in this row, expected {}", cells_.size(), expected));
+}
+
 void CsvRows::fail(const std::string& message) const {
   throw inputError(name_, line_, message);
 }

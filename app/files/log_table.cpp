@@ -16,10 +16,9 @@ LogTable readLog(const std::string& path) {
   if (!rows.next()) throw inputError(path, 0, "no header, expected the names of a log's columns");
   table.columns.assign(rows.cells().begin(), rows.cells().end());
   if (table.columns[0] != "t") rows.fail("this is no log: expected a header that begins with the column t");
+  const std::string expected = fmt::format("{} as in the header", table.columns.size());
   while (rows.next()) {
-    if (rows.cells().size() != table.columns.size())
-      rows.fail(fmt::format("{} columns in this row, expected {} as in the header", rows.cells().size(),
-                            table.columns.size()));
+    rows.requireCells(table.columns.size(), expected);
     std::vector<double>& value = table.value.emplace_back();
     for (std::size_t k = 0; k < table.columns.size(); ++k) value.push_back(rows.number(k, table.columns[k]));
     table.text.emplace_back(rows.cells().begin(), rows.cells().end());

@@ -130,10 +130,10 @@ std::vector<Row> readTable(std::string_view text, const std::string& name, const
   Layout layout;
   const RecordingColumns& columns = chooseLayout(rows, header, map, layout);
   hasForce = !layout.force.empty();
+  const std::string expected = fmt::format("{} as in the first", count);
   std::vector<Row> out;
   for (bool more = header.empty() || rows.next(); more; more = rows.next()) {
-    if (rows.cells().size() != count)
-      rows.fail(fmt::format("{} columns in this row, expected {} as in the first", rows.cells().size(), count));
+    rows.requireCells(count, expected);
     out.push_back(rowAt(rows, layout, columns, out.size()));
   }
   if (out.empty()) throw inputError(name, 0, "no rows after the header, expected at least one");

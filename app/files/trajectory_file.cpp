@@ -77,10 +77,10 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name) {
   if (!rows.next()) throw inputError(name, 0, fmt::format("no header, expected {}", requiredHeader()));
   checkHeader(rows.cells(), name, rows.line());
   const std::size_t columns = rows.cells().size();
+  const std::string expected = fmt::format("{} as in the header", columns);
   std::vector<double> row;
   while (rows.next()) {
-    if (rows.cells().size() != columns)
-      rows.fail(fmt::format("{} columns in this row, expected {} as in the header", rows.cells().size(), columns));
+    rows.requireCells(columns, expected);
     row.clear();
     for (std::size_t k = 0; k < columns; ++k) row.push_back(rows.number(k, columnNames[k]));
     addSample(trajectory, sampleOfRow(row, rows), name, rows.line());

@@ -25,7 +25,7 @@ std::string trialKey(const StabilityPoint& p) {
 }
 
 StabilityPoint pointOf(const CsvRows& row) {
-  if (row.cells().size() != 7) row.fail("expected the seven cells of a trial");
+  row.requireCells(7, "the seven of a trial");
   StabilityPoint p;
   p.method = row.cells()[0];
   p.trial = row.cells()[1];

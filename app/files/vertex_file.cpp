@@ -32,18 +32,18 @@ template <typename Row>
 void forEachVertex(std::string_view text, const std::string& name, const SoftBodyModel& model,
                    std::span<const std::string_view> columns, const Row& row) {
   CsvRows rows(text, name);
+  const std::string expected = joined(columns, ",");
   bool first = true, any = false;
   for (; rows.next(); first = false) {
     if (first && isHeader(rows.cells(), columns)) continue;
-    if (rows.cells().size() != columns.size())
-      rows.fail(fmt::format("{} columns in this row, expected {}", rows.cells().size(), joined(columns, ",")));
+    rows.requireCells(columns.size(), expected);
     const int vertex = rows.index(0, columns[0], model.nodeOfInputVertex.size());
     const int node = model.nodeOfInputVertex[vertex];
     if (node < 0) rows.fail(fmt::format("vertex {} is none of the surface: repair dropped it from the mesh", vertex));
     row(rows, node);
     any = true;
   }
-  if (!any) throw inputError(name, 0, fmt::format("no rows, expected at least one of {}", joined(columns, ",")));
+  if (!any) throw inputError(name, 0, fmt::format("no rows, expected at least one of {}", expected));
 }
 
 }  // namespace
