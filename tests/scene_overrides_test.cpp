@@ -51,7 +51,7 @@ TEST_F(SceneOverrides, MistakesInOverridesNameTheOverride) {
   EXPECT_EQ(set("camera.key.fov", "50"), "--set camera.key.fov: several elements answer to this, expected one");
   EXPECT_EQ(
       set("body.gallbladder.surface", "thin"),
-      R"(--set body.gallbladder.surface: <body> surface="thin": unknown value; known: "full", "skin", "contact")");
+      R"(--set body.gallbladder.surface: <body> surface="thin": did you mean "skin"? known: full, skin, contact)");
   EXPECT_EQ(set("tissue.bile_sac.young", "-1"),
             R"(--set tissue.bile_sac.young: <tissue> young="-1": expected 1 number > 0)");
   EXPECT_EQ(set("", "x").substr(0, 6), "--set ");

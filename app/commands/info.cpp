@@ -9,6 +9,7 @@
 #include "app/files/text.h"
 #include "app/files/trajectory_file.h"
 #include "app/files/xml_element.h"
+#include "app/scene_names.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/model/build_report.h"
 #include "physics/model/mesh_topology.h"
@@ -72,10 +73,8 @@ void addBody(const SceneBody& body, const SoftBodyModel& model, std::vector<Resu
   add("young", text(body.tissue.young), "Pa");
   add("poisson", text(body.tissue.poisson), "");
   add("damping", text(body.tissue.damping), "");
-  constexpr const char* links[] = {"springs", "beam", "identified"};
-  add("link_model", links[static_cast<int>(body.links)], "");
-  constexpr const char* surfaces[] = {"full", "skin", "contact"};
-  add("surface", surfaces[static_cast<int>(body.surface)], "");
+  add("link_model", nameOf(body.links), "");
+  add("surface", nameOf(body.surface), "");
   add("look", body.look, "");
   add("fixed_spheres", text(body.fixed.size()), "");
   add("driven_spheres", text(body.driven.size()), "");

@@ -46,11 +46,10 @@ void readFrames(const std::string& path, const XmlElement& element, std::size_t 
 }
 
 void readPatches(const std::string& path, const XmlElement& element, std::size_t nodes, IdentifiedNetwork& network) {
-  for (const XmlElement& child : element.children) {
-    if (child.name != "identified_patch") continue;
+  for (const XmlElement* child : childrenOf(element, "identified_patch")) {
     FixedPatch& patch = network.patches.emplace_back();
-    patch.region = readText(child, "region");
-    Rows rows(path, child);
+    patch.region = readText(*child, "region");
+    Rows rows(path, *child);
     rows.forEach([&] { patch.nodes.push_back(rows.index(nodes)); });
     rows.require(!patch.nodes.empty(), "expected at least one node");
     rows.require(
@@ -86,9 +85,7 @@ void readLinks(const std::string& path, const XmlElement& element, IdentifiedNet
 }
 
 void readStrains(const std::string& path, const XmlElement& element, IdentifiedNetwork& network) {
-  const bool given = std::any_of(element.children.begin(), element.children.end(),
-                                 [](const XmlElement& child) { return child.name == "identified_strains"; });
-  if (!given) return;
+  if (childrenOf(element, "identified_strains").empty()) return;
   Rows rows(path, element, "identified_strains");
   std::size_t next = 0;
   rows.forEach([&] {

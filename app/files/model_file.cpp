@@ -245,8 +245,7 @@ SoftBodyModel readModel(const std::string& path) {
   readBuckets(path, root, model);
   readSkeleton(path, root, model.skeleton);
   readRenderSurface(path, root, model.restNodes.size(), model.renderSurface);
-  for (const XmlElement& child : root.children)
-    if (child.name == "identified") model.identified = readIdentified(path, child, model);
+  for (const XmlElement* e : childrenOf(root, "identified")) model.identified = readIdentified(path, *e, model);
   return model;
 }
 

@@ -51,10 +51,7 @@ void putArray(std::string& out, const char* name, const std::vector<T>& values) 
 // The numbers of one element's text in order, row by row, with the line for complaints.
 class Rows {
  public:
-  // Of the only child of that name, which there is.
-  Rows(const std::string& path, const XmlElement& root, const std::string& name)
-      : Rows(path, *std::find_if(root.children.begin(), root.children.end(),
-                                 [&](const XmlElement& e) { return e.name == name; })) {}
+  Rows(const std::string& path, const XmlElement& root, const std::string& name) : Rows(path, onlyChild(root, name)) {}
   Rows(const std::string& path, const XmlElement& element) : path_(path), element_(element) {
     rest_ = element_.text;
     line_ = std::max(element_.textLine, element_.line);

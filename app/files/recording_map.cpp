@@ -4,32 +4,13 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <sstream>
 
 #include "app/files/mesh_file.h"
 #include "app/files/placement.h"
-#include "app/files/text.h"
 
 namespace medulla {
 
 namespace {
-
-// Index into `known`, of which the nearest is named otherwise.
-std::size_t readNamed(const XmlElement& element, const std::string& attribute, const std::vector<std::string>& known,
-                      const std::string& fallback) {
-  const std::string name = readText(element, attribute, fallback);
-  const auto found = std::find(known.begin(), known.end(), name);
-  if (found != known.end()) return static_cast<std::size_t>(found - known.begin());
-  refuse(element, attribute,
-         fmt::format("did you mean \"{}\"? known: {}", nearestName(name, known), joined(known, ", ")));
-}
-
-const XmlElement& childOf(const XmlElement& parent, const std::string& name) {
-  static const XmlElement absent;
-  for (const XmlElement& child : parent.children)
-    if (child.name == name) return child;
-  return absent;
-}
 
 ColumnChoice numbersFrom(int first, int count) {
   ColumnChoice out;
@@ -78,7 +59,7 @@ void useRos(RecordingMap& map) {
 
 void useMap(const XmlElement& root, RecordingMap& map) {
   enum { table, jigsaws, ros, sofa };
-  const std::size_t name = readNamed(root, "map", {"table", "jigsaws", "ros", "sofa"}, "table");
+  const int name = readChoice(root, "map", {"table", "jigsaws", "ros", "sofa"}, table);
   const std::string parts = "part=\"master_left|master_right|slave_left|slave_right\"";
   if (name == jigsaws && !root.find("part")) refuse(root, "map", parts + " is missing, which says whose motion it is");
   if (name != jigsaws && root.find("part")) refuse(root, "part", parts + " belongs to map=\"jigsaws\"");
@@ -86,16 +67,14 @@ void useMap(const XmlElement& root, RecordingMap& map) {
   map.writeState = name == sofa;
   if (name == ros) useRos(map);
   if (name == jigsaws)
-    useJigsaws(int(readNamed(root, "part", {"master_left", "master_right", "slave_left", "slave_right"}, "")), map);
+    useJigsaws(readChoice(root, "part", {"master_left", "master_right", "slave_left", "slave_right"}, 0), map);
 }
 
 // True where the attribute is there.
 bool readColumns(const XmlElement& e, const std::string& attribute, std::vector<std::size_t> counts,
                  ColumnChoice& out) {
   if (!e.find(attribute)) return false;
-  std::istringstream words(readText(e, attribute));
-  out.clear();
-  for (std::string word; words >> word;) out.push_back(word);
+  out = readWords(e, attribute);
   if (std::find(counts.begin(), counts.end(), out.size()) != counts.end()) return true;
   refuse(e, attribute, fmt::format("{} columns, expected {}", out.size(), counts[0]));
 }
@@ -116,9 +95,9 @@ void readLayout(const XmlElement& e, RecordingColumns& columns) {
 void readUnits(const XmlElement& e, RecordingMap& map) {
   const std::vector<std::string> times = {"s", "ms", "us", "ns"};
   constexpr double seconds[] = {1, 1e-3, 1e-6, 1e-9};
-  map.metresPerUnit = metresPerUnit(lengthUnits()[readNamed(e, "length", lengthUnits(), "m")]);
+  map.metresPerUnit = metresPerUnit(lengthUnits()[readChoice(e, "length", lengthUnits(), 0)]);
   if (!e.find("time")) return;
-  for (RecordingColumns& columns : map.layouts) columns.secondsPerUnit = seconds[readNamed(e, "time", times, "s")];
+  for (RecordingColumns& columns : map.layouts) columns.secondsPerUnit = seconds[readChoice(e, "time", times, 0)];
 }
 
 void readGrip(const XmlElement& e, RecordingMap& map) {
@@ -128,8 +107,7 @@ void readGrip(const XmlElement& e, RecordingMap& map) {
 }
 
 void readFrame(const XmlElement& e, RecordingMap& map) {
-  const std::vector<std::string> axes = {"x", "y", "z"};
-  if (e.find("mirror")) map.mirror[static_cast<Eigen::Index>(readNamed(e, "mirror", axes, ""))] = -1;
+  if (e.find("mirror")) map.mirror[readChoice(e, "mirror", {"x", "y", "z"}, 0)] = -1;
   map.scale = readNumber(e, "scale", map.scale, positive);
   map.worldFromRecording = readPlacement(e);
   map.deviceFromTool = readOrientation(e, "tool");
@@ -146,7 +124,8 @@ void readSpan(const XmlElement& e, RecordingMap& map) {
 // What no map has given, and what would have no effect.
 void requireComplete(const XmlElement& root, const RecordingMap& map) {
   const RecordingColumns& layout = map.layouts[0];
-  const XmlElement &columns = childOf(root, "columns"), &grip = childOf(root, "grip"), &units = childOf(root, "units");
+  const XmlElement &columns = onlyChild(root, "columns"), &grip = onlyChild(root, "grip"),
+                   &units = onlyChild(root, "units");
   if (!grip.where.empty() && layout.grip.empty())
     refuse(grip, "", "there is no grip column, expected one in <columns>");
   if (layout.rate > 0 && units.find("time")) refuse(units, "time", "there is a rate, expected no unit of time");
@@ -189,11 +168,11 @@ RecordingMap readRecordingMap(const std::string& path) {
   map.line = root.line;
   map.recordingPath = readPath(root, "file", path);
   useMap(root, map);
-  for (RecordingColumns& layout : map.layouts) readLayout(childOf(root, "columns"), layout);
-  readUnits(childOf(root, "units"), map);
-  readGrip(childOf(root, "grip"), map);
-  readFrame(childOf(root, "frame"), map);
-  readSpan(childOf(root, "span"), map);
+  for (RecordingColumns& layout : map.layouts) readLayout(onlyChild(root, "columns"), layout);
+  readUnits(onlyChild(root, "units"), map);
+  readGrip(onlyChild(root, "grip"), map);
+  readFrame(onlyChild(root, "frame"), map);
+  readSpan(onlyChild(root, "span"), map);
   requireComplete(root, map);
   return map;
 }

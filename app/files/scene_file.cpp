@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <set>
-#include <sstream>
 #include <string_view>
 
 #include "app/files/mesh_file.h"
@@ -14,6 +13,7 @@
 #include "app/files/text.h"
 #include "app/files/xml_element.h"
 #include "app/scene.h"
+#include "app/scene_names.h"
 #include "physics/content_hash.h"
 #include "physics/model/rotation_between.h"
 
@@ -21,19 +21,16 @@ namespace medulla {
 
 namespace {
 
-std::vector<const XmlElement*> childrenOf(const XmlElement& parent, const std::string& name) {
-  std::vector<const XmlElement*> out;
-  for (const XmlElement& child : parent.children) {
-    if (child.name == name) out.push_back(&child);
-  }
-  return out;
+template <typename E>
+E readEnum(const XmlElement& element, const std::string& attribute, E fallback) {
+  const auto names = namesOf(fallback);
+  return static_cast<E>(readChoice(element, attribute, {names.begin(), names.end()}, static_cast<int>(fallback)));
 }
 
-// An absent element reads like an empty one: every attribute at its default.
-const XmlElement& onlyChild(const XmlElement& parent, const std::string& name) {
-  static const XmlElement absent;
-  const std::vector<const XmlElement*> found = childrenOf(parent, name);
-  return found.empty() ? absent : *found[0];
+bool readBool(const XmlElement& element, const std::string& attribute, bool fallback) {
+  const std::string text = readText(element, attribute, fallback ? "true" : "false");
+  if (text != "true" && text != "false") refuse(element, attribute, "expected true or false");
+  return text == "true";
 }
 
 // Names stand in override paths, column names, object names and file names.
@@ -67,8 +64,7 @@ void readClock(const XmlElement& clock, Scene& scene) {
 }
 
 void readDynamics(const XmlElement& dynamics, Scene& scene) {
-  constexpr Integrator integrators[] = {Integrator::explicitEuler, Integrator::implicit};
-  scene.integrator = integrators[readChoice(dynamics, "integrator", {"explicit", "implicit"}, 0)];
+  scene.integrator = readEnum(dynamics, "integrator", scene.integrator);
   scene.order = 1 + readChoice(dynamics, "order", {"1", "2"}, 0);
   if (scene.order == 2 && scene.integrator != Integrator::implicit)
     refuse(dynamics, "order", "expected 1 with integrator=\"explicit\": order 2 needs integrator=\"implicit\"");
@@ -76,8 +72,7 @@ void readDynamics(const XmlElement& dynamics, Scene& scene) {
   scene.ambientDrag = readNumber(dynamics, "ambient_drag", scene.ambientDrag, notNegative);
   scene.sleepAfter = readNumber(dynamics, "sleep_after", scene.sleepAfter, notNegative);
   scene.substeps = readInteger(dynamics, "substeps", scene.substeps, {0, 100000});
-  constexpr ContactMode modes[] = {ContactMode::none, ContactMode::balls, ContactMode::swept};
-  scene.contact = modes[readChoice(dynamics, "contact", {"none", "balls", "swept"}, 1)];
+  scene.contact = readEnum(dynamics, "contact", scene.contact);
 }
 
 struct NamedTissue {
@@ -137,15 +132,10 @@ NodeChoice readNodeChoice(const XmlElement& e, const std::vector<std::string>& o
   return choice;
 }
 
-FixedFreedom readFreedom(const XmlElement& e, FixedFreedom without) {
-  const bool translation = without == FixedFreedom::translation;
-  return readChoice(e, "dof", {"all", "translation"}, translation) == 0 ? FixedFreedom::all : FixedFreedom::translation;
-}
-
 void readFixations(const XmlElement& body, const std::string& scenePath, SceneBody& out) {
   std::set<int> taken;
   for (const XmlElement* fix : childrenOf(body, "fix")) {
-    const FixedFreedom freedom = readFreedom(*fix, FixedFreedom::all);
+    const FixedFreedom freedom = readEnum(*fix, "dof", FixedFreedom::all);
     const NodeChoice nodes = readNodeChoice(*fix, {"spheres"}, scenePath);
     if (!fix->find("spheres")) {
       out.fixes.push_back({fix->line, nodes, freedom});
@@ -196,7 +186,7 @@ std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::v
     d.frequency = readNumber(*drive, "frequency", d.frequency, positive);
     d.phase = readNumber(*drive, "phase", d.phase);
     d.velocity = readVector(*drive, "velocity", d.velocity);
-    d.freedom = readFreedom(*drive, d.freedom);
+    d.freedom = readEnum(*drive, "dof", d.freedom);
     out.push_back(d);
   }
   return out;
@@ -218,8 +208,7 @@ void readNeighbours(const XmlElement& root, Scene& scene) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     for (const XmlElement* e : childrenOf(*bodies[b], "neighbours")) {
       std::vector<int>& out = scene.bodies[b].neighbours.emplace();
-      std::istringstream names(readText(*e, "names"));
-      for (std::string name; names >> name;) {
+      for (const std::string& name : readWords(*e, "names")) {
         const auto found = std::find(known.begin(), known.end(), name);
         if (found == known.end())
           refuse(*e, "names",
@@ -241,10 +230,8 @@ void readBodies(const XmlElement& root, Scene& scene) {
     body.modelPath = readPath(*e, "model", scene.path);
     body.look = readText(*e, "look");
     body.tissue = findTissue(*e, tissues);
-    constexpr LinkModel links[] = {LinkModel::beam, LinkModel::springs, LinkModel::identified};
-    body.links = links[readChoice(*e, "links", {"beam", "springs", "identified"}, 0)];
-    constexpr SurfaceMode surfaces[] = {SurfaceMode::full, SurfaceMode::skin, SurfaceMode::contact};
-    body.surface = surfaces[readChoice(*e, "surface", {"full", "skin", "contact"}, 0)];
+    body.links = readEnum(*e, "links", body.links);
+    body.surface = readEnum(*e, "surface", body.surface);
     body.worldFromModel = readPlacement(*e);
     if (e->find("reference")) body.referencePath = readPath(*e, "reference", scene.path);
     readFixations(*e, scene.path, body);
@@ -265,8 +252,7 @@ void requireShape(const XmlElement& e, const std::string& attribute, bool fits, 
 
 void readShape(const XmlElement& e, StaticShape& shape) {
   using Kind = StaticShape::Kind;
-  constexpr Kind kinds[] = {Kind::plane, Kind::box, Kind::sphere, Kind::mesh};
-  shape.kind = kinds[readChoice(e, "shape", {"plane", "box", "sphere", "mesh"}, 0)];
+  shape.kind = readEnum(e, "shape", shape.kind);
   const bool plane = shape.kind == Kind::plane, box = shape.kind == Kind::box, sphere = shape.kind == Kind::sphere,
              mesh = shape.kind == Kind::mesh;
   requireShape(e, "normal", plane, plane, "plane");
@@ -294,7 +280,7 @@ void readStatics(const XmlElement& root, Scene& scene) {
     readShape(*e, out.shape);
     const bool mesh = out.shape.kind == StaticShape::Kind::mesh;
     if (mesh) out.meshPath = readPath(*e, "mesh", scene.path);
-    out.contact = readChoice(*e, "contact", {"false", "true"}, mesh ? 0 : 1) == 1;
+    out.contact = readBool(*e, "contact", !mesh);
     out.look = readText(*e, "look");
     if (out.look.empty() && !out.contact) refuse(*e, "shape", "without contact and without a look it has no effect");
     out.unit = lengthUnits()[readChoice(*e, "unit", lengthUnits(), 0)];
@@ -351,7 +337,7 @@ void readCamera(const XmlElement& camera, Scene& scene) {
     scene.camera.push_back(key);
   }
   if (scene.camera.empty()) scene.camera.push_back(own);
-  scene.endoscope = readChoice(camera, "endoscope", {"true", "false"}, 0) == 0;
+  scene.endoscope = readBool(camera, "endoscope", scene.endoscope);
 }
 
 void readLight(const XmlElement& light, Scene& scene) {

@@ -209,6 +209,20 @@ const XmlAttribute* XmlElement::find(const std::string& attribute) const {
   return nullptr;
 }
 
+std::vector<const XmlElement*> childrenOf(const XmlElement& parent, const std::string& name) {
+  std::vector<const XmlElement*> out;
+  for (const XmlElement& child : parent.children) {
+    if (child.name == name) out.push_back(&child);
+  }
+  return out;
+}
+
+const XmlElement& onlyChild(const XmlElement& parent, const std::string& name) {
+  static const XmlElement absent;
+  const std::vector<const XmlElement*> found = childrenOf(parent, name);
+  return found.empty() ? absent : *found[0];
+}
+
 std::string rootElementOf(const std::string& path) {
   return parseXml(path).name;
 }
@@ -261,16 +275,18 @@ std::string readText(const XmlElement& element, const std::string& attribute, co
   return a->value;
 }
 
+std::vector<std::string> readWords(const XmlElement& element, const std::string& attribute) {
+  return words(readText(element, attribute));
+}
+
 int readChoice(const XmlElement& element, const std::string& attribute, const std::vector<std::string>& known,
                int fallback) {
   const XmlAttribute* a = element.find(attribute);
   if (!a) return fallback;
-  for (std::size_t k = 0; k < known.size(); ++k) {
-    if (a->value == known[k]) return static_cast<int>(k);
-  }
-  std::string list;
-  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + inQuotes(name, '"');
-  refuse(element, attribute, "unknown value; known: " + list);
+  const auto found = std::find(known.begin(), known.end(), a->value);
+  if (found != known.end()) return static_cast<int>(found - known.begin());
+  const std::string nearest = inQuotes(nearestName(a->value, known), '"');
+  refuse(element, attribute, "did you mean " + nearest + "? known: " + joined(known, ", "));
 }
 
 }  // namespace medulla

@@ -44,6 +44,10 @@ using XmlRules = std::vector<XmlRule>;  // the first is the root's; every child 
 // may change the tree before it is held against the rules.
 XmlElement readXml(const std::string& path, const XmlRules& rules, const std::function<void(XmlElement&)>& edit = {});
 
+std::vector<const XmlElement*> childrenOf(const XmlElement& parent, const std::string& name);
+// An absent element reads like an empty one: every attribute at its default.
+const XmlElement& onlyChild(const XmlElement& parent, const std::string& name);
+
 // Name of the root element. Throws std::runtime_error "FILE:LINE: ..." on broken XML.
 std::string rootElementOf(const std::string& path);
 
@@ -75,7 +79,9 @@ std::vector<double> readNumbers(const XmlElement& element, const std::string& at
 std::vector<int> readIntegers(const XmlElement& element, const std::string& attribute, int count,
                               Range range = anyNumber);
 std::string readText(const XmlElement& element, const std::string& attribute, const std::string& fallback = "");
-// Index into `known`.
+// Separated by white space; none where the attribute is absent.
+std::vector<std::string> readWords(const XmlElement& element, const std::string& attribute);
+// Index into `known`, of which the nearest is named otherwise.
 int readChoice(const XmlElement& element, const std::string& attribute, const std::vector<std::string>& known,
                int fallback);
 
