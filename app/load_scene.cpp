@@ -50,27 +50,28 @@ static std::string regionText(const NodeChoice& choice) {
 }
 
 // That of the model's own, identified for this body.
-static std::string identifyingCommand(const SoftBodyModel& model, const SceneBody& body) {
-  std::string out = model.settings.substr(0, model.settings.find(" --identify"));
+static std::string identifyingCommand(const SceneBody& body) {
+  const std::string& settings = body.model->settings;
+  std::string out = settings.substr(0, settings.find(" --identify"));
   out += fmt::format(" --identify --poisson {}", body.tissue.poisson);
   for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix {}", shellWord(regionText(fix.nodes)));
   return out;
 }
 
-static std::vector<int> findNodes(const Scene& scene, int line, const NodeChoice& choice, const SceneBody& body,
-                                  const SoftBodyModel& model) {
+static std::vector<int> findNodes(const Scene& scene, int line, const NodeChoice& choice, const SceneBody& body) {
   if (!choice.verticesPath.empty()) {
     requireFile(scene, line, "vertices", "list of vertices", choice.verticesPath);
-    return readVertices(choice.verticesPath, model);
+    return readVertices(choice.verticesPath, *body.model);
   }
-  std::vector<int> nodes = nodesInRegion(model, choice.region);
+  std::vector<int> nodes = nodesInRegion(*body.model, choice.region);
   if (nodes.empty())
     throw inputError(scene.path, line, fmt::format("no surface node of body \"{}\" lies in here", body.name));
   return nodes;
 }
 
 // Patches of an identified model hold it, and no spheres.
-static void resolvePatches(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
+static void resolvePatches(const Scene& scene, SceneBody& body) {
+  const SoftBodyModel& model = *body.model;
   std::vector<std::vector<int>> asked, known;
   for (const SceneFix& fix : body.fixes) {
     if (fix.freedom != FixedFreedom::all)
@@ -78,7 +79,7 @@ static void resolvePatches(const Scene& scene, const SoftBodyModel& model, Scene
                        fmt::format("body \"{}\" has identified links, which its patches hold wholly: expected "
                                    "dof=\"all\"",
                                    body.name));
-    asked.push_back(findNodes(scene, fix.line, fix.nodes, body, model));
+    asked.push_back(findNodes(scene, fix.line, fix.nodes, body));
     std::sort(asked.back().begin(), asked.back().end());
     body.fixedNodes.insert(body.fixedNodes.end(), asked.back().begin(), asked.back().end());
   }
@@ -98,13 +99,14 @@ static void resolvePatches(const Scene& scene, const SoftBodyModel& model, Scene
                                : asked != known  ? "was identified with another part of its surface fixed"
                                                  : fmt::format("was identified for a Poisson's ratio of {}",
                                                                model.identified->poisson),
-                               identifyingCommand(model, body)));
+                               identifyingCommand(body)));
 }
 
 // Nodes that are fixed, and the spheres that those hold.
-static void resolveFixes(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
+static void resolveFixes(const Scene& scene, SceneBody& body) {
+  const SoftBodyModel& model = *body.model;
   if (body.links == LinkModel::identified) {
-    resolvePatches(scene, model, body);
+    resolvePatches(scene, body);
     if (!model.identified->usesFormulas) {
       for (const int sphere : spheresBehindPatches(*model.identified)) body.fixed.push_back({sphere});
       return;
@@ -113,7 +115,7 @@ static void resolveFixes(const Scene& scene, const SoftBodyModel& model, SceneBo
     body.fixedNodes.clear();
   }
   for (const SceneFix& fix : body.fixes) {
-    const std::vector<int> nodes = findNodes(scene, fix.line, fix.nodes, body, model);
+    const std::vector<int> nodes = findNodes(scene, fix.line, fix.nodes, body);
     for (const int sphere : spheresHeldBy(model, nodes)) {
       const bool known =
           std::any_of(body.fixed.begin(), body.fixed.end(), [&](const FixedSphere& f) { return f.sphere == sphere; });
@@ -130,34 +132,33 @@ static void resolveFixes(const Scene& scene, const SoftBodyModel& model, SceneBo
                     body.name));
 }
 
-static void resolveLoads(const Scene& scene, const SoftBodyModel& model, SceneBody& body) {
+static void resolveLoads(const Scene& scene, SceneBody& body) {
+  const SoftBodyModel& model = *body.model;
   for (const SceneLoad& load : body.loads) {
     if (!load.forcesPath.empty()) requireFile(scene, load.line, "file", "file of forces", load.forcesPath);
     const std::vector<DeadLoad> loads =
-        load.forcesPath.empty() ? spreadLoad(model, findNodes(scene, load.line, load.nodes, body, model), load.whole)
+        load.forcesPath.empty() ? spreadLoad(model, findNodes(scene, load.line, load.nodes, body), load.whole)
                                 : readVertexForces(load.forcesPath, model, load.whole);
     body.deadLoads.insert(body.deadLoads.end(), loads.begin(), loads.end());
   }
 }
 
-static Reference loadReference(const Scene& scene, const SceneBody& body, const SoftBodyModel& model) {
+static Reference loadReference(const Scene& scene, const SceneBody& body) {
   if (body.referencePath.empty()) return {};
   requireFile(scene, body.line, "reference", "reference", body.referencePath);
-  return readReference(body.referencePath, model);
+  return readReference(body.referencePath, *body.model);
 }
 
-static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene& scene) {
-  std::vector<std::shared_ptr<const SoftBodyModel>> models;
+static void loadModels(Scene& scene) {
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const SceneBody& body = scene.bodies[b];
-    std::shared_ptr<const SoftBodyModel> model;
-    for (std::size_t e = 0; e < b && !model; ++e)
-      if (scene.bodies[e].modelPath == body.modelPath) model = models[e];
-    if (!model) {
+    SceneBody& body = scene.bodies[b];
+    for (std::size_t e = 0; e < b && !body.model; ++e)
+      if (scene.bodies[e].modelPath == body.modelPath) body.model = scene.bodies[e].model;
+    if (!body.model) {
       requireFile(scene, body.line, "model", fmt::format("model of body \"{}\"", body.name), body.modelPath);
-      model = std::make_shared<const SoftBodyModel>(readModel(body.modelPath));
+      body.model = std::make_shared<const SoftBodyModel>(readModel(body.modelPath));
     }
-    const int spheres = static_cast<int>(model->spheres.size());
+    const int spheres = static_cast<int>(body.model->spheres.size());
     for (const FixedSphere& fixed : body.fixed)
       if (fixed.sphere < 0 || fixed.sphere >= spheres)
         throw inputError(scene.path, body.line,
@@ -168,9 +169,7 @@ static std::vector<std::shared_ptr<const SoftBodyModel>> loadModels(const Scene&
         throw inputError(scene.path, body.line,
                          fmt::format("body \"{}\" drives sphere {}, its model has spheres 0 to {}", body.name,
                                      driven.sphere, spheres - 1));
-    models.push_back(std::move(model));
   }
-  return models;
 }
 
 // Known looks are the renderer's, but a run without pictures should not accept what a run with pictures refuses.
@@ -209,11 +208,11 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
     tool.line = 0;
   }
   for (const SceneBody& body : scene.bodies) requireLook(scene, body.line, body.look);
-  loaded.models = loadModels(scene);
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    resolveFixes(scene, *loaded.models[b], scene.bodies[b]);
-    resolveLoads(scene, *loaded.models[b], scene.bodies[b]);
-    loaded.references.push_back(loadReference(scene, scene.bodies[b], *loaded.models[b]));
+  loadModels(scene);
+  for (SceneBody& body : scene.bodies) {
+    resolveFixes(scene, body);
+    resolveLoads(scene, body);
+    loaded.references.push_back(loadReference(scene, body));
   }
   for (const SceneStatic& item : scene.statics) {
     if (!item.look.empty()) requireLook(scene, item.line, item.look);

@@ -39,8 +39,8 @@ struct CarriedLink {
   Vector3d at(double along) const { return blendPoint(end[0], end[1], along) + 0.5 * along * (1 - along) * bow; }
 };
 
-CarriedLink carriedLink(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame,
-                        const ElasticLink& link) {
+CarriedLink carriedLink(const BodyDescription& body, const BodyFrame& frame, const ElasticLink& link) {
+  const SoftBodyModel& model = *body.model;
   const FillingSphere* spheres[] = {&model.spheres[link.sphere0], &model.spheres[link.sphere1]};
   const SpherePose* poses[] = {&frame.spheres[link.sphere0], &frame.spheres[link.sphere1]};
   Eigen::Matrix3d rest;
@@ -62,8 +62,8 @@ CarriedLink carriedLink(const SceneBody& body, const SoftBodyModel& model, const
 }
 
 // Between the centres of two cells, or of one and where what holds it lies.
-CarriedLink carriedLink(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame,
-                        const IdentifiedLink& link) {
+CarriedLink carriedLink(const BodyDescription& body, const BodyFrame& frame, const IdentifiedLink& link) {
+  const SoftBodyModel& model = *body.model;
   CarriedLink out;
   out.radius = model.spheres[link.frame0].radius;
   const int frames[] = {link.frame0, link.frame1};
@@ -83,12 +83,13 @@ CarriedLink carriedLink(const SceneBody& body, const SoftBodyModel& model, const
   return out;
 }
 
-std::vector<CarriedLink> carriedLinks(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame) {
+std::vector<CarriedLink> carriedLinks(const BodyDescription& body, const BodyFrame& frame) {
+  const SoftBodyModel& model = *body.model;
   std::vector<CarriedLink> out;
   if (body.links == LinkModel::identified) {
-    for (const IdentifiedLink& link : model.identified->links) out.push_back(carriedLink(body, model, frame, link));
+    for (const IdentifiedLink& link : model.identified->links) out.push_back(carriedLink(body, frame, link));
   } else {
-    for (const ElasticLink& link : model.links) out.push_back(carriedLink(body, model, frame, link));
+    for (const ElasticLink& link : model.links) out.push_back(carriedLink(body, frame, link));
   }
   return out;
 }
@@ -119,7 +120,8 @@ void drawMesh(const SoftBodyModel& model, const BodyFrame& frame, float height, 
     out.segments.push_back({toGlm(frame.nodes[a]), toGlm(frame.nodes[b]), 0.5f * kThin * height, kMeshColour});
 }
 
-void drawSpheres(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame, Drawing& out) {
+void drawSpheres(const BodyDescription& body, const BodyFrame& frame, Drawing& out) {
+  const SoftBodyModel& model = *body.model;
   for (std::size_t i = 0; i < model.spheres.size(); ++i) {
     const FillingSphere& sphere = model.spheres[i];
     const SpherePose& pose = frame.spheres[i];
@@ -169,13 +171,14 @@ void drawFrames(const CarriedLink& link, float length, Drawing& out) {
 
 }  // namespace
 
-void drawBodyModel(const SceneBody& body, const SoftBodyModel& model, const BodyFrame& frame, const Shown& shown,
-                   float height, Drawing& out) {
+void drawBodyModel(const BodyDescription& body, const BodyFrame& frame, const Shown& shown, float height,
+                   Drawing& out) {
+  const SoftBodyModel& model = *body.model;
   if (shown.mesh) drawMesh(model, frame, height, out);
   if (shown.skeleton) drawSkeleton(model, frame, height, out);
-  if (shown.spheres) drawSpheres(body, model, frame, out);
+  if (shown.spheres) drawSpheres(body, frame, out);
   if (shown.buckets) drawBuckets(model, frame, out);
-  const std::vector<CarriedLink> links = carriedLinks(body, model, frame);
+  const std::vector<CarriedLink> links = carriedLinks(body, frame);
   for (const CarriedLink& link : links) {
     if (shown.links)
       drawLink(link, body.links == LinkModel::beam, std::min(kLink * height, 0.2f * float(link.radius)), out);

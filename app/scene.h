@@ -33,22 +33,14 @@ struct SceneLoad {
   DeadLoad whole;          // force on all chosen nodes together, N, world; its node is of no account
 };
 
-struct SceneBody {
+// loadScene() finds the model, fixed nodes and dead loads, and adds to the spheres fixed by number those that fixed
+// nodes hold.
+struct SceneBody : BodyDescription {
   int line = 0;
-  SurfaceMode surface = SurfaceMode::full;
-  LinkModel links = LinkModel::beam;
-  std::string name, modelPath, look;
+  std::string modelPath, look;
   std::string referencePath;  // where another program puts its vertices at the end; empty: none
-  Tissue tissue;
-  LinkFactors factors;
-  std::vector<FixedSphere> fixed;  // by number; loadScene() adds those that fixed nodes hold
   std::vector<SceneFix> fixes;
   std::vector<SceneLoad> loads;
-  std::vector<int> fixedNodes;      // found by loadScene(), as are
-  std::vector<DeadLoad> deadLoads;  // these
-  std::vector<DrivenSphere> driven;
-  std::optional<std::vector<int>> neighbours;  // indices of bodies
-  Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
 };
 
 // What does not move: drawn if it has a look, holding bodies if it says so.
@@ -90,14 +82,7 @@ struct Scene {
   std::string path, name;
   double servoRate = 1200, dynamicsRate = 50;  // Hz, up to 20000 and 20 to 1200; the first a multiple of the second
   double duration = 1;                         // s, > 0, <= 86400
-  double settle = 0;                           // s, 0 to 60: bodies alone, before the time begins
-  Eigen::Vector3d gravity{0, -9.81, 0};        // m/s2
-  double ambientDrag = 0;                      // 1/s, >= 0
-  double sleepAfter = 0;                       // s, >= 0, of keeping still; 0: never
-  int substeps = 0;                            // per dynamics frame; 0: as many as the stability estimate asks for
-  Integrator integrator = Integrator::explicitEuler;
-  int order = 1;  // 1, or 2 of the implicit integrator
-  ContactMode contact = ContactMode::balls;
+  WorldSettings dynamics{.contact = ContactMode::balls};
   std::vector<SceneBody> bodies;
   std::vector<SceneStatic> statics;
   std::vector<SceneTool> tools;

@@ -136,7 +136,7 @@ SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Rende
   };
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const SceneBody& body = scene.bodies[b];
-    SurfaceShape shape = shapeOf(loaded.models[b]->renderSurface, rest.bodies[b].nodes, body.look);
+    SurfaceShape shape = shapeOf(body.model->renderSurface, rest.bodies[b].nodes, body.look);
     shape.travels = body.fixed.empty() && body.fixedNodes.empty();
     add(body.line, std::move(shape));
   }
@@ -164,10 +164,9 @@ void SceneView::compose(const PictureState& state, ViewKind view, const Shown& s
   picture.surfaces.resize(scene.bodies.size() + drawnStatics_);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyFrame& frame = state.frame.bodies[b];
-    const SoftBodyModel& model = *loaded_->models[b];
-    evaluateRenderSurface(model.renderSurface, frame.nodes, picture.surfaces[b].positions);
+    evaluateRenderSurface(scene.bodies[b].model->renderSurface, frame.nodes, picture.surfaces[b].positions);
     if (view != ViewKind::tissue)
-      drawBodyModel(scene.bodies[b], model, frame, shown, heightAtTarget(picture.camera), picture.model);
+      drawBodyModel(scene.bodies[b], frame, shown, heightAtTarget(picture.camera), picture.model);
   }
   for (std::size_t k = 0; k < scene.tools.size(); ++k) {
     addTool(scene.tools[k], state.inputs[k], state.tools[k], picture);

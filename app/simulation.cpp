@@ -10,26 +10,8 @@
 
 namespace medulla {
 
-BodyDescription bodyDescription(const LoadedScene& loaded, std::size_t body) {
-  const SceneBody& b = loaded.scene.bodies[body];
-  return {b.name,  loaded.models[body], b.tissue, b.factors,    b.surface,  b.links, b.worldFromModel,
-          b.fixed, b.fixedNodes,        b.driven, b.neighbours, b.deadLoads};
-}
-
 World makeWorld(const LoadedScene& loaded) {
   const Scene& scene = loaded.scene;
-  WorldSettings settings;
-  settings.gravity = scene.gravity;
-  settings.ambientDrag = scene.ambientDrag;
-  settings.sleepAfter = scene.sleepAfter;
-  settings.frameDuration = 1 / scene.dynamicsRate;
-  settings.settleFrames = static_cast<int>(std::lround(scene.settle * scene.dynamicsRate));
-  settings.integrator = scene.integrator;
-  settings.order = scene.order;
-  settings.substeps = scene.substeps;
-  settings.contact = scene.contact;
-  std::vector<BodyDescription> bodies;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) bodies.push_back(bodyDescription(loaded, b));
   std::vector<StaticShape> statics;
   for (std::size_t k = 0; k < scene.statics.size(); ++k) {
     if (!scene.statics[k].contact) continue;
@@ -37,7 +19,7 @@ World makeWorld(const LoadedScene& loaded) {
     if (statics.back().kind == StaticShape::Kind::mesh) statics.back().mesh = loaded.statics[k];
   }
   try {
-    return World(settings, std::move(bodies), statics);
+    return World(scene.dynamics, {scene.bodies.begin(), scene.bodies.end()}, statics);
   } catch (const std::runtime_error& error) {
     throw inputError(scene.path, 0, error.what());
   }
@@ -59,8 +41,8 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   sampleInputs(0, inputs_);
 
   std::vector<TouchableBody> bodies;
-  for (std::size_t b = 0; b < loaded.models.size(); ++b)
-    bodies.push_back({loaded.models[b], world_.nodeGive(static_cast<int>(b))});
+  for (const SceneBody& body : loaded.scene.bodies)
+    bodies.push_back({body.model, world_.nodeGive(static_cast<int>(bodies.size()))});
   std::vector<ToolSettings> tools;
   for (const SceneTool& tool : loaded.scene.tools) tools.push_back(tool.settings);
   servo_ = std::make_unique<Servo>(bodies, tools, tickDuration_, current_, inputs_, embree);
@@ -153,7 +135,7 @@ void Simulation::accountImpulses(const FrameReport& report) {
 }
 
 void Simulation::accountVolumes() {
-  for (std::size_t b = 0; b < loaded_->models.size(); ++b) {
+  for (std::size_t b = 0; b < loaded_->scene.bodies.size(); ++b) {
     const double ratio = world_.volumeRatio(static_cast<int>(b));
     totals_.volumeRatioMin = std::min(totals_.volumeRatioMin, ratio);
     totals_.volumeRatioMax = std::max(totals_.volumeRatioMax, ratio);

@@ -13,21 +13,17 @@
 
 namespace medulla {
 
-// A scene with everything that it names in memory.
+// A scene with everything that it names in memory; its bodies have their models.
 struct LoadedScene {
   Scene scene;
-  std::vector<std::shared_ptr<const SoftBodyModel>> models;  // one per body
-  std::vector<TriangleMesh> statics;                         // one per static, in its frame; what is drawn
-  std::vector<Trajectory> trajectories;                      // one per tool
-  std::vector<Reference> references;                         // one per body; without displacements where none is named
+  std::vector<TriangleMesh> statics;     // one per static, in its frame; what is drawn
+  std::vector<Trajectory> trajectories;  // one per tool
+  std::vector<Reference> references;     // one per body; without displacements where none is named
 };
 
 // `trajectories` replaces files of the scene's tools, by tool name. Throws std::runtime_error with file and line; a
 // file that is missing is reported at the scene's line that names it.
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories = {});
-
-// A body as the scene wants it.
-BodyDescription bodyDescription(const LoadedScene& loaded, std::size_t body);
 
 // The scene's bodies before they settle, ahead of time 0. Throws std::runtime_error naming the body that cannot be
 // simulated.
@@ -95,7 +91,6 @@ class Simulation {
   void sampleInputs(double time, std::vector<ToolSample>& out) const;  // of every tool
 
   int frame() const { return frame_; }  // dynamics frames done
-  int frameCount() const { return frameCount_; }
   double time() const { return frame_ * frameDuration_; }
   const FrameTimes& times() const { return times_; }
   const ServoRecord& record() const { return record_; }        // of the last frame; before the first: the rest state

@@ -308,11 +308,18 @@ const Trial& trialOf(const std::string& name) {
   return *found;
 }
 
-// The body that a trial is about, alone.
-BodyDescription bodyOf(const Trial& trial, BodyDescription body) {
+// With nothing around it that moves it.
+BodyDescription alone(BodyDescription body) {
   body.worldFromModel.setIdentity();
   body.driven.clear();
+  body.neighbours.reset();
   body.deadLoads.clear();
+  return body;
+}
+
+// The body that a trial is about.
+BodyDescription bodyOf(const Trial& trial, const BodyDescription& whole) {
+  BodyDescription body = alone(whole);
   if (body.fixed.empty() && (body.links != LinkModel::identified || body.fixedNodes.empty()))
     throw std::runtime_error(fmt::format("body '{}' is not held anywhere: expected a body with <fix>", body.name));
   if (trial.change) trial.change(body);
@@ -424,11 +431,11 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
   } catch (const std::runtime_error&) {  // not finite
     out.recoveredAt.reset();
   }
-  out.duration = world.time();
   return out;
 }
 
-double explicitLimit(const BodyDescription& body) {
+double explicitLimit(const BodyDescription& whole) {
+  const BodyDescription body = alone(whole);
   BodyMechanics mechanics = bodyMechanics(body);
   return dampBody(body, mechanics, Integrator::explicitEuler);
 }

@@ -23,7 +23,6 @@ std::vector<std::string> tortureTrials();
 struct TortureOutcome {
   bool survived = false;                      // every state stayed finite
   std::optional<double> recoveredAt;          // s, from then on within 1 % of the body's diagonal of its rest
-  double duration = 0;                        // s, simulated
   double startEnergy = 0, largestEnergy = 0;  // J, kinetic and elastic; the start's counts what a tool gave
 };
 
@@ -36,7 +35,7 @@ TortureOutcome torture(const BodyDescription& body, const TortureMethod& method,
 // How many steps that takes at most. Throws likewise.
 double tortureSteps(const BodyDescription& body, const std::string& trial, double step);
 
-// s, the largest stable step of the explicit method by its own estimate.
+// s, the largest stable step of the explicit method by its own estimate, of the body alone.
 double explicitLimit(const BodyDescription& body);
 
 }  // namespace medulla

@@ -198,13 +198,13 @@ TEST_F(Gate, TellsApartWhatAPersonWouldWantToKnow) {
   camera = before;
 
   BuildSettings settings;
-  settings.spheres = static_cast<int>(loaded.models[0]->spheres.size()) + 1;
+  settings.spheres = static_cast<int>(loaded.scene.bodies[0].model->spheres.size()) + 1;
   settings.overshoot = 0;
   BuildReport report;
   LoadedScene finer = loaded;
   const std::string organ = kSource + "/assets/gallbladder/gallbladder";
   const TriangleMesh fine = readMesh(organ + "_fine.obj", 1);
-  finer.models[0] = std::make_shared<const SoftBodyModel>(
+  finer.scene.bodies[0].model = std::make_shared<const SoftBodyModel>(
       buildModel(repairMesh(readMesh(organ + ".obj", 1)), &fine, settings, report));
   const States finerStates = simulate(finer);
   expectTold(golden, Artist(finer, finerStates.rest).draw(finerStates.now), "another number of spheres");

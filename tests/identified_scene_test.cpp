@@ -60,7 +60,7 @@ TEST_F(IdentifiedScene, RunsHeldByItsPatch) {
   const World& world = simulation.world();
   DynamicsFrame frame;
   world.readFrame(frame);
-  const SoftBodyModel& m = *loaded.models[0];
+  const SoftBodyModel& m = *loaded.scene.bodies[0].model;
   for (const int node : m.identified->patches[0].nodes)
     EXPECT_EQ(frame.bodies[0].nodes[node], m.restNodes[node]) << "node " << node;
   EXPECT_GT(world.nodeSpeed(0), 0);

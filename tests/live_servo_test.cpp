@@ -52,7 +52,7 @@ TEST(LiveServo, RunsAgainstTheClockAndFeelsContact) {
       ASSERT_TRUE(tool.proxy.allFinite() && tool.force.allFinite());
   }
   const LiveReport report = live.report();
-  EXPECT_GE(report.ticks, (simulation.frameCount() - 1) * simulation.ticksPerFrame());
+  EXPECT_GE(report.ticks, (simulation.frame() - 1) * simulation.ticksPerFrame());
   EXPECT_GT(simulation.totals().forceMax, 0.05);
   EXPECT_GT(report.cpuMedian, 0);
   EXPECT_LE(report.cpuMedian, report.cpu999);

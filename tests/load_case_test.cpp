@@ -127,9 +127,9 @@ TEST_F(LoadCase, PartsOfSpaceAndTheirVerticesMeanTheSameNodes) {
   ASSERT_GT(a.fixedNodes.size(), 10u);
   ASSERT_GT(a.deadLoads.size(), 10u);
   std::string held, loaded;
-  for (std::size_t v = 0; v < byPlane.models[0]->nodeOfInputVertex.size(); ++v) {
-    const int node = byPlane.models[0]->nodeOfInputVertex[v];
-    const double y = byPlane.models[0]->restNodes[node].y();
+  for (std::size_t v = 0; v < byPlane.scene.bodies[0].model->nodeOfInputVertex.size(); ++v) {
+    const int node = byPlane.scene.bodies[0].model->nodeOfInputVertex[v];
+    const double y = byPlane.scene.bodies[0].model->restNodes[node].y();
     if (-y <= 0.02) held += fmt::format("{}\n", v);
     if (y <= -0.06) loaded += fmt::format("{}\n", v);
   }

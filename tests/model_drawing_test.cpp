@@ -28,11 +28,11 @@ struct Moment {
     while (!simulation.finished()) simulation.advanceFrame();
     stateAt(simulation.record(), simulation.record().start, state);
   }
-  const SoftBodyModel& model() const { return *loaded.models[0]; }
+  const SoftBodyModel& model() const { return *loaded.scene.bodies[0].model; }
   const BodyFrame& frame() const { return state.frame.bodies[0]; }
   Drawing draw(const std::vector<std::string>& parts) const {
     Drawing out;
-    drawBodyModel(loaded.scene.bodies[0], model(), frame(), readShown(parts), 0.1f, out);
+    drawBodyModel(loaded.scene.bodies[0], frame(), readShown(parts), 0.1f, out);
     return out;
   }
 };
@@ -131,7 +131,7 @@ TEST(ModelDrawing, IsTheSameOfNodesInSinglePrecision) {
   for (const char* part : {"mesh", "skeleton", "spheres", "buckets", "links", "frames", "attachments"}) {
     const Drawing expected = moment.draw({part});
     Drawing found;
-    drawBodyModel(moment.loaded.scene.bodies[0], moment.model(), kept, readShown({part}), 0.1f, found);
+    drawBodyModel(moment.loaded.scene.bodies[0], kept, readShown({part}), 0.1f, found);
     ASSERT_EQ(found.balls.size(), expected.balls.size()) << part;
     ASSERT_EQ(found.segments.size(), expected.segments.size()) << part;
     EXPECT_GT(found.balls.size() + found.segments.size() + found.arrows.size(), 0u) << part;

@@ -20,7 +20,7 @@ TEST_F(SceneOverrides, OverridesReplaceSingleAttributes) {
                                        {"scene.name", "other"}});
   EXPECT_EQ(s.bodies[0].surface, SurfaceMode::full);
   EXPECT_EQ(s.bodies[0].tissue.young, 1e4);  // the later one
-  EXPECT_EQ(s.gravity, Eigen::Vector3d::Zero());
+  EXPECT_EQ(s.dynamics.gravity, Eigen::Vector3d::Zero());
   EXPECT_EQ(s.tools[0].settings.radius, 0.005);
   EXPECT_EQ(s.bodies[0].factors.torsion, 7);
   EXPECT_EQ(s.bodies[1].factors.flexion, 8);  // where the scene has no <links>

@@ -43,7 +43,7 @@ TEST(Simulation, PicturesOnTicksShowTheTickAndOthersLieBetween) {
 // Loop's limit weights sum to one and reproduce rigid motion: the drawn surface moves with the body.
 TEST(SceneView, DrawnSurfaceFollowsARigidMotion) {
   const LoadedScene loaded = shortScene(1);
-  const SoftBodyModel& model = *loaded.models[0];
+  const SoftBodyModel& model = *loaded.scene.bodies[0].model;
   const Eigen::Isometry3d motion =
       Eigen::Translation3d(0.1, -0.2, 0.3) * Eigen::AngleAxisd(1.2, Eigen::Vector3d(1, 2, 3).normalized());
   std::vector<Eigen::Vector3d> moved;

@@ -52,7 +52,7 @@ void expectSurvival(const BodyDescription& body, const std::string& trial) {
     for (const double step : {0.01, 0.05}) {
       const TortureOutcome outcome = torture(body, method, trial, step);
       EXPECT_TRUE(outcome.survived) << method.name << ' ' << step;
-      EXPECT_TRUE(outcome.recoveredAt) << method.name << ' ' << step << " after " << outcome.duration << " s";
+      EXPECT_TRUE(outcome.recoveredAt) << method.name << ' ' << step;
       EXPECT_LE(outcome.largestEnergy, (method.order == 1 ? 1 + 1e-12 : 1.5) * outcome.startEnergy)
           << method.name << ' ' << step;
     }

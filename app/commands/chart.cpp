@@ -92,20 +92,20 @@ SceneOverride modelOverride(const std::string& model, const Scene& scene) {
 
 int spheresOf(const LoadedScene& loaded) {
   std::size_t count = 0;
-  for (const auto& model : loaded.models) count += model->spheres.size();
+  for (const SceneBody& body : loaded.scene.bodies) count += body.model->spheres.size();
   return static_cast<int>(count);
 }
 
 // Nodes are compared by number: models must be of the same meshes.
 void requireSameMeshes(const LoadedScene& a, const LoadedScene& b) {
-  for (std::size_t k = 0; k < a.models.size(); ++k)
-    if (a.models[k]->restNodes != b.models[k]->restNodes)
+  for (std::size_t k = 0; k < a.scene.bodies.size(); ++k)
+    if (a.scene.bodies[k].model->restNodes != b.scene.bodies[k].model->restNodes)
       throw std::runtime_error(fmt::format("the model {} is of another mesh than {}: expected the same nodes",
                                            b.scene.bodies[k].modelPath, a.scene.bodies[k].modelPath));
 }
 
 int chosenSubsteps(LoadedScene loaded) {
-  loaded.scene.substeps = 0;
+  loaded.scene.dynamics.substeps = 0;
   return makeWorld(loaded).substepsPerFrame();
 }
 
@@ -178,7 +178,7 @@ Outcome execute(const ChartRun& run, const std::function<void(double)>& progress
     progress(simulation.totals().simulated);
   }
   out.point.cpu = (processCpuSeconds() - start) / simulation.totals().simulated;
-  for (int b = 0; b < static_cast<int>(loaded.models.size()) && !out.point.failedAt; ++b) {
+  for (int b = 0; b < static_cast<int>(loaded.scene.bodies.size()) && !out.point.failedAt; ++b) {
     const double ratio = simulation.world().volumeRatio(b);
     if (!out.point.volumeRatio || std::abs(ratio - 1) > std::abs(*out.point.volumeRatio - 1))
       out.point.volumeRatio = ratio;
@@ -287,8 +287,8 @@ std::vector<SphereChartRow> sphereRows(const ChartOptions& options, const Loaded
     const LoadedScene loaded = loadRun(run);
     SphereChartRow row;
     row.spheres = spheresOf(loaded);
-    for (const auto& model : loaded.models) {
-      const BuildReport report = measureModel(*model);
+    for (const SceneBody& body : loaded.scene.bodies) {
+      const BuildReport report = measureModel(*body.model);
       row.gapMax = std::max(row.gapMax, report.gapMax);
       row.gapMean = std::max(row.gapMean, report.gapMean);
     }

@@ -20,7 +20,7 @@ struct Deviation {
 };
 
 Eigen::Vector3d restPlace(const LoadedScene& loaded, std::size_t body, std::size_t node) {
-  return loaded.scene.bodies[body].worldFromModel * loaded.models[body]->restNodes[node];
+  return loaded.scene.bodies[body].worldFromModel * loaded.scene.bodies[body].model->restNodes[node];
 }
 
 void setDisplacement(const LoadedScene& loaded, ChartTruth& truth) {
@@ -37,8 +37,8 @@ void setDisplacement(const LoadedScene& loaded, ChartTruth& truth) {
 // Per body and node: whether a dead load acts on it.
 std::vector<std::vector<char>> loadedNodes(const LoadedScene& loaded) {
   std::vector<std::vector<char>> out;
-  for (std::size_t b = 0; b < loaded.models.size(); ++b) {
-    out.emplace_back(loaded.models[b]->restNodes.size(), 0);
+  for (std::size_t b = 0; b < loaded.scene.bodies.size(); ++b) {
+    out.emplace_back(loaded.scene.bodies[b].model->restNodes.size(), 0);
     for (const DeadLoad& load : loaded.scene.bodies[b].deadLoads) out.back()[load.node] = 1;
   }
   return out;
@@ -55,9 +55,9 @@ ChartTruth truthOfReferences(const LoadedScene& loaded) {
   ChartTruth truth;
   truth.cost = ChartCost::ofTheCase;
   DynamicsFrame& frame = truth.moments.emplace_back();
-  for (std::size_t b = 0; b < loaded.models.size(); ++b) {
+  for (std::size_t b = 0; b < loaded.scene.bodies.size(); ++b) {
     const Reference& reference = loaded.references[b];
-    const std::size_t nodes = loaded.models[b]->restNodes.size();
+    const std::size_t nodes = loaded.scene.bodies[b].model->restNodes.size();
     std::vector<char>& known = truth.known.emplace_back(nodes, 0);
     std::vector<Eigen::Vector3d>& place = frame.bodies.emplace_back().nodes;
     for (std::size_t i = 0; i < nodes; ++i) {
@@ -82,7 +82,7 @@ ChartTruth truthOfReferences(const LoadedScene& loaded) {
 ChartTruth truthOfRun(const LoadedScene& loaded, const std::vector<RecordedFrame>& moments) {
   ChartTruth truth;
   for (const RecordedFrame& m : moments) truth.moments.push_back(m.frame);
-  for (const auto& model : loaded.models) truth.known.emplace_back(model->restNodes.size(), 1);
+  for (const SceneBody& body : loaded.scene.bodies) truth.known.emplace_back(body.model->restNodes.size(), 1);
   setDisplacement(loaded, truth);
   return truth;
 }
@@ -92,7 +92,7 @@ void measureErrors(const LoadedScene& loaded, const ChartTruth& truth, const std
   const std::vector<std::vector<char>> underLoad = loadedNodes(loaded);
   Deviation all, end, atLoads, elsewhere;
   for (std::size_t k = 0; k < moments.size(); ++k) {
-    for (std::size_t b = 0; b < loaded.models.size(); ++b) {
+    for (std::size_t b = 0; b < loaded.scene.bodies.size(); ++b) {
       for (std::size_t i = 0; i < truth.known[b].size(); ++i) {
         if (!truth.known[b][i]) continue;
         const double squared =

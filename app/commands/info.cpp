@@ -56,17 +56,18 @@ std::vector<Result> modelResults(const SoftBodyModel& model) {
   return results;
 }
 
-std::size_t linkCount(const SceneBody& body, const SoftBodyModel& model) {
-  return body.links == LinkModel::identified ? model.identified->links.size() : model.links.size();
+std::size_t linkCount(const SceneBody& body) {
+  return body.links == LinkModel::identified ? body.model->identified->links.size() : body.model->links.size();
 }
 
-void addBody(const SceneBody& body, const SoftBodyModel& model, std::vector<Result>& results) {
+void addBody(const SceneBody& body, std::vector<Result>& results) {
+  const SoftBodyModel& model = *body.model;
   const auto add = [&](const char* name, const std::string& value, const char* unit) {
     results.push_back({fmt::format("body.{}.{}", body.name, name), value, unit});
   };
   const double volume = enclosedVolume({model.restNodes, model.triangles});
   add("spheres", text(model.spheres.size()), "");
-  add("links", text(linkCount(body, model)), "");
+  add("links", text(linkCount(body)), "");
   add("nodes", text(model.restNodes.size()), "");
   add("triangles", text(model.triangles.size()), "");
   add("mass", text(volume * body.tissue.density), "kg");
@@ -95,11 +96,10 @@ std::vector<Result> sceneResults(const LoadedScene& loaded) {
   const Scene& scene = loaded.scene;
   const World world = makeWorld(loaded);
   std::size_t spheres = 0, links = 0, nodes = 0;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const SoftBodyModel& model = *loaded.models[b];
-    spheres += model.spheres.size();
-    links += linkCount(scene.bodies[b], model);
-    nodes += model.restNodes.size();
+  for (const SceneBody& body : scene.bodies) {
+    spheres += body.model->spheres.size();
+    links += linkCount(body);
+    nodes += body.model->restNodes.size();
   }
   std::vector<Result> results = {{"kind", "scene", ""},
                                  {"name", scene.name, ""},
@@ -109,7 +109,7 @@ std::vector<Result> sceneResults(const LoadedScene& loaded) {
                                  {"substeps_per_frame", fmt::format("{}", world.substepsPerFrame()), ""},
                                  {"substep", text(world.substep()), "s"},
                                  {"stable_substep", text(world.stableSubstep()), "s"},
-                                 {"gravity", text(scene.gravity), "m/s2"},
+                                 {"gravity", text(scene.dynamics.gravity), "m/s2"},
                                  {"picture", fmt::format("{}x{}", scene.width, scene.height), ""},
                                  {"fps", text(scene.fps), "Hz"},
                                  {"bodies", text(scene.bodies.size()), ""},
@@ -118,9 +118,9 @@ std::vector<Result> sceneResults(const LoadedScene& loaded) {
                                  {"spheres", text(spheres), ""},
                                  {"links", text(links), ""},
                                  {"nodes", text(nodes), ""}};
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    addBody(scene.bodies[b], *loaded.models[b], results);
-    addFrequencies(world.bodies()[b], results);
+  for (const SceneBody& body : scene.bodies) {
+    addBody(body, results);
+    addFrequencies(body, results);
   }
   for (const SceneTool& tool : scene.tools)
     results.push_back({fmt::format("tool.{}.radius", tool.name), text(tool.settings.radius), "m"});

@@ -34,11 +34,9 @@ CacheLayout cacheLayout(const LoadedScene& loaded) {
   CacheLayout layout;
   layout.motionHash = runHash(loaded, false);
   layout.fps = loaded.scene.fps;
-  for (std::size_t b = 0; b < loaded.models.size(); ++b) {
-    const SoftBodyModel& model = *loaded.models[b];
-    layout.bodies.push_back({loaded.scene.bodies[b].name, static_cast<int>(model.spheres.size()),
-                             static_cast<int>(model.restNodes.size())});
-  }
+  for (const SceneBody& body : loaded.scene.bodies)
+    layout.bodies.push_back(
+        {body.name, static_cast<int>(body.model->spheres.size()), static_cast<int>(body.model->restNodes.size())});
   for (const SceneTool& tool : loaded.scene.tools) layout.tools.push_back(tool.name);
   return layout;
 }
@@ -316,7 +314,7 @@ void printWarnings(const Scene& scene, const World& world) {
   for (const BodyOverlap& o : world.startOverlaps())
     fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n", scene.bodies[o.body0].name,
                scene.bodies[o.body1].name, 1e3 * o.depth);
-  if (scene.sleepAfter > 0 && scene.integrator == Integrator::implicit)
+  if (scene.dynamics.sleepAfter > 0 && scene.dynamics.integrator == Integrator::implicit)
     fmt::print(stderr, "warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
 }
 

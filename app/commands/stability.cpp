@@ -25,16 +25,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kMapTrial = "stiffness_1";  // stretched by half and let go
 
-// The scene's first body, with nothing around it that moves it.
-BodyDescription bodyOf(const LoadedScene& loaded) {
-  BodyDescription out = bodyDescription(loaded, 0);
-  out.worldFromModel = Eigen::Isometry3d::Identity();
-  out.driven.clear();
-  out.neighbours.reset();
-  out.deadLoads.clear();
-  return out;
-}
-
 // A trial and, once it is known, how it ended.
 struct PlannedTrial {
   BodyDescription body;
@@ -188,7 +178,7 @@ void writeTables(const fs::path& folder, const std::string& title, const Stabili
 
 int runStability(const StabilityOptions& options) {
   const LoadedScene loaded = loadRun(options.run);
-  const BodyDescription body = bodyOf(loaded);
+  const BodyDescription& body = loaded.scene.bodies[0];
   const std::vector<TortureMethod> methods = methodsOf(options);
   const fs::path folder = options.folder;
   const OutputFolder made(options.folder);

@@ -53,8 +53,10 @@ std::string readUniqueName(const XmlElement& element, std::set<std::string>& tak
 
 void readClock(const XmlElement& clock, Scene& scene) {
   scene.duration = readNumber(clock, "duration", scene.duration, {0, 86400, true, false});
-  scene.settle = readNumber(clock, "settle", scene.settle, {0, 60});
   scene.dynamicsRate = readNumber(clock, "dynamics", scene.dynamicsRate, {20, 1200});
+  const double settle = readNumber(clock, "settle", 0, {0, 60});  // s
+  scene.dynamics.frameDuration = 1 / scene.dynamicsRate;
+  scene.dynamics.settleFrames = static_cast<int>(std::lround(settle * scene.dynamicsRate));
   scene.servoRate = readNumber(clock, "servo", scene.servoRate, {20, 20000});
   const double ratio = scene.servoRate / scene.dynamicsRate;
   if (ratio < 1 || std::abs(ratio - std::round(ratio)) > 1e-9 * ratio) {
@@ -63,16 +65,16 @@ void readClock(const XmlElement& clock, Scene& scene) {
   }
 }
 
-void readDynamics(const XmlElement& dynamics, Scene& scene) {
-  scene.integrator = readEnum(dynamics, "integrator", scene.integrator);
-  scene.order = 1 + readChoice(dynamics, "order", {"1", "2"}, 0);
-  if (scene.order == 2 && scene.integrator != Integrator::implicit)
+void readDynamics(const XmlElement& dynamics, WorldSettings& out) {
+  out.integrator = readEnum(dynamics, "integrator", out.integrator);
+  out.order = 1 + readChoice(dynamics, "order", {"1", "2"}, 0);
+  if (out.order == 2 && out.integrator != Integrator::implicit)
     refuse(dynamics, "order", "expected 1 with integrator=\"explicit\": order 2 needs integrator=\"implicit\"");
-  scene.gravity = readVector(dynamics, "gravity", scene.gravity);
-  scene.ambientDrag = readNumber(dynamics, "ambient_drag", scene.ambientDrag, notNegative);
-  scene.sleepAfter = readNumber(dynamics, "sleep_after", scene.sleepAfter, notNegative);
-  scene.substeps = readInteger(dynamics, "substeps", scene.substeps, {0, 100000});
-  scene.contact = readEnum(dynamics, "contact", scene.contact);
+  out.gravity = readVector(dynamics, "gravity", out.gravity);
+  out.ambientDrag = readNumber(dynamics, "ambient_drag", out.ambientDrag, notNegative);
+  out.sleepAfter = readNumber(dynamics, "sleep_after", out.sleepAfter, notNegative);
+  out.substeps = readInteger(dynamics, "substeps", out.substeps, {0, 100000});
+  out.contact = readEnum(dynamics, "contact", out.contact);
 }
 
 struct NamedTissue {
@@ -430,7 +432,7 @@ Scene readScene(const std::string& path, const std::vector<SceneOverride>& overr
   scene.path = path;
   scene.name = readName(root);
   readClock(onlyChild(root, "clock"), scene);
-  readDynamics(onlyChild(root, "dynamics"), scene);
+  readDynamics(onlyChild(root, "dynamics"), scene.dynamics);
   readBodies(root, scene);
   readStatics(root, scene);
   readTools(root, scene);
