@@ -213,7 +213,7 @@ RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) 
   options.run.frameTimesPath = fileOf(scene, a.run.frameTimes);
   for (SurfaceRequest& surface : options.run.surfaces) surface.path = fileOf(scene, surface.path);
   for (auto& [tool, path] : options.run.records) path = fileOf(scene, path);
-  options.cachePath = fileOf(scene, a.cache);
+  options.cacheToRead = fileOf(scene, a.cache);
   for (const std::string& output : a.outputs) options.outputs.push_back(fileOf(scene, output));
   if (options.outputs.empty()) options.outputs = {fileOf(scene, a.still.empty() ? "{scene}.mp4" : "{scene}.png")};
   readView(a, options.view);
@@ -342,7 +342,7 @@ Verb addReplay(CLI::App& app) {
   return {c, [a] {
             RunOptions options = runOptions(a->run);
             options.untilRest = a->untilRest;
-            options.cachePath = a->cache;
+            options.cacheToWrite = a->cache;
             options.realtime = a->realtime;
             if (a->realtime && !a->cache.empty())
               usageError("--cache", a->cache, "no --realtime: what pictures show is not recorded against the clock");

@@ -94,11 +94,11 @@ std::vector<int> cachedNumbers(const CacheReader& cache, const Wanted& wanted, c
   for (const double time : wanted.times) {
     const double number = time * cache.layout().fps;
     if (std::abs(number - std::round(number)) > 1e-6)
-      throw inputError(options.cachePath, 0,
+      throw inputError(options.cacheToRead, 0,
                        fmt::format("holds pictures every 1/{:g} s, none at {:g} s", cache.layout().fps, time));
     numbers.push_back(static_cast<int>(std::lround(number)));
     if (numbers.back() >= cache.pictures())
-      throw inputError(options.cachePath, 0,
+      throw inputError(options.cacheToRead, 0,
                        fmt::format("holds pictures 0 to {}, not picture {}", cache.pictures() - 1, numbers.back()));
   }
   return numbers;
@@ -109,18 +109,18 @@ void requireOwnCache(const CacheReader& cache, const LoadedScene& loaded, const 
   const CacheLayout& found = cache.layout();
   if (found.motionHash != expected.motionHash || found.bodies != expected.bodies || found.tools != expected.tools)
     throw inputError(
-        options.cachePath, 0,
+        options.cacheToRead, 0,
         fmt::format("is of another scene or stale: {}, a file that it names, an override or the program has "
                     "changed; write it anew with medulla replay --cache",
                     loaded.scene.path));
   if (found.fps != expected.fps)
-    throw inputError(options.cachePath, 0,
+    throw inputError(options.cacheToRead, 0,
                      fmt::format("holds {:g} pictures per second, expected {:g}", found.fps, expected.fps));
 }
 
 void renderCache(const LoadedScene& loaded, const RenderOptions& options, const Wanted& wanted, Timings& timings) {
   StageTimes& times = timings.stages;
-  CacheReader cache(options.cachePath);
+  CacheReader cache(options.cacheToRead);
   requireOwnCache(cache, loaded, options);
   const std::vector<int> numbers = cachedNumbers(cache, wanted, options);
   PictureState state;
@@ -179,9 +179,9 @@ int runRender(const RenderOptions& options) {
   applyOverrides(options, loaded.scene);
   const Wanted wanted = wantedOf(options, loaded.scene);
   requireDistinctOutputs(loaded, options.run, options.outputs);
-  requireDistinctFiles(options.outputs, {options.cachePath});
+  requireDistinctFiles(options.outputs, {options.cacheToRead});
   if (options.still) loaded.scene.duration = *options.still;  // nothing later is asked for
-  if (options.cachePath.empty())
+  if (options.cacheToRead.empty())
     renderRun(loaded, options, wanted, timings);
   else
     renderCache(loaded, options, wanted, timings);

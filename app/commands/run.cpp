@@ -134,7 +134,7 @@ class CacheRecorder {
  public:
   CacheRecorder(const LoadedScene& loaded, const RunOptions& options)
       : pictures_(pictureTimes(loaded.scene, 0, pictureCount(loaded.scene)), 0) {
-    if (!options.cachePath.empty()) file_.emplace(options.cachePath, cacheLayout(loaded));
+    if (!options.cacheToWrite.empty()) file_.emplace(options.cacheToWrite, cacheLayout(loaded));
   }
   void afterFrame(const Simulation& simulation) {
     if (!file_) return;
@@ -276,7 +276,7 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
                             const std::vector<std::string>& pictures) {
   std::vector<std::string> outputs = pictures;
   outputs.push_back(options.logPath);
-  outputs.push_back(options.cachePath);
+  outputs.push_back(options.cacheToWrite);
   outputs.push_back(options.frameTimesPath);
   for (const auto& [tool, path] : options.records) outputs.push_back(path);
   for (const SurfaceRequest& request : options.surfaces) outputs.push_back(request.path);

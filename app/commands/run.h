@@ -30,7 +30,7 @@ struct RunOptions {
   bool logEveryTick = false;
   std::string frameTimesPath;  // what each dynamics frame took, apart from the log, which is the same in every run
   std::vector<SurfaceRequest> surfaces;
-  std::string cachePath;  // what every picture shows, for `render --cache`; empty: none
+  std::string cacheToWrite;  // what every picture shows, for `render --cache`; empty: none
   EmbreeSettings embree;
   bool realtime = false;   // replay only: the servo runs against the clock
   bool untilRest = false;  // ends when nothing moves any more; the scene's duration is the longest it may take
