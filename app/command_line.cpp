@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -120,6 +121,26 @@ void usageError(const std::string& option, const std::string& value, const std::
   throw CLI::ValidationError(option + " " + value, "expected " + expected);
 }
 
+template <typename T>
+static CLI::Validator within(double low, double high, const std::string& what) {
+  const std::string expected =
+      what + (std::isinf(high) ? fmt::format(" of {:g} or more", low) : fmt::format(" from {:g} to {:g}", low, high));
+  return CLI::Validator(
+      [=](const std::string& word) {
+        const std::optional<T> value = parseNumber<T>(word);
+        return value && low <= *value && *value <= high ? "" : fmt::format("{}: expected {}", word, expected);
+      },
+      std::isinf(high) ? "" : fmt::format("in [{:g} - {:g}]", low, high));
+}
+
+CLI::Validator numberFrom(double low, double high, const std::string& what) {
+  return within<double>(low, high, what);
+}
+
+CLI::Validator wholeNumberFrom(int low, int high) {
+  return within<int>(low, high, "a whole number");
+}
+
 void addSceneOptions(CLI::App& command, RunArguments& a) {
   command.add_option("SCENE", a.scene, "scene file (XML)")->required();
   addOverrides(command, a);
@@ -181,14 +202,8 @@ void readPictures(const RenderArguments& a, RenderOptions& options) {
     options.frames = splitPair(a.frames, ':');
     if (!options.frames) usageError("--frames", a.frames, "A:B, whole numbers, B excluded");
   }
-  if (!a.fps.empty()) {
-    options.fps = parseNumber<double>(a.fps);
-    if (!options.fps || *options.fps < 1 || *options.fps > 240) usageError("--fps", a.fps, "a number from 1 to 240");
-  }
-  if (!a.still.empty()) {
-    options.still = parseNumber<double>(a.still);
-    if (!options.still || *options.still < 0) usageError("--still", a.still, "a time in seconds, 0 or more");
-  }
+  if (!a.fps.empty()) options.fps = parseNumber<double>(a.fps);
+  if (!a.still.empty()) options.still = parseNumber<double>(a.still);
 }
 
 void readView(const RenderArguments& a, ViewOptions& view) {
@@ -292,9 +307,14 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
        "draft: no shadows, jagged edges; standard; best: four times the pixels, averaged [standard; of a still "
        "best]")
       ->check(CLI::IsMember({"draft", "standard", "best"}));
-  c->add_option("--fps", a.fps, "pictures per second, 1 to 240 (default: the scene's)");
+  c->add_option("--fps", a.fps, "pictures per second, 1 to 240 (default: the scene's)")
+      ->check(numberFrom(1, 240))
+      ->type_name("HZ");
   CLI::Option* frames = c->add_option("--frames", a.frames, "only pictures A to B-1, counted from 0")->type_name("A:B");
-  c->add_option("--still", a.still, "one picture at time T (s) into FILE.png")->type_name("T")->excludes(frames);
+  c->add_option("--still", a.still, "one picture at time T (s) into FILE.png")
+      ->check(numberFrom(0, kEndless, "a time in seconds"))
+      ->type_name("T")
+      ->excludes(frames);
   c->add_option("--cache", a.cache, "draw the states that replay --cache wrote instead of simulating")
       ->type_name("FILE");
   c->add_option("--context", a.context, "how to draw off screen")

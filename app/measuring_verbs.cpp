@@ -12,38 +12,29 @@ namespace medulla {
 
 namespace {
 
-struct CompareArguments {
-  CompareOptions options;
-  std::string tolerance = "0";
-};
-
-CompareOptions compareOptions(const CompareArguments& a) {
-  CompareOptions options = a.options;
-  const auto tolerance = parseNumber<double>(a.tolerance);
-  if (!tolerance || *tolerance < 0) usageError("--tolerance", a.tolerance, "a number of 0 or more");
-  options.tolerance = *tolerance;
-  return options;
-}
-
 struct ChartArguments {
   RunArguments run;
   ChartOptions options;
   std::vector<std::string> steps = {"0.1", "0.2", "0.5", "1", "2", "5", "10", "20"};
 };
 
-std::vector<double> numbersOf(const std::string& option, const std::vector<std::string>& words, double low, double high,
-                              double unit, const std::string& expected) {
-  std::vector<double> out;
-  for (const std::string& word : words) {
-    const auto value = parseNumber<double>(word);
-    if (!value || *value < low || *value > high) usageError(option, word, expected);
-    out.push_back(unit * *value);
-  }
-  return out;
+CLI::Validator stepFrom(const std::string& what) {
+  return numberFrom(1e-3, 50, what);
 }
 
-std::vector<double> stepsOf(const std::string& option, const std::vector<std::string>& words) {
-  return numbersOf(option, words, 1e-3, 50, 1e-3, "milliseconds from 0.001 to 50");
+CLI::Validator stepOrAuto() {
+  const auto check = [step = stepFrom("auto, or milliseconds")](std::string& word) {
+    return word == "auto" ? std::string() : step(word);
+  };
+  return CLI::Validator(check, "");
+}
+
+// In units of `unit`; options have checked them.
+std::vector<double> numbersOf(const std::vector<std::string>& words, double unit) {
+  std::vector<double> out;
+  out.reserve(words.size());
+  for (const std::string& word : words) out.push_back(unit * parseNumber<double>(word).value());
+  return out;
 }
 
 ChartOptions chartOptions(const ChartArguments& a) {
@@ -51,7 +42,7 @@ ChartOptions chartOptions(const ChartArguments& a) {
   options.run = runOptions(a.run);
   std::vector<std::string> given = a.steps;
   const bool chosen = std::erase(given, "auto") > 0;
-  options.steps = numbersOf("--steps", given, 1e-3, 50, 1e-3, "milliseconds from 0.001 to 50, or auto");
+  options.steps = numbersOf(given, 1e-3);
   if (chosen) options.steps.push_back(0);
   return options;
 }
@@ -66,9 +57,9 @@ struct StabilityArguments {
 StabilityOptions stabilityOptions(const StabilityArguments& a) {
   StabilityOptions options = a.options;
   options.run = runOptions(a.run);
-  options.steps = stepsOf("--steps", a.steps);
-  options.trialSteps = stepsOf("--trial-steps", a.trialSteps);
-  options.young = numbersOf("--young", a.young, 1e-3, 1e12, 1, "Pa from 0.001 to 1e12");
+  options.steps = numbersOf(a.steps, 1e-3);
+  options.trialSteps = numbersOf(a.trialSteps, 1e-3);
+  options.young = numbersOf(a.young, 1);
   return options;
 }
 
@@ -90,6 +81,7 @@ Verb addChart(CLI::App& app) {
        "--steps", a.steps,
        "substeps to run with, ms; the nearest whole shares of a dynamics frame are taken; auto: as long as each run's "
        "stability estimate allows")
+      ->check(stepOrAuto())
       ->type_name("MS,MS,...|auto")
       ->delimiter(',')
       ->allow_extra_args(false)
@@ -118,8 +110,14 @@ Verb addStability(CLI::App& app) {
                 "folder for map.csv, trials.csv, stability.gnuplot and stability.svg; made where missing")
       ->type_name("DIR")
       ->required();
-  const auto addList = [&](const char* name, std::vector<std::string>& values, const char* help, const char* type) {
-    c->add_option(name, values, help)->type_name(type)->delimiter(',')->allow_extra_args(false)->capture_default_str();
+  const auto addList = [&](const char* name, std::vector<std::string>& values, const CLI::Validator& check,
+                           const char* help, const char* type) {
+    c->add_option(name, values, help)
+        ->check(check)
+        ->type_name(type)
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->capture_default_str();
   };
   for (const TortureMethod& method : tortureMethods()) a.options.methods.push_back(method.name);
   c->add_option("--methods", a.options.methods, "integrators, a panel each")
@@ -127,12 +125,12 @@ Verb addStability(CLI::App& app) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
-  addList("--steps", a.steps, "steps of the map, ms", "MS,MS,...");
-  addList("--young", a.young, "stiffnesses of the map, Pa", "PA,PA,...");
-  addList("--trial-steps", a.trialSteps, "steps of the trials, ms", "MS,MS,...");
+  addList("--steps", a.steps, stepFrom("milliseconds"), "steps of the map, ms", "MS,MS,...");
+  addList("--young", a.young, numberFrom(1e-3, 1e12, "Pa"), "stiffnesses of the map, Pa", "PA,PA,...");
+  addList("--trial-steps", a.trialSteps, stepFrom("milliseconds"), "steps of the trials, ms", "MS,MS,...");
   a.options.threads = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 64U));
   c->add_option("--threads", a.options.threads, "trials that run side by side; the results are the same")
-      ->check(CLI::Range(1, 64))
+      ->check(wholeNumberFrom(1, 64))
       ->capture_default_str();
   return {c, [arguments] { return runStability(stabilityOptions(*arguments)); }};
 }
@@ -158,17 +156,18 @@ Verb addGolden(CLI::App& app) {
 }
 
 Verb addCompare(CLI::App& app) {
-  const auto arguments = std::make_shared<CompareArguments>();
-  CompareArguments& a = *arguments;
+  const auto options = std::make_shared<CompareOptions>();
+  CompareOptions& o = *options;
   CLI::App* c =
       app.add_subcommand("compare", "say where two logs or two state caches differ first; exit code 3 where they do");
-  c->add_option("A", a.options.a, "log (CSV) or state cache of a run")->required();
-  c->add_option("B", a.options.b, "another")->required();
-  c->add_option("--tolerance", a.tolerance,
+  c->add_option("A", o.a, "log (CSV) or state cache of a run")->required();
+  c->add_option("B", o.b, "another")->required();
+  c->add_option("--tolerance", o.tolerance,
                 "differences that do not count, as a share of the column's largest value; 0: every field is the same "
                 "text")
+      ->check(numberFrom(0, kEndless))
       ->capture_default_str();
-  return {c, [arguments] { return runCompare(compareOptions(*arguments)); }};
+  return {c, [options] { return runCompare(*options); }};
 }
 
 Verb addPlot(CLI::App& app) {

@@ -1,12 +1,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 
 #include "app/commands/commands.h"
 #include "app/files/mesh_file.h"
-#include "app/files/number_text.h"
 #include "app/verbs.h"
 
 // The verbs that make models.
@@ -20,18 +18,6 @@ struct BuildArguments {
   std::vector<const CLI::Option*> ofCover;  // which the skeleton follows none of
 };
 
-// CLI::Range lets NaN pass.
-CLI::Validator numberFrom(double low, double high) {
-  const std::string expected = fmt::format("a number from {} to {}", low, high);
-  return CLI::Validator(
-      [=](const std::string& word) {
-        const std::optional<double> value = parseNumber<double>(word);
-        return value && low <= *value && *value <= high ? std::string()
-                                                        : fmt::format("{}: expected {}", word, expected);
-      },
-      fmt::format("FLOAT in [{} - {}]", low, high));
-}
-
 BuildOptions buildOptions(const BuildArguments& a) {
   BuildOptions options = a.options;
   options.settings.method = a.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
@@ -43,8 +29,6 @@ BuildOptions buildOptions(const BuildArguments& a) {
   if (!options.fine.empty() && options.fine.size() != options.meshes.size())
     usageError("--fine", options.fine.back(),
                fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
-  if (!std::isfinite(options.identification.poisson))
-    usageError("--poisson", fmt::format("{}", options.identification.poisson), "a number of 0 or more, less than 0.5");
   const auto form = std::find(kLinkForms.begin(), kLinkForms.end(), a.linkForm);
   options.identification.links = static_cast<LinkForm>(form - kLinkForms.begin());
   if (options.identify && options.meshes.size() > 1)
@@ -61,7 +45,7 @@ void addCoverOptions(CLI::App& c, BuildArguments& a) {
            "--spheres", a.options.settings.spheres,
            "number of filling spheres; of several meshes together: shared out so that the largest gap, in metres, "
            "is about the same for all")
-          ->check(CLI::Range(1, spheresMax))
+          ->check(wholeNumberFrom(1, spheresMax))
           ->capture_default_str();
   CLI::Option* gap =
       c.add_option(
@@ -94,6 +78,7 @@ void addIdentification(CLI::App& c, BuildArguments& a) {
       ->allow_extra_args(false)
       ->needs(identify);
   c.add_option("--poisson", a.options.identification.poisson, "Poisson's ratio of the tissue, 0 to less than 0.5")
+      ->check(numberFrom(0, 0.5))
       ->needs(identify)
       ->capture_default_str();
   c.add_option("--link-form", a.linkForm,
@@ -130,7 +115,7 @@ Verb addBuild(CLI::App& app) {
       ->check(numberFrom(0, 0.4))
       ->capture_default_str();
   c->add_option("--render-levels", a.options.settings.renderLevels, "subdivisions of the mesh for the drawn surface")
-      ->check(CLI::Range(0, 4))
+      ->check(wholeNumberFrom(0, 4))
       ->capture_default_str();
   c->add_option("--report", a.options.reportPath, "write the quality report as CSV too")->type_name("FILE.csv");
   addIdentification(*c, a);
@@ -146,7 +131,7 @@ Verb addNew(CLI::App& app) {
       ->type_name("DIR")
       ->required();
   c->add_option("--spheres", o.build.settings.spheres, "number of filling spheres")
-      ->check(CLI::Range(1, spheresMax))
+      ->check(wholeNumberFrom(1, spheresMax))
       ->capture_default_str();
   c->add_option("--unit", o.build.unit, "unit of the mesh file")
       ->check(CLI::IsMember(lengthUnits()))

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,11 @@ struct Verb {
 };
 
 [[noreturn]] void usageError(const std::string& option, const std::string& value, const std::string& expected);
+
+inline constexpr double kEndless = std::numeric_limits<double>::infinity();
+// Checks an option's words, each of them. CLI::Range lets NaN pass. `what`: how errors begin to say what is expected.
+CLI::Validator numberFrom(double low, double high, const std::string& what = "a number");
+CLI::Validator wholeNumberFrom(int low, int high);
 
 // Options as typed; turned into RunOptions after parsing.
 struct RunArguments {

@@ -270,9 +270,9 @@ TEST_F(ChartCommand, BadInputIsRefusedInOneLineAndLeavesNoFolder) {
     EXPECT_NE(complaints(r)[0].find(words), std::string::npos) << r.err;
     EXPECT_FALSE(std::filesystem::exists(folder / "out"));
   };
-  refused(chart({"--steps", "nan"}), 2, "--steps nan");
-  refused(chart({"--steps", "0"}), 2, "--steps 0");
-  refused(chart({"--steps", "60"}), 2, "--steps 60");
+  refused(chart({"--steps", "nan"}), 2, "--steps: nan: expected auto, or milliseconds from 0.001 to 50");
+  refused(chart({"--steps", "0"}), 2, "--steps: 0: expected");
+  refused(chart({"--steps", "60"}), 2, "--steps: 60: expected");
   refused(chart({"--methods", "full,peel"}), 2, "peel");
   refused(chart({"--models", folder / "none.xml"}), 1, "none.xml does not exist");
   refused(chart({"--models", std::string(MEDULLA_SOURCE_DIR) + "/assets/stomach/stomach.model.xml"}), 1,
