@@ -1,12 +1,9 @@
 #include "app/picture_outputs.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <fstream>
 
@@ -58,20 +55,18 @@ PngFolder::PngFolder(const std::string& path, const Slice& slice)
   std::error_code error;
   fs::create_directory(collecting_, error);
   if (error) throw std::runtime_error(fmt::format("{}: cannot be made: {}", collecting_.string(), error.message()));
-  lock();
+  lock_.emplace(collecting_.string(), collecting_.string(), "another run is drawing these pictures");
   try {
     takeOver();
   } catch (...) {
     fs::remove(collecting_, error);  // if it is empty
-    close(lock_);
     throw;
   }
 }
 
 // Noticed before the first picture is drawn, and not when half of them have moved in.
 void PngFolder::requireReplaceable() const {
-  if (access(folder_.c_str(), W_OK | X_OK) != 0)
-    throw std::runtime_error(fmt::format("{}: cannot be written: {}", folder_.string(), std::strerror(errno)));
+  if (access(folder_.c_str(), W_OK | X_OK) != 0) throw unwritable(folder_.string());
   for (const auto& entry : fs::directory_iterator(folder_)) {
     const int number = numberOf(entry.path());
     const bool ours = slice_.first <= number && number < slice_.last;
@@ -79,16 +74,6 @@ void PngFolder::requireReplaceable() const {
       throw std::runtime_error(
           fmt::format("{}: is a folder, expected the name of a file to write", entry.path().string()));
   }
-}
-
-void PngFolder::lock() {
-  lock_ = open(collecting_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (lock_ >= 0 && flock(lock_, LOCK_EX | LOCK_NB) == 0) return;
-  const int error = errno;
-  if (lock_ >= 0) close(lock_);
-  throw std::runtime_error(
-      fmt::format("{}: {}", collecting_.string(),
-                  error == EWOULDBLOCK ? "another run is drawing these pictures" : std::strerror(error)));
 }
 
 void PngFolder::takeOver() const {
@@ -109,7 +94,6 @@ void PngFolder::takeOver() const {
 PngFolder::~PngFolder() {
   std::error_code ignored;
   if (!keep_) fs::remove_all(collecting_, ignored);
-  close(lock_);
 }
 
 bool PngFolder::has(int number) const {
@@ -146,7 +130,7 @@ PictureOutputs::PictureOutputs(const std::vector<std::string>& paths, const Sett
     if (settings.still) {
       if (extension != ".png") throw std::runtime_error(path + ": expected FILE.png for a still");
       makeParent(path);
-      const OutputFile writableAtAll(path);
+      requireWritable({path});
       stills_.push_back(path);
     } else if (isVideoName(path)) {
       makeParent(path);

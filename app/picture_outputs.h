@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,7 +36,6 @@ class PngFolder {
 
  private:
   void requireReplaceable() const;
-  void lock();
   void takeOver() const;
   int removeLater() const;
 
@@ -43,7 +43,7 @@ class PngFolder {
   OutputFolder made_;
   std::filesystem::path folder_, collecting_;
   bool keep_;
-  int lock_ = -1;
+  std::optional<FolderLock> lock_;
 };
 
 // Where pictures go: any number of videos and folders of numbered PNG files; of a still, PNG files. Folders that are

@@ -76,7 +76,7 @@ class SurfaceRecorder {
       if (!(time >= 0 && time <= loaded.scene.duration))
         throw std::runtime_error(
             fmt::format("--surface-at {}: expected a time from 0 to {} s or \"end\"", time, loaded.scene.duration));
-      const OutputFile writableAtAll(request.path);
+      requireWritable({request.path});
       moments_.push_back({time, {}});
       paths_.push_back(request.path);
     }

@@ -1,11 +1,9 @@
 #include "app/files/output_file.h"
 
-#include <stdexcept>
-
 #include <fcntl.h>
-#include <unistd.h>
-
 #include <fmt/core.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -15,8 +13,28 @@
 
 namespace medulla {
 
-static std::runtime_error unwritable(const std::string& path) {
+std::runtime_error unwritable(const std::string& path) {
   return inputError(path, 0, std::string("cannot be written: ") + std::strerror(errno));
+}
+
+void writeAll(int descriptor, std::string_view text, const std::string& path) {
+  while (!text.empty()) {
+    const ssize_t count = ::write(descriptor, text.data(), text.size());
+    if (count < 0 && errno != EINTR) throw unwritable(path);
+    if (count > 0) text.remove_prefix(static_cast<std::size_t>(count));
+  }
+}
+
+FolderLock::FolderLock(const std::string& folder, const std::string& name, const std::string& taken)
+    : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (descriptor_ >= 0 && ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
+  const int error = errno;
+  if (descriptor_ >= 0) ::close(descriptor_);
+  throw inputError(name, 0, error == EWOULDBLOCK ? taken : std::string("cannot be locked: ") + std::strerror(error));
+}
+
+FolderLock::~FolderLock() {
+  ::close(descriptor_);
 }
 
 OutputFile::OutputFile(const std::string& path)
@@ -29,11 +47,7 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::flush() {
-  for (std::size_t done = 0; done < buffer_.size();) {
-    const ssize_t count = ::write(descriptor_, buffer_.data() + done, buffer_.size() - done);
-    if (count < 0 && errno != EINTR) throw unwritable(path_);
-    if (count > 0) done += static_cast<std::size_t>(count);
-  }
+  writeAll(descriptor_, buffer_, path_);
   buffer_.clear();
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "render/partial_file.h"
@@ -38,6 +40,25 @@ void writeText(const std::string& path, const std::string& text);
 // Before work whose results they are to take: throws what OutputFile throws for the first that cannot be written. Empty
 // names are skipped.
 void requireWritable(const std::vector<std::string>& paths);
+
+// Of what the system has just refused to write.
+std::runtime_error unwritable(const std::string& path);
+
+// All of it, where the system takes less at a time. Throws unwritable().
+void writeAll(int descriptor, std::string_view text, const std::string& path);
+
+// Keeps a folder from others who ask, until it is destroyed or the process ends. Throws std::runtime_error
+// "NAME: TAKEN" where somebody has it.
+class FolderLock {
+ public:
+  FolderLock(const std::string& folder, const std::string& name, const std::string& taken);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int descriptor_;
+};
 
 // A folder for outputs, made where it is missing, with those above it. What was made here and is empty at the end,
 // since what was to fill it failed, goes again. Throws std::runtime_error with path and reason where the system

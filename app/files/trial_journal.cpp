@@ -2,17 +2,12 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <limits>
 
 #include "app/files/csv_rows.h"
-#include "app/files/input_error.h"
-#include "app/files/output_file.h"
 #include "app/files/text_file.h"
 
 namespace medulla {
@@ -40,27 +35,16 @@ StabilityPoint pointOf(const CsvRows& row) {
 }  // namespace
 
 TrialJournal::TrialJournal(std::string path, std::uint64_t run)
-    : path_(std::move(path)), head_(fmt::format("# medulla stability {:016x}\n", run)) {
-  lock();
+    : path_(std::move(path)),
+      head_(fmt::format("# medulla stability {:016x}\n", run)),
+      lock_(std::filesystem::absolute(path_).parent_path().string(), path_, "another run is filling it") {
   if (std::filesystem::exists(path_)) read();
   writeAnew();  // without a row's beginning, and without trials of another run
 }
 
-// Of the folder: the file itself is replaced.
-void TrialJournal::lock() {
-  const std::string folder = std::filesystem::absolute(path_).parent_path().string();
-  lock_ = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (lock_ >= 0 && ::flock(lock_, LOCK_EX | LOCK_NB) == 0) return;
-  const bool taken = errno == EWOULDBLOCK;
-  if (lock_ >= 0) ::close(lock_);
-  throw inputError(path_, 0,
-                   taken ? "another run is filling it" : std::string("cannot be locked: ") + std::strerror(errno));
-}
-
 TrialJournal::~TrialJournal() {
   if (known_.empty()) ::unlink(path_.c_str());
-  for (const int descriptor : {descriptor_, lock_})
-    if (descriptor >= 0) ::close(descriptor);
+  if (descriptor_ >= 0) ::close(descriptor_);
 }
 
 void TrialJournal::read() {
@@ -81,17 +65,8 @@ bool TrialJournal::find(StabilityPoint& point) const {
 }
 
 void TrialJournal::add(const StabilityPoint& point) {
-  append(stabilityRow(point));
+  writeAll(descriptor_, stabilityRow(point), path_);
   known_[trialKey(point)] = point;
-}
-
-void TrialJournal::append(const std::string& text) {
-  for (std::size_t done = 0; done < text.size();) {
-    const ssize_t count = ::write(descriptor_, text.data() + done, text.size() - done);
-    if (count < 0 && errno != EINTR)
-      throw inputError(path_, 0, std::string("cannot be written: ") + std::strerror(errno));
-    if (count > 0) done += static_cast<std::size_t>(count);
-  }
 }
 
 void TrialJournal::forget(const std::vector<StabilityPoint>& done) {
@@ -105,7 +80,7 @@ void TrialJournal::writeAnew() {
   writeText(path_, text);
   if (descriptor_ >= 0) ::close(descriptor_);
   descriptor_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
-  if (descriptor_ < 0) throw inputError(path_, 0, std::string("cannot be written: ") + std::strerror(errno));
+  if (descriptor_ < 0) throw unwritable(path_);
 }
 
 }  // namespace medulla

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "app/files/output_file.h"
 #include "app/files/stability_file.h"
 
 namespace medulla {
@@ -29,13 +30,12 @@ class TrialJournal {
   const std::string& path() const { return path_; }
 
  private:
-  void lock();
   void read();
   void writeAnew();
-  void append(const std::string& text);
 
   std::string path_, head_;
-  int lock_ = -1, descriptor_ = -1;
+  FolderLock lock_;  // not of the file, which is replaced
+  int descriptor_ = -1;
   std::map<std::string, StabilityPoint> known_;
 };
 
