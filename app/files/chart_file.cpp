@@ -13,6 +13,14 @@ bool atRim(const ChartPoint& p) {
   return p.failedAt || !(p.errorMax < kChartRim);
 }
 
+const char* costLabel(ChartCost cost) {
+  return cost == ChartCost::ofTheCase ? "CPU seconds of the whole load case" : "CPU seconds per simulated second";
+}
+
+const char* costUnit(ChartCost cost) {
+  return cost == ChartCost::ofTheCase ? "s" : "s/s";
+}
+
 std::string logTicks(double low, double high) {
   std::string list;
   for (int exponent = static_cast<int>(std::floor(std::log10(low))); std::pow(10, exponent) <= high; ++exponent)
@@ -36,7 +44,7 @@ void writeChart(const std::string& path, const std::vector<ChartPoint>& points, 
       fmt::format("curve,spheres,step[s],cpu[{}],error_max[%],error_rms[%],end_error_max[%],end_error_rms[%],"
                   "loaded_error_max[%],loaded_error_rms[%],rest_error_max[%],rest_error_rms[%],volume_ratio,nodes,"
                   "failed_at[s],on_front\n",
-                  cost == ChartCost::ofTheCase ? "s" : "s/s"));
+                  costUnit(cost)));
   for (const ChartPoint& p : points) {
     file.write(fmt::format("{},{},{:.6g},{:.4g},", p.curve, p.spheres, p.step, p.cpu));
     if (p.failedAt) {

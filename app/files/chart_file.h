@@ -25,6 +25,9 @@ struct ChartPoint {
 // What a run costs: a scene goes on, a load case with a reference is done at its end.
 enum class ChartCost { perSimulatedSecond, ofTheCase };
 
+const char* costLabel(ChartCost cost);
+const char* costUnit(ChartCost cost);
+
 // Ticks of a logarithmic axis at 1, 2 and 5: within a decade or two gnuplot would label one or two alone.
 std::string logTicks(double low, double high);
 

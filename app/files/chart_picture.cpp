@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "app/files/chart_labels.h"
+#include "app/files/chart_style.h"
 
 namespace medulla {
 
@@ -24,9 +25,7 @@ struct Curve {
   int row = -1;          // on the rim; -1: nothing of it failed
 };
 
-// Okabe and Ito (2008): told apart by all kinds of eyes; black is another program's in every chart.
 std::vector<Curve> curvesOf(const std::vector<ChartPoint>& points) {
-  constexpr const char* kColours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999933"};
   std::vector<Curve> out;
   std::size_t own = 0;
   int rows = 0;
@@ -34,7 +33,7 @@ std::vector<Curve> curvesOf(const std::vector<ChartPoint>& points) {
     auto curve = std::find_if(out.begin(), out.end(), [&](const Curve& c) { return c.name == p.curve; });
     if (curve == out.end()) {
       const bool other = p.nodes > 0;
-      out.push_back({p.curve, other ? "#000000" : kColours[own % std::size(kColours)], other});
+      out.push_back({p.curve, other ? kBlack : kCurveColours[own % std::size(kCurveColours)], other});
       own += other ? 0 : 1;
       curve = out.end() - 1;
     }
@@ -87,16 +86,13 @@ std::string dataBlock(const std::string& name, const std::vector<ChartPoint>& po
 }
 
 std::string axes(const std::string& title, const Frame& f, ChartCost cost) {
-  std::string out = fmt::format(
-      "set terminal svg size {},{} dynamic noenhanced font 'Helvetica,14' background 'white'\n"
+  std::string out = chartHead(kWidth, kHeight, 14);
+  out += fmt::format(
       "set lmargin at screen {:.6g}\nset rmargin at screen {:.6g}\n"
       "set bmargin at screen {:.6g}\nset tmargin at screen {:.6g}\n",
-      kWidth, kHeight, kLeft / kWidth, kRight / kWidth, kBottom / kHeight, kTop / kHeight);
+      kLeft / kWidth, kRight / kWidth, kBottom / kHeight, kTop / kHeight);
   out +=
       "set logscale xy\n"
-      "set border 3 lc '#555555'\n"
-      "set tics nomirror out\n"
-      "set grid xtics ytics lc '#dddddd' lt 1 lw 1\n"
       "set format '%g'\n"
       "set key outside right top Left reverse samplen 2 spacing 1.3\n";
   // Not as the axis's own: wide numbers would push it out of the picture.
@@ -104,8 +100,7 @@ std::string axes(const std::string& title, const Frame& f, ChartCost cost) {
       "set label 'largest error of a surface node, % of the largest displacement' at screen {:.6g}, screen {:.6g} "
       "rotate by 90 center\n",
       14.0 / kWidth, 0.5 * (kBottom + kTop) / kHeight);
-  out += cost == ChartCost::ofTheCase ? "set xlabel 'CPU seconds of the whole load case'\n"
-                                      : "set xlabel 'CPU seconds per simulated second'\n";
+  out += fmt::format("set xlabel '{}'\n", costLabel(cost));
   out += fmt::format("set xtics ({}) font ',12'\nset ytics ({})\n", logTicks(f.low, f.high),
                      logTicks(f.least, 0.99 * kChartRim));
   out += fmt::format("set ytics add ({0})\n", kChartRim);
@@ -173,8 +168,6 @@ std::string chartScript(const std::string& title, const std::vector<ChartPoint>&
   plot += "$front using 1:2 with lines lw 9 lc '#e8e2c8' title 'Pareto front'";
   for (std::size_t k = 0; k < curves.size(); ++k) {
     const std::string name = fmt::format("c{}", k);
-    std::string legend = curves[k].name;
-    std::replace(legend.begin(), legend.end(), '_', ' ');
     const auto block = [&](const std::string& called, bool failed) {
       return dataBlock(called, bySteps, curves[k], frame,
                        [&](const ChartPoint& p) { return p.curve == curves[k].name && atRim(p) == failed; });
@@ -184,12 +177,12 @@ std::string chartScript(const std::string& title, const std::vector<ChartPoint>&
         ", \\\n  NaN with linespoints lw 2 pt {2} ps 0.7 lc '{1}' title '{3}'"  // in the key even if all failed
         ", \\\n  ${0} using 1:2 with linespoints lw 2 pt {2} ps 0.7 lc '{1}' notitle"
         ", \\\n  ${0}failed using 1:2 with points pt 2 ps 0.8 lw 2 lc '{1}' notitle",
-        name, curves[k].colour, 5 + 2 * (k % 5), legend);
+        name, curves[k].colour, 5 + 2 * (k % 5), spaced(curves[k].name));
   }
   const bool others = std::any_of(curves.begin(), curves.end(), [](const Curve& c) { return c.isOther; });
   out += fmt::format("set label 'numbers: substep, ms{}' at graph 1.02, graph 0 left tc '#888888' font ',11'\n",
                      others ? "; of FEM, nodes" : "");
-  plot += ", \\\n  NaN with points pt 2 ps 0.8 lw 2 lc '#555555' title 'failed, or 100 % wrong'";
+  plot += fmt::format(", \\\n  NaN with points pt 2 ps 0.8 lw 2 lc '{}' title 'failed, or 100 % wrong'", kGrey);
   return out + plot + "\n";
 }
 

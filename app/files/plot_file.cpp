@@ -8,6 +8,7 @@
 #include <iterator>
 #include <vector>
 
+#include "app/files/chart_style.h"
 #include "app/files/input_error.h"
 #include "app/round_number.h"
 
@@ -34,8 +35,7 @@ struct Panel {
   bool logarithmic = false, fromZero = false;
 };
 
-// Okabe and Ito (2008): told apart by all kinds of eyes. The shades stay lighter than any of them.
-constexpr const char* kColours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#555555"};
+// Lighter than any curve.
 constexpr const char *kContactShade = "#dcebf7", *kHeldShade = "#fde3c4";
 
 // ---- What the log holds ----------------------------------------------------------------------------------
@@ -79,7 +79,8 @@ std::vector<Span> spansWhere(const Series& time, const std::function<bool(std::s
 }
 
 Curve line(const std::string& title, std::size_t colour, double width, Series values) {
-  return {title, fmt::format("lines lw {} lc '{}'", width, kColours[colour % std::size(kColours)]), std::move(values)};
+  return {title, fmt::format("lines lw {} lc '{}'", width, kCurveColours[colour % std::size(kCurveColours)]),
+          std::move(values)};
 }
 
 void addToolPanels(const LogTable& log, const Series& time, const std::string& tool, std::vector<Panel>& out) {
@@ -97,15 +98,16 @@ void addToolPanels(const LogTable& log, const Series& time, const std::string& t
   }
   for (std::size_t k = 0; k < time.size(); ++k) depth[k] = contact[k] > 0.5 && held[k] < 0.5 ? distance[k] : 0;
   forces.title = tool + ": force on the hand, N";
-  forces.curves.insert(forces.curves.begin(), {"magnitude", "lines lw 2.6 lc '#000000'", force});
+  forces.curves.insert(forces.curves.begin(), {"magnitude", fmt::format("lines lw 2.6 lc '{}'", kBlack), force});
   forces.contact = spansWhere(time, [&](std::size_t k) { return contact[k] > 0.5; });
   forces.held = spansWhere(time, [&](std::size_t k) { return held[k] > 0.5; });
   places.title = tool + ": device to proxy, mm";
   places.contact = forces.contact;
   places.held = forces.held;
   places.fromZero = true;
-  places.curves.push_back({"penetration", "filledcurves y1=0 fs transparent solid 0.45 noborder lc '#0072b2'", depth});
-  places.curves.push_back({"distance", "lines lw 1.8 lc '#000000'", distance});
+  places.curves.push_back(
+      {"penetration", fmt::format("filledcurves y1=0 fs transparent solid 0.45 noborder lc '{}'", kBlue), depth});
+  places.curves.push_back({"distance", fmt::format("lines lw 1.8 lc '{}'", kBlack), distance});
   out.push_back(std::move(forces));
   out.push_back(std::move(places));
 }
@@ -132,7 +134,7 @@ std::vector<Panel> panelsOf(const LogTable& log, const Series& time) {
   volume.title = "volume, % of rest";
   nodes.title = "surface nodes modelled";
   nodes.fromZero = true;
-  const bool crowd = bodies.size() > std::size(kColours);  // alike then, and named once
+  const bool crowd = bodies.size() > std::size(kCurveColours);  // alike then, and named once
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const std::string name = !crowd ? bodies[b] : b == 0 ? fmt::format("{} bodies", bodies.size()) : "";
     const std::size_t colour = crowd ? 0 : b;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "app/files/chart_style.h"
 #include "app/files/output_file.h"
 
 namespace medulla {
@@ -34,19 +35,17 @@ std::string block(const std::string& name, const std::vector<StabilityPoint>& po
   return out + "EOD\n";
 }
 
-// Okabe and Ito (2008): told apart by all kinds of eyes.
 struct Grade {
-  const char *style, *meaning;
+  const char *points, *colour, *meaning;
 };
-constexpr Grade kGrades[] = {{"points pt 5 lc '#009e73'", "back at rest within 1 %"},
-                             {"points pt 5 lc '#e69f00'", "survived"},
-                             {"points pt 2 lw 2 lc '#d55e00'", "failed"}};
+constexpr Grade kGrades[] = {
+    {"pt 5", kGreen, "back at rest within 1 %"}, {"pt 5", kOrange, "survived"}, {"pt 2 lw 2", kVermilion, "failed"}};
 
 std::string plotOf(const std::string& name, double size) {
   std::string out;
   for (std::size_t k = 0; k < std::size(kGrades); ++k)
-    out += fmt::format("{}${}{} using 1:2 with {} ps {} notitle", k == 0 ? "" : ", \\\n  ", name, k, kGrades[k].style,
-                       size);
+    out += fmt::format("{}${}{} using 1:2 with points {} lc '{}' ps {} notitle", k == 0 ? "" : ", \\\n  ", name, k,
+                       kGrades[k].points, kGrades[k].colour, size);
   return out;
 }
 
@@ -55,17 +54,11 @@ std::string keyLabels() {
   std::string out;
   double x = 0.2;
   for (const Grade& g : kGrades) {
-    std::string style = g.style;
-    style.erase(0, std::string("points ").size());
-    out += fmt::format("set label '{}' at screen {:.2f}, 0.012 left point {} ps 1.1 offset 1,0\n", g.meaning, x, style);
+    out += fmt::format("set label '{}' at screen {:.2f}, 0.012 left point {} lc '{}' ps 1.1 offset 1,0\n", g.meaning, x,
+                       g.points, g.colour);
     x += 0.22;
   }
   return out + "set label 'dashed: explicit limit' at screen 0.72, 0.012 left\n";
-}
-
-std::string spaced(std::string name) {
-  std::replace(name.begin(), name.end(), '_', ' ');
-  return name;
 }
 
 }  // namespace
@@ -89,10 +82,7 @@ std::string stabilityScript(const std::string& title, const std::vector<Stabilit
   const auto rowOf = [&](const StabilityPoint& p) {
     return static_cast<double>(std::find(trials.begin(), trials.end(), p.trial) - trials.begin());
   };
-  std::string out =
-      "set terminal svg size 1100,1000 dynamic noenhanced font 'Helvetica,13' background 'white'\n"
-      "set border 3 lc '#555555'\nset tics nomirror out\nset logscale x\n"
-      "set grid lc '#e4e4e4' lt 1 lw 1\nset xlabel 'step, ms'\nset key off\n";
+  std::string out = chartHead(1100, 1000, 13) + "set logscale x\nset xlabel 'step, ms'\nset key off\n";
   out += "$limit << EOD\n";
   for (const StableStep& s : limit) out += fmt::format("{:.6g} {:.6g}\n", 1e3 * s.step, s.young);
   out += "EOD\n";
@@ -118,7 +108,7 @@ std::string stabilityScript(const std::string& title, const std::vector<Stabilit
         "set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen 0.92\nset bmargin at screen "
         "0.57\nset logscale y\nset autoscale y\nset ytics auto\nset title '{}'\n{}",
         left, left + 0.9 * width, spaced(methods[m]), y);
-    out += fmt::format("plot $limit using 1:2 with lines lw 2 dt 2 lc '#555555' notitle, \\\n  {}\n",
+    out += fmt::format("plot $limit using 1:2 with lines lw 2 dt 2 lc '{}' notitle, \\\n  {}\n", kGrey,
                        plotOf(fmt::format("map{}_", m), 1.1));
   }
   for (std::size_t m = 0; m < methods.size(); ++m) {
