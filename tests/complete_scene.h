@@ -60,6 +60,13 @@ class SceneFile : public testing::Test {
     EXPECT_NE(at, std::string::npos) << from;
     return text.replace(at, from.size(), to);
   }
+  // One edit of the complete scene and the whole complaint that it must bring.
+  struct Mistake {
+    const char *from, *to, *complaint;
+  };
+  void expectComplaints(const std::vector<Mistake>& mistakes) const {
+    for (const Mistake& m : mistakes) EXPECT_EQ(complaint(edited(m.from, m.to)), m.complaint);
+  }
 
   TemporaryFolder temporary;
   const std::string folder = temporary.path();

@@ -187,13 +187,8 @@ TEST_F(SceneFile, AKeyAtZeroReplacesTheCamerasOwnPose) {
   EXPECT_EQ(s.camera[0].position, Eigen::Vector3d(0, 0.1, 0.2));
 }
 
-// One edit of the complete scene and the whole complaint that it must bring.
-struct Mistake {
-  const char *from, *to, *complaint;
-};
-
 TEST_F(SceneFile, MistakesInTheStructureNameTheLineAndWhatWasExpected) {
-  const Mistake mistakes[] = {
+  expectComplaints({
       {"position=\"0.1", "positon=\"0.1", R"(x.xml:10: <body> has no attribute "positon"; did you mean "position"?)"},
       {"<light ", "<lihgt ", R"(x.xml:24: <scene> has no child <lihgt>; did you mean "light"?)"},
       {"<fix spheres=\"4\"", "<body spheres=\"4\"", R"(x.xml:13: <body> has no child <body>; did you mean "load"?)"},
@@ -216,13 +211,12 @@ TEST_F(SceneFile, MistakesInTheStructureNameTheLineAndWhatWasExpected) {
       {"tissue=\"bile_sac\"", "tissue=\"bile_sack\"",
        R"(x.xml:9: <body> tissue="bile_sack": no <tissue> of this name; did you mean "bile_sac"?)"},
       {"model=\"second.model.xml\"", "model=\"\"", R"(x.xml:16: <body> model="": is empty)"},
-  };
-  for (const Mistake& m : mistakes) EXPECT_EQ(complaint(edited(m.from, m.to)), m.complaint);
+  });
 }
 
 // What single precision, or a product of two, would make infinity of.
 TEST_F(SceneFile, NumbersBeyondWhatCanBeDrawnOrSimulatedAreRefused) {
-  const Mistake mistakes[] = {
+  expectComplaints({
       {"6e3", "1e300", R"(x.xml:7: <tissue> young="1e300": expected no number beyond 1e+30)"},
       {"0.1 0.2 0.3", "0.1 0.2 -1e9", R"(x.xml:10: <body> position="0.1 0.2 -1e9": expected no number beyond 1000)"},
       {"amplitude=\"0.1\"", "amplitude=\"1e4\"",
@@ -248,13 +242,12 @@ TEST_F(SceneFile, NumbersBeyondWhatCanBeDrawnOrSimulatedAreRefused) {
        R"(x.xml:24: <light> reference_distance="1e39": expected no number beyond 1000)"},
       {"haze_distance=\"4\"", "haze_distance=\"1e39\"",
        R"(x.xml:24: <light> haze_distance="1e39": expected no number beyond 1000)"},
-  };
-  for (const Mistake& m : mistakes) EXPECT_EQ(complaint(edited(m.from, m.to)), m.complaint);
+  });
   EXPECT_EQ(complaint(edited("0.1 0.2 0.3", "1000 -1000 0")), "");
 }
 
-TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
-  const Mistake mistakes[] = {
+TEST_F(SceneFile, WrongValuesOfTimesDynamicsAndBodiesNameTheLineAndWhatWasExpected) {
+  expectComplaints({
       {"6e3", "6e3Pa", R"(x.xml:7: <tissue> young="6e3Pa": expected 1 number > 0)"},
       {"6e3", "nan", R"(x.xml:7: <tissue> young="nan": expected 1 number > 0)"},
       {"6e3", "inf", R"(x.xml:7: <tissue> young="inf": expected 1 number > 0)"},
@@ -272,6 +265,33 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {"\"springs\"", "\"ropes\"",
        R"(x.xml:11: <body> links="ropes": did you mean "springs"? known: springs, beam, identified)"},
       {"\"skin\"", "\"thin\"", R"(x.xml:11: <body> surface="thin": did you mean "skin"? known: full, skin, contact)"},
+      {"ambient_drag=\"0.3\"", "ambient_drag=\"-1\"",
+       R"(x.xml:5: <dynamics> ambient_drag="-1": expected 1 number >= 0)"},
+      {"sleep_after=\"0.5\"", "sleep_after=\"-1\"", R"(x.xml:5: <dynamics> sleep_after="-1": expected 1 number >= 0)"},
+      {"\"explicit\"", "\"mixed\"",
+       R"(x.xml:5: <dynamics> integrator="mixed": did you mean "implicit"? known: explicit, implicit)"},
+      {"order=\"1\"", "order=\"3\"", R"(x.xml:5: <dynamics> order="3": did you mean "1"? known: 1, 2)"},
+      {"order=\"1\"", "order=\"2\"",
+       R"(x.xml:5: <dynamics> order="2": expected 1 with integrator="explicit": order 2 needs integrator="implicit")"},
+      {"substeps=\"16\"", "substeps=\"1.5\"",
+       R"(x.xml:5: <dynamics> substeps="1.5": expected 1 integer >= 0 and <= 1e+05)"},
+      {"\"swept\"", "\"cones\"",
+       R"(x.xml:5: <dynamics> contact="cones": did you mean "none"? known: none, balls, swept)"},
+      {"friction=\"0.3\"", "friction=\"-0.3\"", R"(x.xml:7: <tissue> friction="-0.3": expected 1 number >= 0)"},
+      {"names=\"second\"", "names=\"secnd\"",
+       R"(x.xml:14: <neighbours> names="secnd": no <body> is named "secnd"; did you mean "second"?)"},
+      {"names=\"second\"", "names=\"second gallbladder\"",
+       R"(x.xml:14: <neighbours> names="second gallbladder": a body is no neighbour of itself)"},
+      {"names=\"second\"", "names=\"\"", R"(x.xml:14: <neighbours> names="": is empty)"},
+      {"servo=\"1000\"", "servo=\"1001\"",
+       R"(x.xml:4: <clock> servo="1001": expected the servo rate to be a multiple of the dynamics rate)"},
+      {"settle=\"2\"", "settle=\"61\"", R"(x.xml:4: <clock> settle="61": expected 1 number >= 0 and <= 60)"},
+      {"dynamics=\"40\"", "dynamics=\"10\"", R"(x.xml:4: <clock> dynamics="10": expected 1 number >= 20 and <= 1200)"},
+  });
+}
+
+TEST_F(SceneFile, WrongValuesOfWhatHoldsAndMovesBodiesLikewise) {
+  expectComplaints({
       {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4\"", R"(x.xml:16: <fix> box="0 1 2 3 4": expected 6 numbers)"},
       {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4 1\"",
        R"(x.xml:16: <fix> box="0 1 2 3 4 1": expected the lower corner first: x0 y0 z0 x1 y1 z1)"},
@@ -301,24 +321,14 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {"sphere=\"2\"", "sphere=\"4\"", R"(x.xml:13: <drive> sphere="4": this sphere is fixed)"},
       {"axis=\"0 1 1\"", "axis=\"0 0 0\"", R"(x.xml:13: <drive> axis="0 0 0": expected a direction)"},
       {"frequency=\"2\"", "frequency=\"0\"", R"(x.xml:13: <drive> frequency="0": expected 1 number > 0)"},
-      {"ambient_drag=\"0.3\"", "ambient_drag=\"-1\"",
-       R"(x.xml:5: <dynamics> ambient_drag="-1": expected 1 number >= 0)"},
-      {"sleep_after=\"0.5\"", "sleep_after=\"-1\"", R"(x.xml:5: <dynamics> sleep_after="-1": expected 1 number >= 0)"},
-      {"\"explicit\"", "\"mixed\"",
-       R"(x.xml:5: <dynamics> integrator="mixed": did you mean "implicit"? known: explicit, implicit)"},
-      {"order=\"1\"", "order=\"3\"", R"(x.xml:5: <dynamics> order="3": did you mean "1"? known: 1, 2)"},
-      {"order=\"1\"", "order=\"2\"",
-       R"(x.xml:5: <dynamics> order="2": expected 1 with integrator="explicit": order 2 needs integrator="implicit")"},
-      {"substeps=\"16\"", "substeps=\"1.5\"",
-       R"(x.xml:5: <dynamics> substeps="1.5": expected 1 integer >= 0 and <= 1e+05)"},
-      {"\"swept\"", "\"cones\"",
-       R"(x.xml:5: <dynamics> contact="cones": did you mean "none"? known: none, balls, swept)"},
-      {"friction=\"0.3\"", "friction=\"-0.3\"", R"(x.xml:7: <tissue> friction="-0.3": expected 1 number >= 0)"},
-      {"names=\"second\"", "names=\"secnd\"",
-       R"(x.xml:14: <neighbours> names="secnd": no <body> is named "secnd"; did you mean "second"?)"},
-      {"names=\"second\"", "names=\"second gallbladder\"",
-       R"(x.xml:14: <neighbours> names="second gallbladder": a body is no neighbour of itself)"},
-      {"names=\"second\"", "names=\"\"", R"(x.xml:14: <neighbours> names="": is empty)"},
+      {"spheres=\"0 1\"", "spheres=\"\"", R"(x.xml:12: <fix> spheres="": expected one or more integers >= 0)"},
+      {"spheres=\"0 1\"", "spheres=\"0 -1\"", R"(x.xml:12: <fix> spheres="0 -1": expected one or more integers >= 0)"},
+      {"spheres=\"4\"", "spheres=\"1\"", R"(x.xml:13: <fix> spheres="1": sphere 1 is fixed twice)"},
+  });
+}
+
+TEST_F(SceneFile, WrongValuesOfSceneryAndToolsLikewise) {
+  expectComplaints({
       {"shape=\"mesh\"", "shape=\"cone\"",
        R"(x.xml:17: <static> shape="cone": did you mean "plane"? known: plane, box, sphere, mesh)"},
       {"shape=\"mesh\"", "shape=\"box\"",
@@ -339,14 +349,12 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {" look=\"fat\"", "", R"(x.xml:17: <static> shape="box": without contact and without a look it has no effect)"},
       {"unit=\"mm\"", "unit=\"km\"",
        R"(x.xml:17: <static> unit="km": did you mean "m"? known: m, cm, mm, micron, inch)"},
-      {"servo=\"1000\"", "servo=\"1001\"",
-       R"(x.xml:4: <clock> servo="1001": expected the servo rate to be a multiple of the dynamics rate)"},
-      {"settle=\"2\"", "settle=\"61\"", R"(x.xml:4: <clock> settle="61": expected 1 number >= 0 and <= 60)"},
-      {"dynamics=\"40\"", "dynamics=\"10\"", R"(x.xml:4: <clock> dynamics="10": expected 1 number >= 20 and <= 1200)"},
-      {"spheres=\"0 1\"", "spheres=\"\"", R"(x.xml:12: <fix> spheres="": expected one or more integers >= 0)"},
-      {"spheres=\"0 1\"", "spheres=\"0 -1\"", R"(x.xml:12: <fix> spheres="0 -1": expected one or more integers >= 0)"},
-      {"spheres=\"4\"", "spheres=\"1\"", R"(x.xml:13: <fix> spheres="1": sphere 1 is fixed twice)"},
       {"0.4 0.1", "0.1 0.4", R"(x.xml:18: <tool> friction="0.1 0.4": expected static >= dynamic friction)"},
+  });
+}
+
+TEST_F(SceneFile, WrongValuesOfThePictureLikewise) {
+  expectComplaints({
       {"<key t=\"6\"", "<key t=\"4\"", R"(x.xml:22: <key> t="4": expected a later time than the key before it)"},
       {"target=\"0 0.01 0\"", "target=\"0 0 0.2\"",
        R"(x.xml:20: <camera> position="0 0 0.2": position and target are the same point)"},
@@ -364,8 +372,7 @@ TEST_F(SceneFile, WrongValuesNameTheLineTheValueAndWhatWasExpected) {
       {"let go", "lâché", R"(x.xml:25: <caption> text="lâché": expected characters of ASCII alone)"},
       {"0.5 3 7", "0.5 13", R"(x.xml:25: <output> golden="0.5 13": a time beyond the scene's duration)"},
       {"0.5 3 7", "3 0.5", R"(x.xml:25: <output> golden="3 0.5": expected increasing times)"},
-  };
-  for (const Mistake& m : mistakes) EXPECT_EQ(complaint(edited(m.from, m.to)), m.complaint);
+  });
 }
 
 TEST_F(SceneFile, FilesThatAreNoScenes) {

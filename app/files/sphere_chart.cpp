@@ -51,7 +51,7 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
   out += fmt::format("set xtics ({})\nset xrange [{:.6g}:{:.6g}]\n", ticks, 0.8 * rows.front().spheres,
                      1.25 * rows.back().spheres);
   if (cheapest > 0)
-    out += fmt::format("set border 11\nset y2label '{}'\nset y2tics ({})\nset y2range [{:.6g}:{:.6g}]\n",
+    out += fmt::format("set border 11 lc '{}'\nset y2label '{}'\nset y2tics ({})\nset y2range [{:.6g}:{:.6g}]\n", kGrey,
                        costLabel(cost), logTicks(cheapest / 5, 2 * dearest), cheapest / 5, 2 * dearest);
   out += "$rows << EOD\n" + data + "EOD\n";
   std::vector<std::string> plots;
