@@ -49,13 +49,16 @@ static std::string regionText(const NodeChoice& choice) {
   return {};
 }
 
-// That of the model's own, identified for this body.
+// That of the model's own, identified for this body; run where the mesh lies, as that was.
 static std::string identifyingCommand(const SceneBody& body) {
   const std::string& settings = body.model->settings;
   std::string out = settings.substr(0, settings.find(" --identify"));
   out += fmt::format(" --identify --poisson {}", body.tissue.poisson);
+  const std::string form = " --link-form ";
+  if (const std::size_t at = settings.find(form); at != std::string::npos)
+    out += settings.substr(at, settings.find(' ', at + form.size()) - at);
   for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix {}", shellWord(regionText(fix.nodes)));
-  return out;
+  return out + " -o " + shellWord(std::filesystem::path(body.modelPath).filename().string());
 }
 
 static std::vector<int> findNodes(const Scene& scene, int line, const NodeChoice& choice, const SceneBody& body) {

@@ -70,24 +70,24 @@ TEST_F(IdentifiedScene, WithoutItsNetworkPatchOrRatioItIsRefusedAndTheRightBuild
   const std::string build = "; this would make it: medulla build pear.obj --spheres 7 --identify --poisson ";
   EXPECT_EQ(refusal(scene(kHeld, "plain.xml")),
             "case.xml:3: body \"pear\" has identified links, and its model has none" + build +
-                "0.45 --fix plane=0,-1,0,0.02");
+                "0.45 --fix plane=0,-1,0,0.02 -o plain.xml");
   EXPECT_EQ(refusal(scene("<fix plane='0 -1 0 0.03'/>")),
             "case.xml:3: body \"pear\" has identified links, and its model was identified with another part of its "
             "surface fixed" +
-                build + "0.45 --fix plane=0,-1,0,0.03");
+                build + "0.45 --fix plane=0,-1,0,0.03 -o pear.xml");
   EXPECT_EQ(refusal(scene("")),
             "case.xml:3: body \"pear\" has identified links, and its model was identified with another part of its "
             "surface fixed" +
-                build + "0.45");
+                build + "0.45 -o pear.xml");
   folder.write("held nodes.csv", "0\n");
   EXPECT_EQ(refusal(scene("<fix vertices='held nodes.csv'/>")),
             "case.xml:3: body \"pear\" has identified links, and its model was identified with another part of its "
             "surface fixed" +
-                build + "0.45 --fix 'vertices=" + folder / "held nodes.csv" + "'");
+                build + "0.45 --fix 'vertices=" + folder / "held nodes.csv" + "' -o pear.xml");
   EXPECT_EQ(refusal(scene(kHeld, "pear.xml", 0.3)),
             "case.xml:3: body \"pear\" has identified links, and its model was identified for a Poisson's ratio of "
             "0.45" +
-                build + "0.3 --fix plane=0,-1,0,0.02");
+                build + "0.3 --fix plane=0,-1,0,0.02 -o pear.xml");
 }
 
 TEST_F(IdentifiedScene, PatchesHoldWhollyAndInsteadOfSpheres) {

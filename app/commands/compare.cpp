@@ -129,28 +129,29 @@ int compareCaches(const CompareOptions& options) {
   const std::vector<double> scale = options.tolerance > 0 ? scales(a, b, fields) : std::vector<double>();
   PictureState state;
   std::vector<double> inA, inB;
+  std::vector<Result> unseen;  // the first difference of what no picture shows, such as speeds
   for (int n = 0; n < std::min(a.pictures(), b.pictures()); ++n) {
     const std::uint64_t hashA = a.read(n, state);
     valuesOf(state, inA);
     const std::uint64_t hashB = b.read(n, state);
     valuesOf(state, inB);
-    const auto differ = [&](const std::string& field, const std::string& valueA, const std::string& valueB) {
-      return differing({{"picture", fmt::format("{}", n), ""},
-                        {"t", fmt::format("{}", inA[0]), "s"},
-                        {"field", field, ""},
-                        {"a", valueA, ""},
-                        {"b", valueB, ""}});
+    const auto difference = [&](const std::string& field, const std::string& valueA, const std::string& valueB) {
+      return std::vector<Result>{{"picture", fmt::format("{}", n), ""},
+                                 {"t", fmt::format("{}", inA[0]), "s"},
+                                 {"field", field, ""},
+                                 {"a", valueA, ""},
+                                 {"b", valueB, ""}};
     };
     for (std::size_t k = 0; k < inA.size(); ++k)
       if (options.tolerance > 0 ? std::abs(inA[k] - inB[k]) > options.tolerance * scale[k] : inA[k] != inB[k])
-        return differ(fields[k], fmt::format("{}", inA[k]), fmt::format("{}", inB[k]));
-    // What no picture shows, such as speeds.
-    if (options.tolerance == 0 && hashA != hashB)
-      return differ("state_hash", fmt::format("{:016x}", hashA), fmt::format("{:016x}", hashB));
+        return differing(difference(fields[k], fmt::format("{}", inA[k]), fmt::format("{}", inB[k])));
+    if (options.tolerance == 0 && hashA != hashB && unseen.empty())
+      unseen = difference("state_hash", fmt::format("{:016x}", hashA), fmt::format("{:016x}", hashB));
   }
   if (a.pictures() != b.pictures())
     return differing(
         {{"pictures_a", fmt::format("{}", a.pictures()), ""}, {"pictures_b", fmt::format("{}", b.pictures()), ""}});
+  if (!unseen.empty()) return differing(unseen);
   printResults({{"equal", "yes", ""}, {"pictures", fmt::format("{}", a.pictures()), ""}});
   return 0;
 }

@@ -104,7 +104,7 @@ std::string axes(const std::string& title, const Frame& f, ChartCost cost) {
   out += fmt::format("set xtics ({}) font ',12'\nset ytics ({})\n", logTicks(f.low, f.high),
                      logTicks(f.least, 0.99 * kChartRim));
   out += fmt::format("set ytics add ({0})\n", kChartRim);
-  if (f.least < kLeastShown) out += fmt::format("set ytics add ('{0} or less' {0})\n", kLeastShown);
+  if (f.least < kLeastShown) out += fmt::format("set ytics add ('< {0}' {0})\n", kLeastShown);
   out += fmt::format("set title '{}'\n", title);
   out += fmt::format("set xrange [{:.6g}:{:.6g}]\nset yrange [{:.6g}:{:.6g}]\n", f.low, f.high, f.least, f.most);
   out += fmt::format(

@@ -345,8 +345,11 @@ void readCamera(const XmlElement& camera, Scene& scene) {
 void readLight(const XmlElement& light, Scene& scene) {
   scene.lightOffset = readVector(light, "offset", scene.lightOffset, anyPlace);
   scene.lightIntensity = readNumber(light, "intensity", scene.lightIntensity, notNegative);
-  scene.lightReferenceDistance = readNumber(light, "reference_distance", scene.lightReferenceDistance, anyLength);
   if (light.find("position")) scene.lightPosition = readVector(light, "position", Eigen::Vector3d::Zero(), anyPlace);
+  const CameraKey& first = scene.camera.front();
+  const double away = (first.target - scene.lightPosition.value_or(first.position)).norm();
+  scene.lightReferenceDistance =
+      readNumber(light, "reference_distance", away > 0 ? away : scene.lightReferenceDistance, anyLength);
   if (scene.lightPosition && light.find("offset"))
     refuse(light, "offset", "the light has a position in the world, expected one of the two");
   const std::vector<double> haze = readNumbers(light, "haze", 3, notNegative);
