@@ -73,6 +73,13 @@ struct CarriedImpulse {
   Quad impulse;  // N s, world
 };
 
+// What friction held with at the end of an implicit step. Sticking is a spring taken implicitly (implicit_loads.cpp).
+struct HeldFriction {
+  std::uint64_t key;
+  Quad force;     // N, world
+  double energy;  // J, that it has taken in and not given back
+};
+
 // What contacts ask of a sphere and change in it, in the world's frame: in one place, three lines of the cache, because
 // every pass asks for it once per contact of the sphere.
 struct alignas(64) ContactSphere {
@@ -116,6 +123,7 @@ struct ContactData {
   // State: the impulses that the last substep ended with, ascending in key; the next one starts from them.
   std::vector<CarriedImpulse> carried;
   std::vector<CarriedImpulse> resting;  // those of contacts of bodies that sleep, likewise
+  std::vector<HeldFriction> held;       // of implicit steps: of every contact that pushed in the last one, likewise
   bool listsAreOld = true;              // whatever the balls have moved: bodies fell asleep or woke, or none yet
 
   PenetrationReport penetration;

@@ -164,7 +164,7 @@ void listStaticNeighbours(WorldData& d) {
 
 void findStaticContacts(WorldData& d, double moved) {
   ContactData& c = d.contact;
-  const double reach = kFastest * d.substep;
+  const double reach = contactReach(d);
   for (const StaticNeighbour& n : c.staticNeighbours) {
     if (!(n.gapAtList - moved < reach)) continue;
     const StaticContactShape& shape = c.statics[n.shape];

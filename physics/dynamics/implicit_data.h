@@ -38,6 +38,12 @@ struct PointLoad {
   std::array<Eigen::Vector3d, 3> axes;
 };
 
+// What a contact's friction goes on from.
+struct Holding {
+  Eigen::Vector3d impulse;  // N s, across the normal
+  double energy;            // J: HeldFriction::energy
+};
+
 // The spheres by whose motions the strain of one identified cell changes: its own and its neighbours'.
 struct StrainStar {
   int first = 0, end = 0;  // in ImplicitData::starSphere, starRate
@@ -67,6 +73,7 @@ struct ImplicitData {
   std::vector<int> rowQuad;
   std::vector<Quad> rowCoefficient;
   std::vector<PointLoad> loads;
+  std::vector<Holding> held;  // per contact
 
   StageStart before, start;  // of the step, of its present stage
   double totalMass = 0;      // kg

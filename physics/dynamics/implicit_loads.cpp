@@ -63,29 +63,41 @@ void addContactRows(const WorldData& d, ImplicitData& s, std::size_t index) {
   });
 }
 
-Vector3d ratesOf(const ImplicitData& s, const LoadRow* rows) {
-  Vector3d out;
-  for (int a = 0; a < 3; ++a) {
-    double rate = 0;
-    for (int k = rows[a].first; k < rows[a].end; ++k)
-      rate += dotProduct(load(s.rowCoefficient[k]), load(s.motion[s.rowQuad[k]]));
-    out[a] = rate;
-  }
-  return out;
+double rateOf(const ImplicitData& s, const LoadRow& row) {
+  double rate = 0;
+  for (int k = row.first; k < row.end; ++k) rate += dotProduct(load(s.rowCoefficient[k]), load(s.motion[s.rowQuad[k]]));
+  return rate;
 }
 
-void settleContact(const WorldData& d, const ImplicitData& s, const Contact& c, LoadRow* rows) {
+Vector3d ratesOf(const ImplicitData& s, const LoadRow* rows) {
+  return {rateOf(s, rows[0]), rateOf(s, rows[1]), rateOf(s, rows[2])};
+}
+
+double workAcross(const ImplicitData& s, const LoadRow* rows) {
+  return rows[1].impulse * rateOf(s, rows[1]) + rows[2].impulse * rateOf(s, rows[2]);
+}
+
+// Friction that holds goes on from what it held with, l0, less what stops the rest of the sliding, s v: what bears a
+// weight on a slope does so without creeping. With the energy l^2 / (2 s) l = c (l0 - s v), where c <= 1 is Coulomb's
+// limit, is passive: its work is l.v = (l0 - l / c).l / s <= (l0^2 - l^2) / (2 s). Between steps of different durations
+// the force stays, not the impulse, and s may change as well: a ledger says what has really been taken in, and
+// workOfLoads() lets no more than that come back.
+void settleContact(const WorldData& d, const ImplicitData& s, const PointLoad& load, LoadRow* rows) {
+  const Contact& c = d.contact.contacts[load.index];
   const ContactLaw law = contactLaw(d, c, s.duration);
   const Vector3d rate = ratesOf(s, rows);
   const double wanted = -(rate[0] + law.bias) / law.softness;
   if (!(law.softness > 0 && wanted > 0)) return;
   rows[0].impulse = wanted;
   rows[0].weight = 1 / law.softness;
-  const double sliding = std::hypot(rate[1], rate[2]), sticking = 1 / law.softness;
-  const double drag = sliding * sticking > c.friction * wanted ? c.friction * wanted / sliding : sticking;
+  const double sticking = 1 / law.softness;
+  double drag[3];
+  for (int a = 1; a < 3; ++a) drag[a] = load.axes[a].dot(s.held[load.index].impulse) - sticking * rate[a];
+  const double most = c.friction * wanted, whole = std::hypot(drag[1], drag[2]);
+  const double share = whole > most ? most / whole : 1;
   for (int a = 1; a < 3; ++a) {
-    rows[a].weight = drag;
-    rows[a].impulse = -drag * rate[a];
+    rows[a].weight = share * sticking;
+    rows[a].impulse = share * drag[a];
   }
 }
 
@@ -127,6 +139,50 @@ void addDeadLoads(const WorldData& d, ImplicitData& s, double time) {
 
 }  // namespace
 
+// Along the tangents of now, in this stage's time.
+void recallFriction(const WorldData& d, ImplicitData& s) {
+  s.held.assign(d.contact.contacts.size(), {Vector3d::Zero(), 0});
+  auto from = d.contact.held.begin();
+  for (std::size_t k = 0; k < s.held.size(); ++k) {
+    const Contact& c = d.contact.contacts[k];
+    while (from != d.contact.held.end() && from->key < c.key) ++from;
+    if (from == d.contact.held.end()) return;
+    if (from->key != c.key) continue;
+    const Vector3d normal(c.normal[0], c.normal[1], c.normal[2]), whole = s.duration * vectorOf(from->force);
+    s.held[k] = {whole - normal.dot(whole) * normal, from->energy};
+  }
+}
+
+void keepFriction(WorldData& d, const ImplicitData& s) {
+  d.contact.held.clear();
+  for (std::size_t k = 0; k < s.loads.size() && s.loads[k].isContact; ++k) {
+    const LoadRow* rows = &s.rows[3 * k];
+    if (!(rows[0].impulse > 0)) continue;
+    const Vector3d impulse = rows[1].impulse * s.loads[k].axes[1] + rows[2].impulse * s.loads[k].axes[2];
+    const double left = std::max(0.0, s.held[s.loads[k].index].energy - workAcross(s, rows));
+    d.contact.held.push_back({d.contact.contacts[s.loads[k].index].key, quadOf(impulse / s.duration),
+                              std::min(left, 0.5 * impulse.squaredNorm() / rows[0].weight)});
+  }
+}
+
+double workOfLoads(const ImplicitData& s) {
+  double sum = 0;
+  for (std::size_t k = 0; k < s.loads.size(); ++k) {
+    const LoadRow* rows = &s.rows[3 * k];
+    const double across = workAcross(s, rows);
+    sum += rows[0].impulse * rateOf(s, rows[0]);
+    sum += s.loads[k].isContact ? std::min(across, s.held[s.loads[k].index].energy) : across;
+  }
+  for (std::size_t k = 3 * s.loads.size(); k < s.rows.size(); ++k) sum += s.rows[k].impulse * rateOf(s, s.rows[k]);
+  return sum;
+}
+
+bool contactPushes(const ImplicitData& s) {
+  for (std::size_t k = 0; k < s.loads.size() && s.loads[k].isContact; ++k)
+    if (s.rows[3 * k].impulse > 0) return true;
+  return false;
+}
+
 void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   s.rows.clear();
   s.rowQuad.clear();
@@ -144,7 +200,7 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   for (std::size_t k = 0; k < s.loads.size(); ++k) {
     LoadRow* rows = &s.rows[3 * k];
     if (s.loads[k].isContact) {
-      settleContact(d, s, d.contact.contacts[s.loads[k].index], rows);
+      settleContact(d, s, s.loads[k], rows);
     } else {
       settleTool(d, s, s.loads[k], stage, rows);
     }

@@ -29,6 +29,10 @@ struct StageLoads {
   StepTime time;  // of the stage
 };
 void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& loads);  // rows, and their part of the residual
+void recallFriction(const WorldData& d, ImplicitData& s);  // of ContactData::contacts: ImplicitData::held
+void keepFriction(WorldData& d, const ImplicitData& s);    // for the step after this one
+bool contactPushes(const ImplicitData& s);
+double workOfLoads(const ImplicitData& s);  // J, in this stage
 
 // link_stiffness.cpp: adds the links' stiffness and damping, times the squared duration, to `diagonal`; sets `beside`.
 void addLinkStiffness(const WorldData& d, ImplicitData& s);

@@ -192,21 +192,29 @@ double search(WorldData& d, ImplicitData& s, const StageLoads& stage, double bef
   return left;
 }
 
+// Rounding stops some iterations of very stiff bodies just short of what is enough: within this.
+constexpr double kSettled = 10;
+
+// sqrt(J): the residual that accelerations of no account leave.
+double leastResidual(const ImplicitData& s) {
+  constexpr double kLeastAcceleration = 1e-5;  // m/s2, of all masses
+  return s.duration * kLeastAcceleration * std::sqrt(s.totalMass);
+}
+
 // From the present state, which `s.start` holds, with its momenta there. False where the iteration does not settle.
 bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   constexpr int kIterations = 20;
   constexpr double kSolved = 0.03, kNear = 0.3;
-  constexpr double kLeastAcceleration = 1e-5;  // m/s2, of all masses
   const double share = d.settings.order == 2 ? 1e-6 : 1e-3;
   if (d.contact.mode != ContactMode::none) {
     findContacts(d);
-    notePenetration(d.contact);
+    recallFriction(d, s);
   }
   s.motion = s.start.motion;
   leadDriven(d, s, stage.time.end);
   place(d, s, s.duration);
   double left = evaluateResidual(d, s, stage);
-  const double enough = share * left + s.duration * kLeastAcceleration * std::sqrt(s.totalMass);
+  const double enough = share * left + leastResidual(s);
   Operator derivative = differentiate;
   for (int i = 0; i < kIterations && left > enough; ++i) {
     const double before = left;
@@ -220,19 +228,25 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
       derivative = applySystem;
     }
   }
-  return left <= 10 * enough;  // rounding stops some iterations of very stiff bodies just short of it
+  return left <= kSettled * enough;
 }
 
-// Steps of half of the one before at each level down to kDeepest, and one of its length in a single stage; all but the
-// first are made when a step fails for the first time.
-constexpr std::size_t kDeepest = 6, kSingleStage = 7;
-ImplicitData& implicitLevel(WorldData& d, std::size_t level) {
-  while (d.implicit.size() <= level) {
-    const bool twoStages = d.settings.order == 2 && d.implicit.size() < kSingleStage;
-    d.implicit.push_back(std::make_shared<ImplicitData>());
-    layOutImplicit(d, twoStages ? kGamma * d.substep : d.substep, *d.implicit.back());
+// Steps of half of the one before at each halving down to kDeepest; in one stage, whatever the order, or as the order
+// says. All but the first are made when they are first needed.
+constexpr std::size_t kDeepest = 6;
+struct Part {
+  std::size_t halvings = 0;
+  bool oneStage = false;
+};
+ImplicitData& dataOf(WorldData& d, const Part& part) {
+  const bool twoStages = d.settings.order == 2 && !part.oneStage;
+  const std::size_t k = d.settings.order == 2 && part.oneStage ? kDeepest + 1 + part.halvings : part.halvings;
+  if (d.implicit.size() <= k) d.implicit.resize(k + 1);
+  if (d.implicit[k] == nullptr) {
+    d.implicit[k] = std::make_shared<ImplicitData>();
+    layOutImplicit(d, twoStages ? kGamma * d.substep : d.substep, *d.implicit[k]);
   }
-  return *d.implicit[level];
+  return *d.implicit[k];
 }
 
 // The second stage of order 2 sets out from the first one's start, led on for the time of the first stage's complement
@@ -274,11 +288,7 @@ double workOf(const WorldData& d, const ImplicitData& s) {
     sum += d.spheres.groups[i / 4].mass[i % 4] * gravity.dot(vectorOf(s.motion[2 * i]));
   for (int i = 0; i < d.nodes.dynamicEnd; ++i)
     sum += d.nodes.mass[i] * gravity.dot(vectorOf(s.motion[2 * d.spheres.count + i]));
-  for (const LoadRow& row : s.rows) {
-    if (row.impulse == 0) continue;
-    for (int k = row.first; k < row.end; ++k)
-      sum += row.impulse * dotProduct(load(s.rowCoefficient[k]), load(s.motion[s.rowQuad[k]]));
-  }
+  sum += workOfLoads(s);
   return d.substep / s.duration * sum;
 }
 
@@ -308,40 +318,64 @@ void addToolImpulses(const WorldData& d, double time, std::vector<Vector3d>& imp
   for (std::size_t k = 0; k < impulses.size(); ++k) impulses[k] += time * d.loadForces[k];
 }
 
-// Both stages from s.before. False where one does not settle or energy comes from nowhere; the state is of no account
-// then.
-bool attempt(WorldData& d, ImplicitData& s, std::size_t level, const Loads& loads, const StepTime& time,
-             double energyBefore) {
-  // A body far beyond what its links measure may not settle in any step; what loses energy is then good enough.
-  constexpr std::size_t kMustSettle = 2;
-  const double late = d.substep - s.duration;  // 0 in order 1
-  s.start = s.before;
-  bool settled = true;
-  s.toolImpulses.assign(d.loadForces.size(), Vector3d::Zero());
-  if (late > 0) {
-    settled = solveStage(d, s, {&loads, {time.end - late, time.remaining + late}});
-    addToolImpulses(d, late, s.toolImpulses);
-    beginSecondStage(d, s, late);
-  }
-  if (settled || level > kMustSettle) settled = solveStage(d, s, {&loads, time});
-  addToolImpulses(d, s.duration, s.toolImpulses);
-  if (!settled && level <= kMustSettle) return false;
-  visitAngularMomenta(d, s, [&](int i, Lanes momentum) { store(d.spheres.angularMomentum[i], momentum); });
+// How a step ended: done; not settled, or with energy from nowhere, or so far that contacts may have been passed;
+// or with a contact that pushes in a step of two stages. The state is of no account but where it is done.
+enum class Ending { done, failed, touched };
+
+struct StepEnergy {
+  double kinetic, elastic;  // J
+};
+
+Ending checkEnergy(WorldData& d, const ImplicitData& s, bool twoStages, const StepEnergy& before) {
   // Backward Euler loses energy where the potential is convex; elsewhere this decides. Order 2 swings about it.
   const double given = workOf(d, s), elastic = elasticEnergy(d), kinetic = kineticEnergy(d, s);
-  const double scale = energyBefore + std::abs(given), allowed = energyBefore + given - elastic;
-  const double slack = d.settings.order == 2 ? 0.5 : 1e-3;
-  if (!(kinetic <= allowed + slack * scale)) return false;
-  if (d.settings.order == 2 || kinetic <= allowed) return true;
-  constexpr double kRounding = 1e-13;
+  const double sum = before.kinetic + before.elastic, scale = sum + std::abs(given), allowed = sum + given - elastic;
+  if (twoStages) return kinetic <= allowed + 0.5 * scale ? Ending::done : Ending::failed;
+  if (kinetic <= allowed) return Ending::done;
+  // At rest what the iteration leaves open has either sign: such a world stays.
+  const double least = kSettled * leastResidual(s);
+  if (std::max(kinetic, before.kinetic) < 0.5 * least * least) {
+    restore(d, s.before);
+    slowDown(d, 0);
+    return Ending::done;
+  }
+  constexpr double kSlack = 1e-3, kRounding = 1e-13;
+  if (!(kinetic <= allowed + kSlack * scale)) return Ending::failed;
   slowDown(d, std::sqrt(std::max(0.0, allowed) / kinetic));
-  return allowed > -kRounding * scale;
+  return allowed > -kRounding * scale ? Ending::done : Ending::failed;
+}
+
+// One or two stages from s.before.
+Ending attempt(WorldData& d, ImplicitData& s, std::size_t halvings, const Loads& loads, const StepTime& time,
+               const StepEnergy& before) {
+  // A body far beyond what its links measure may not settle in any step; what loses energy is then good enough.
+  constexpr std::size_t kMustSettle = 2;
+  const double late = d.substep - s.duration;  // 0 in one stage
+  s.start = s.before;
+  s.toolImpulses.assign(d.loadForces.size(), Vector3d::Zero());
+  const auto solve = [&](const StepTime& end, double lasting) {
+    const bool settled = solveStage(d, s, {&loads, end});
+    addToolImpulses(d, lasting, s.toolImpulses);
+    if (late > 0 && contactPushes(s)) return Ending::touched;
+    if (!settled && halvings <= kMustSettle) return Ending::failed;
+    return halvings < kDeepest && outrunsContact(d, lasting) ? Ending::failed : Ending::done;
+  };
+  if (late > 0) {
+    const Ending first = solve({time.end - late, time.remaining + late}, late);
+    if (first != Ending::done) return first;
+    beginSecondStage(d, s, late);
+  }
+  const Ending last = solve(time, s.duration);
+  if (last != Ending::done) return last;
+  visitAngularMomenta(d, s, [&](int i, Lanes momentum) { store(d.spheres.angularMomentum[i], momentum); });
+  return checkEnergy(d, s, late > 0, before);
 }
 
 // The last resort of a body so deformed that its forces are not the slope of its energy (links shorter than a
 // twentieth, or folded to 180 degrees): it moves without speed, as long as it has no more energy than it has ever had,
 // or stays. Likewise frames that were a whole turn apart are so no longer.
 void creep(WorldData& d, const ImplicitData& s) {
+  d.contact.held.clear();
   if (!(elasticEnergy(d) <= d.mostEnergy)) restore(d, s.before);
   slowDown(d, 0);
   const auto orientation = d.spheres.orientation;
@@ -351,34 +385,53 @@ void creep(WorldData& d, const ImplicitData& s) {
   if (!(elasticEnergy(d) <= d.mostEnergy)) d.spheres.orientation = orientation;
 }
 
+void advanceBy(WorldData& d, Part part, const Loads& loads, const StepTime& time, std::vector<Vector3d>& toolImpulse);
+
+void advanceByHalves(WorldData& d, std::size_t halvings, const Loads& loads, const StepTime& time,
+                     std::vector<Vector3d>& toolImpulse) {
+  const double half = 0.5 * d.substep;
+  d.substep = half;
+  advanceBy(d, {halvings + 1}, loads, {time.end - half, time.remaining + half}, toolImpulse);
+  advanceBy(d, {halvings + 1}, loads, time, toolImpulse);
+  d.substep = 2 * half;
+}
+
+bool isTooFast(WorldData& d) {
+  if (d.contact.mode == ContactMode::none) return false;
+  placeBalls(d);
+  return outrunsContact(d, d.substep);
+}
+
 // One step of d.substep; where it fails, two of half of it; where these are the shortest, one of backward Euler's,
-// which damps what order 2 would follow.
-void advanceBy(WorldData& d, std::size_t level, const Loads& loads, const StepTime& time,
-               std::vector<Vector3d>& toolImpulse) {
-  ImplicitData& s = implicitLevel(d, level);
+// which damps what order 2 would follow. So does a step in which contacts push: an impulse that stops a ball within the
+// first stage is none that lasts, and led on into the second one it would throw the ball back faster than it came.
+void advanceBy(WorldData& d, Part part, const Loads& loads, const StepTime& time, std::vector<Vector3d>& toolImpulse) {
+  const bool deepest = part.halvings == kDeepest;
+  if (!deepest && !part.oneStage && isTooFast(d)) return advanceByHalves(d, part.halvings, loads, time, toolImpulse);
+  part.oneStage = part.oneStage || d.settings.order == 1 || !d.contact.held.empty();
+  ImplicitData& s = dataOf(d, part);
   beginHere(d, s.before);
   runStage(d, evaluateForces);
-  const double energy = kineticEnergy(d, s) + elasticEnergy(d);
-  d.mostEnergy = std::max(d.mostEnergy, energy);
-  if (attempt(d, s, level, loads, time, energy)) {
+  const StepEnergy before{kineticEnergy(d, s), elasticEnergy(d)};
+  d.mostEnergy = std::max(d.mostEnergy, before.kinetic + before.elastic);
+  const Ending ending = attempt(d, s, part.halvings, loads, time, before);
+  if (ending == Ending::done) {
+    keepFriction(d, s);
+    notePenetration(d.contact);
     for (std::size_t k = 0; k < d.loadForces.size(); ++k)
       toolImpulse[pointSpring(d, loads, k, time.remaining).tool] += s.toolImpulses[k];
     return;
   }
-  if (level == kSingleStage || (level == kDeepest && d.settings.order == 1)) return creep(d, s);
+  if (deepest && part.oneStage) return creep(d, s);
   restore(d, s.before);
-  if (level == kDeepest) return advanceBy(d, kSingleStage, loads, time, toolImpulse);
-  const double half = 0.5 * d.substep;
-  d.substep = half;
-  advanceBy(d, level + 1, loads, {time.end - half, time.remaining + half}, toolImpulse);
-  advanceBy(d, level + 1, loads, time, toolImpulse);
-  d.substep = 2 * half;
+  if (deepest || ending == Ending::touched) return advanceBy(d, {part.halvings, true}, loads, time, toolImpulse);
+  advanceByHalves(d, part.halvings, loads, time, toolImpulse);
 }
 
 }  // namespace
 
 void stepImplicitly(WorldData& d, const Loads& loads, const StepTime& time, std::vector<Vector3d>& toolImpulse) {
-  advanceBy(d, 0, loads, time, toolImpulse);
+  advanceBy(d, {}, loads, time, toolImpulse);
 }
 
 }  // namespace medulla

@@ -339,6 +339,11 @@ std::uint64_t World::stateHash() const {
       add(c.impulse, 3);
     }
   }
+  for (const HeldFriction& held : d.contact.held) {
+    hash.add(held.key);
+    add(held.force, 3);
+    hash.add(held.energy);
+  }
   for (const SurfacePart& p : d.surface.parts)
     if (!p.always) hash.add(p.moves ? p.quietFrames : -1.0);
   for (const Quad& q : d.surface.weight) add(q, 3);

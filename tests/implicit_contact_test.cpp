@@ -1,0 +1,192 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "physics/dynamics/contact_stages.h"
+#include "tests/contact_bodies.h"
+
+// Contact inside implicit steps: what sticks stays, nothing bounces higher than it fell, nothing fast passes.
+namespace medulla {
+
+using Eigen::Vector3d;
+using synthetic::ballBody;
+using synthetic::ballModel;
+
+constexpr double kRadius = 0.01, kGravity = 9.81;  // m, m/s2
+
+static WorldSettings contactSettings(int order, const Vector3d& gravity = {0, -kGravity, 0}) {
+  WorldSettings s;
+  s.integrator = Integrator::implicit;
+  s.order = order;
+  s.gravity = gravity;
+  s.frameDuration = 0.02;
+  s.contact = ContactMode::balls;
+  return s;
+}
+
+// Four balls in a square, linked; it does not roll.
+static BodyDescription raft(const std::string& name, const Vector3d& position, double friction) {
+  const double a = 0.02;
+  const auto model =
+      ballModel({{{-a, 0, -a}, kRadius}, {{a, 0, -a}, kRadius}, {{a, 0, a}, kRadius}, {{-a, 0, a}, kRadius}},
+                {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 2}});
+  BodyDescription body = ballBody(name, model, position, friction);
+  body.tissue.young = 1e5;
+  return body;
+}
+
+static BodyDescription rod(const std::string& name, const Vector3d& position) {
+  return ballBody(name, ballModel({{{0, 0, 0}, kRadius}, {{0.03, 0, 0}, kRadius}}, {{0, 1}}), position, 0.2);
+}
+
+static StaticShape floorOf(double friction) {
+  StaticShape floor;
+  floor.friction = friction;
+  return floor;
+}
+
+static void run(World& world, double until) {
+  while (world.time() < until - 1e-9) world.advance({});
+}
+
+static Vector3d placeOf(const World& world, int body) {
+  const BodyRange& r = world.data().ranges[body];
+  Vector3d sum = Vector3d::Zero();
+  for (int i = 0; i < r.sphereCount; ++i) sum += vectorOf(world.data().spheres.position[r.firstSphere + i]);
+  return sum / r.sphereCount;
+}
+
+static double energyOf(const World& world) {
+  const Energies e = world.energies();
+  return e.kinetic + e.elastic + e.gravity;
+}
+
+static void throwBody(World& world, int body, const Vector3d& velocity) {
+  const BodyRange& r = world.data().ranges[body];
+  for (int i = 0; i < r.sphereCount; ++i) world.data().spheres.velocity[r.firstSphere + i] = quadOf(velocity);
+}
+
+// A damper alone would let it down by g sin(a) h / (pi (2 + pi)), 1 mm/s.
+TEST(ImplicitContact, ASlopeHoldsWithoutCreeping) {
+  for (const int order : {1, 2}) {
+    for (const int substeps : {1, 4}) {
+      WorldSettings settings = contactSettings(order, kGravity * Vector3d(std::sin(0.35), -std::cos(0.35), 0));
+      settings.substeps = substeps;
+      World world(settings, {raft("raft", {0, kRadius, 0}, 0.5)}, {floorOf(0.5)});
+      run(world, 1);
+      const Vector3d before = placeOf(world, 0);
+      run(world, 2);
+      EXPECT_LT((placeOf(world, 0) - before).norm(), 1e-6) << "order " << order << ", " << substeps << " substeps";
+    }
+  }
+}
+
+// On a slope beyond the friction's angle what is thrown uphill stops, and comes down faster and faster.
+TEST(ImplicitContact, WhatSlidesIsHeldBackByCoulombsFriction) {
+  const double slope = 0.5, friction = 0.3, speed = 0.4;
+  World world(contactSettings(1, kGravity * Vector3d(std::sin(slope), -std::cos(slope), 0)),
+              {raft("raft", {0, kRadius, 0}, friction)}, {floorOf(friction)});
+  throwBody(world, 0, {-speed, 0, 0});
+  run(world, 1);
+  const double up = kGravity * (std::sin(slope) + friction * std::cos(slope)),
+               down = kGravity * (std::sin(slope) - friction * std::cos(slope)), turn = speed / up;
+  const double expected = -0.5 * speed * turn + 0.5 * down * (1 - turn) * (1 - turn);
+  EXPECT_NEAR(placeOf(world, 0).x(), expected, 0.03 * expected);
+}
+
+// Balls on balls: without friction that holds they roll off each other, ever faster.
+TEST(ImplicitContact, AStackStays) {
+  for (const int order : {1, 2}) {
+    std::vector<BodyDescription> bodies;
+    for (int k = 0; k < 3; ++k)
+      bodies.push_back(
+          raft("raft " + std::to_string(k), {1e-4 * (k == 1), (2 * k + 1) * kRadius, 5e-5 * (k == 2)}, 0.4));
+    World world(contactSettings(order), bodies, {floorOf(0.4)});
+    run(world, 1);
+    std::vector<Vector3d> before;
+    for (int k = 0; k < 3; ++k) before.push_back(placeOf(world, k));
+    run(world, 8);
+    for (int k = 0; k < 3; ++k) EXPECT_LT((placeOf(world, k) - before[k]).norm(), 1e-5) << order << ", raft " << k;
+  }
+}
+
+// A tissue's contact is damped critically: restitution 0.05. What comes back is asked for after whatever part of a step
+// the touch falls into.
+TEST(ImplicitContact, NothingBouncesHigh) {
+  for (const int order : {1, 2}) {
+    for (const double height : {0.1, 0.31, 0.7, 1.016, 1.023, 1.03, 2.0}) {
+      World world(contactSettings(order), {synthetic::ball("ball", 0.03, {0, 0.03 + height, 0})}, {floorOf(0.2)});
+      const double falling = std::sqrt(2 * height / kGravity), speed = kGravity * falling;
+      run(world, falling + 0.01);
+      double highest = 0;
+      for (int k = 0; k < 40; ++k) {
+        world.advance({});
+        highest = std::max(highest, placeOf(world, 0).y() - 0.03);
+      }
+      EXPECT_LT(std::sqrt(2 * kGravity * highest), 0.3 * speed) << "order " << order << ", from " << height;
+      EXPECT_NEAR(placeOf(world, 0).y(), 0.03, 1e-3) << "order " << order << ", from " << height;
+    }
+  }
+}
+
+TEST(ImplicitContact, NothingFastPassesAThinBox) {
+  StaticShape box;
+  box.kind = StaticShape::Kind::box;
+  box.size = {0.2, 0.004, 0.2};
+  for (const int order : {1, 2}) {
+    for (const double speed : {6.3, 25.0}) {
+      for (int k = 0; k < 8; ++k) {  // the step's length of the way, in eighths
+        World world(contactSettings(order, Vector3d::Zero()), {rod("rod", {0, 0.1 + speed * 0.005 * k / 8, 0})}, {box});
+        throwBody(world, 0, {0, -speed, 0});
+        run(world, 0.1);
+        EXPECT_GT(placeOf(world, 0).y(), 0.002 + 0.5 * kRadius) << "order " << order << ", " << speed << " m/s, " << k;
+      }
+    }
+  }
+}
+
+TEST(ImplicitContact, FastBodiesDoNotPassEachOther) {
+  for (const int order : {1, 2}) {
+    for (int k = 0; k < 8; ++k) {
+      const double speed = 5;
+      World world(contactSettings(order, Vector3d::Zero()),
+                  {rod("left", {0, 0.1, 0}), rod("right", {0, -0.1 - speed * 0.005 * k / 8, 0})});
+      throwBody(world, 0, {0, -speed, 0});
+      throwBody(world, 1, {0, speed, 0});
+      run(world, 0.1);
+      EXPECT_GT(placeOf(world, 0).y(), placeOf(world, 1).y() + kRadius) << "order " << order << ", " << k;
+    }
+  }
+}
+
+// What friction has taken in, F^2 / (2 k) with k = pi (2 + pi) m / T^2 of each contact, is all that it may give back.
+TEST(ImplicitContact, FrictionThatHeldGivesBackNoMoreThanItTookIn) {
+  const double slope = 0.35;
+  World world(contactSettings(1, kGravity * Vector3d(std::sin(slope), -std::cos(slope), 0)),
+              {raft("raft", {0, kRadius, 0}, 0.5)}, {floorOf(0.5)});
+  run(world, 1);
+  double stored = 0;
+  for (const HeldFriction& held : world.data().contact.held) stored += held.energy;
+  const double mass = 4 * world.data().spheres.groups[0].mass[0], along = kGravity * std::sin(slope), step = 0.005;
+  EXPECT_NEAR(stored, mass * along * along * step * step / (2 * std::numbers::pi * (2 + std::numbers::pi)),
+              0.2 * stored);
+  const double before = energyOf(world) - world.energies().gravity;
+  world.data().gravity = quadOf({0, -kGravity * std::cos(slope), 0});
+  for (int k = 0; k < 10; ++k) {
+    world.advance({});
+    EXPECT_LT(energyOf(world) - world.energies().gravity, before + 1.1 * stored);
+  }
+}
+
+TEST(ImplicitContact, TheHashKnowsWhatFrictionHoldsWith) {
+  World world(contactSettings(1), {raft("raft", {0, kRadius, 0}, 0.5)}, {floorOf(0.5)});
+  run(world, 0.1);
+  ASSERT_FALSE(world.data().contact.held.empty());
+  const std::uint64_t before = world.stateHash();
+  world.data().contact.held[0].force.v[0] += 1e-9;
+  EXPECT_NE(world.stateHash(), before);
+}
+
+}  // namespace medulla
