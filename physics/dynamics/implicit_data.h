@@ -58,6 +58,9 @@ struct ImplicitData {
   std::vector<InertiaGroup> inertia;      // four spheres each
   std::vector<double> pull, carriedMass;  // kg, per node: the attachments' share; what a host feels of node and spring
   std::vector<double> nodeMobility;       // 1/kg, per node: of itself, its attachment and its edges; 0: held
+  // Of attachments that are stiffer along their normals, over the square of the node's area: what a node moves less
+  // along it (1/(kg m4)), what a host feels more (kg/m4). Empty where there are none.
+  std::vector<double> normalMobility, carriedNormal;
   std::vector<std::array<int, 2>> pairs;  // spheres of each link, identified ones last; -1: held
   int linkPairs = 0;                      // so many; then those that share a star alone
   std::vector<StrainStar> stars;

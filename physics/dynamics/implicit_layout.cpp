@@ -35,6 +35,26 @@ void layOutNodes(const WorldData& d, ImplicitData& s) {
   }
 }
 
+// What attachments on frames are stiffer along the normal n, e n n^T on c of all else:
+//   (c + e n n^T)^-1 = 1/c - e / (c (c + e)) n n^T.
+void layOutNormals(const WorldData& d, ImplicitData& s) {
+  const Nodes& n = d.nodes;
+  for (const HostRange& r : n.onSpheres) {
+    if (!r.onFrames) continue;
+    s.normalMobility.resize(n.dynamicEnd, 0);
+    s.carriedNormal.resize(n.dynamicEnd, 0);
+    for (int i = 4 * r.firstGroup; i < 4 * r.endGroup; ++i) {
+      const double area = vectorOf(n.groups[i / 4].restArea, i % 4).squaredNorm(), mass = n.mass[i];
+      const double excess = s.duration * (s.duration + r.relaxation) * area *
+                            d.identified.skin[d.identified.ofNodeGroup[i / 4]].normalExcess[i % 4];
+      if (excess == 0) continue;
+      const double stiff = s.pull[i] + excess;
+      s.normalMobility[i] = excess * s.nodeMobility[i] * s.nodeMobility[i] / (1 + excess * s.nodeMobility[i]) / area;
+      s.carriedNormal[i] = ((n.inverseMass[i] > 0 ? stiff * mass / (mass + stiff) : stiff) - s.carriedMass[i]) / area;
+    }
+  }
+}
+
 }  // namespace
 
 void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
@@ -49,6 +69,7 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
   }
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) s.freedom.push_back(all(d.nodes.inverseMass[i] > 0));
   layOutNodes(d, s);
+  layOutNormals(d, s);
   for (int i = 0; i < d.spheres.count; ++i) s.totalMass += d.spheres.groups[i / 4].mass[i % 4];
   for (const double m : d.nodes.mass) s.totalMass += m;
   for (int k = 0; k < d.links.count; ++k) {

@@ -112,12 +112,29 @@ void loadFactor(const WorldData& d, ImplicitData& s, const std::vector<Block6>& 
   }
 }
 
+// The velocities that `impulses` give to nodes whose neighbours stay, and whose hosts stay, on top of `before`, which
+// may be null: 0.
+void moveNodes(const WorldData& d, const ImplicitData& s, const Quad* impulses, const Quad* before, Quad* out) {
+  const Lanes zero = splat(0);
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
+    const Lanes3 impulse = gatherFour(impulses, 4 * g);
+    Lanes3 v{zero, zero, zero};
+    if (before != nullptr) v = gatherFour(before, 4 * g);
+    v = fma(loadFour(s.nodeMobility, 4 * g), impulse, v);
+    if (!s.normalMobility.empty()) {
+      const Lanes3& area = d.nodes.area[g];
+      v = fnma(loadFour(s.normalMobility, 4 * g) * dot(area, impulse), area, v);
+    }
+    storeFour(v, out, 4 * g);
+  }
+}
+
 void precondition(WorldData& d, ImplicitData& s, const Motion& r, Motion& z) {
   const std::size_t first = 2 * static_cast<std::size_t>(d.spheres.count);
   z = r;
   if (d.nodes.dynamicEnd > 0) {
     // Spheres: r_s + J^T G (M + G)^-1 r_n
-    for (int i = 0; i < d.nodes.dynamicEnd; ++i) store(z[first + i], splat(s.nodeMobility[i]) * load(z[first + i]));
+    moveNodes(d, s, r.data() + first, nullptr, z.data() + first);
     std::fill(s.carried.begin(), s.carried.end(), Quad{});
     applySurface(d, s, z.data() + first);
     returnImpulses(d, s.given, z);
@@ -130,8 +147,7 @@ void precondition(WorldData& d, ImplicitData& s, const Motion& r, Motion& z) {
     carryMotion(d, z, s.carried);
     applySurface(d, s, nullptr);
     negate(s.given);
-    for (int i = 0; i < d.nodes.dynamicEnd; ++i)
-      store(z[first + i], fma(splat(s.nodeMobility[i]), load(s.given[i]), load(z[first + i])));
+    moveNodes(d, s, s.given.data(), z.data() + first, z.data() + first);
   }
   hold(s.freedom, z);
 }
