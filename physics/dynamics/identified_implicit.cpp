@@ -1,12 +1,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "physics/dynamics/identified_measures.h"
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/link_blocks.h"
+#include "physics/dynamics/pair_numbers.h"
 #include "physics/dynamics/skin_map.h"
 
 // Identified links and skins in an implicit step: G^T K G of the measures, and the skins' map with its transpose.
@@ -104,26 +104,6 @@ std::vector<std::vector<int>> collectStars(const WorldData& d, ImplicitData& s) 
   }
   return stars;
 }
-
-// Numbers of pairs of spheres; those that there are not are appended.
-class PairNumbers {
- public:
-  explicit PairNumbers(std::vector<std::array<int, 2>>& pairs) : pairs_(&pairs) {
-    for (std::size_t k = 0; k < pairs.size(); ++k)
-      if (pairs[k][1] >= 0) numbers_[pairs[k]] = static_cast<int>(k);
-  }
-  int of(int a, int b) {  // -1 - k: pair k is (b, a)
-    const auto turned = numbers_.find({b, a});
-    if (turned != numbers_.end()) return -1 - turned->second;
-    const auto [found, isNew] = numbers_.try_emplace({a, b}, static_cast<int>(pairs_->size()));
-    if (isNew) pairs_->push_back(found->first);
-    return found->second;
-  }
-
- private:
-  std::vector<std::array<int, 2>>* pairs_;
-  std::map<std::array<int, 2>, int> numbers_;
-};
 
 // What a link's measures add to the strain of one cell, by the motions of its two spheres.
 void addStrainRates(const Lanes (&strain)[6], const Column (&g)[9], int lane, int own, int other, ImplicitData& s) {
@@ -280,25 +260,6 @@ void returnFrameImpulses(const WorldData& d, Motion& motion) {
     Quad &linear = motion[2 * c.sphere], &angular = motion[2 * c.sphere + 1];
     store(linear, load(linear) + force);
     store(angular, load(angular) + torque + crossProduct(load(c.worldArm), force));
-  }
-}
-
-// Nodes on frames without a link between them have no block to be added to. What bounds the whole from above stands for
-// it: |sum J_k x_k|^2 <= (sum a_j) sum |J_k x_k|^2 / a_k for any a, here the share that each sphere has of the node.
-void addCarriedMassOnFrames(const WorldData& d, const HostRange& range, const std::vector<double>& mass,
-                            std::vector<Block6>& diagonal) {
-  for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
-    if (mass[i] == 0) continue;
-    const HostPoint p = hostPointOnFrames(d, i);
-    double whole = 0;
-    for (int k = 0; k < p.count; ++k) whole += p.force[k].norm();
-    for (int k = 0; k < p.count; ++k) {
-      if (p.force[k].isZero(0)) continue;
-      Eigen::Matrix<double, 6, 3> rows;
-      rows.topRows<3>() = p.force[k];
-      rows.bottomRows<3>() = p.torque[k];
-      diagonal[p.spheres[k]] += mass[i] * whole / p.force[k].norm() * rows * rows.transpose();
-    }
   }
 }
 

@@ -51,6 +51,18 @@ struct StrainStar {
   double relaxation = 0;   // s
 };
 
+// Of the nodes of one skin host: what two of its frames feel of their masses, one as it moves and the other.
+struct CarriedBlock {
+  int term0, term1;      // of the host's terms, not in falling order; -1: home
+  int sphere0, sphere1;  // that carry these frames; -1: held
+  int pair;              // in ImplicitData::pairs where they are two; -1 - k: the other way round
+  Block6 mass;           // kg, kg m, kg m2: in the home frame, of home's motion and of the others' against it
+};
+struct CarriedHost {
+  int host;        // in Identified::hosts
+  int first, end;  // in ImplicitData::carriedBlocks
+};
+
 struct ImplicitData {
   double duration = 0;  // s, of a stage
   // Constants.
@@ -62,14 +74,18 @@ struct ImplicitData {
   // along it (1/(kg m4)), what a host feels more (kg/m4). Empty where there are none.
   std::vector<double> normalMobility, carriedNormal;
   std::vector<std::array<int, 2>> pairs;  // spheres of each link, identified ones last; -1: held
-  int linkPairs = 0;                      // so many; then those that share a star alone
+  int linkPairs = 0;                      // so many; then those that share a star alone,
+  int stiffPairs = 0;                     // so many; then those that share nodes alone
   std::vector<StrainStar> stars;
   std::vector<int> starSphere;
   std::vector<std::array<int, 4>> starPlace;  // per identified link: in starRate, of both ends in star 0 and in star 1
   std::vector<int> starPair;                  // in `pairs`; -1 - k: the other way round
+  std::vector<CarriedHost> carriedHosts;
+  std::vector<CarriedBlock> carriedBlocks;
   // Of the present iteration.
-  std::vector<Block6> diagonal, beside;      // spheres and links alone, per sphere and per pair
-  std::vector<Block6> lumped, lumpedBeside;  // and with the surface's share in them
+  std::vector<Block6> diagonal, beside;      // spheres and links alone, per sphere and per stiff pair
+  std::vector<Block6> lumped, lumpedBeside;  // and with the surface's share in them; per pair
+  std::vector<Block6> homeRow;               // while one host's share is added
   BlockCholesky spheres;                     // of the latter and of loads
   std::vector<Vector6> starRate;             // (N/m)^1/2, as starSphere
   std::vector<LoadRow> rows;

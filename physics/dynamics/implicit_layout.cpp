@@ -78,12 +78,16 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
   }
   listIdentifiedPairs(d, s.pairs);
   layOutStars(d, s);
+  s.stiffPairs = static_cast<int>(s.pairs.size());
+  layOutMassOnFrames(d, s);
   std::vector<std::array<int, 2>> links;
   std::copy_if(s.pairs.begin(), s.pairs.end(), std::back_inserter(links),
                [](const auto& pair) { return pair[1] >= 0; });
   s.spheres.analyse(d.spheres.count, links);
   s.diagonal.resize(d.spheres.count);
-  s.beside.resize(s.pairs.size());
+  s.beside.resize(s.stiffPairs);
+  s.lumped.resize(d.spheres.count);
+  s.lumpedBeside.resize(s.pairs.size());
   s.blocks.resize(d.spheres.count);
   for (Motion* m : {&s.balance, &s.kept, &s.before.motion, &s.start.motion, &s.motion, &s.residual, &s.change,
                     &s.direction, &s.image, &s.preconditioned})

@@ -19,7 +19,7 @@ void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried)
 void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& motion);
 // The links' part of it, of what acts on their anchors; at the frames of the last evaluateLinks().
 void returnLinkLoads(const WorldData& d, const std::vector<LinkLoads>& loads, Motion& motion);
-// Adds J^T m J of the nodes' maps J, `mass` per node (kg), to the spheres' blocks.
+// Adds J^T m J of the nodes' maps J, `mass` per node (kg), to the spheres' blocks; but for nodes on frames.
 void addCarriedMass(const WorldData& d, const std::vector<double>& mass, std::vector<Block6>& diagonal,
                     std::vector<Block6>& beside);
 
@@ -49,8 +49,10 @@ void returnImpulsesToFrames(WorldData& d, const HostRange& range, const std::vec
 // Adds to the impulses `given` of what stands in `carried` what attachments are stiffer along the normals.
 void stiffenNormals(const WorldData& d, ImplicitData& s, const HostRange& range);
 void returnFrameImpulses(const WorldData& d, Motion& motion);
-void addCarriedMassOnFrames(const WorldData& d, const HostRange& range, const std::vector<double>& mass,
-                            std::vector<Block6>& diagonal);
+
+// identified_mass.cpp: J^T m J of nodes on frames, into `lumped` and `lumpedBeside`; once masses are laid out.
+void layOutMassOnFrames(const WorldData& d, ImplicitData& s);
+void addMassOnFrames(const WorldData& d, ImplicitData& s);
 
 // implicit_system.cpp
 void assembleSystem(WorldData& d, ImplicitData& s);

@@ -195,8 +195,10 @@ void assembleSystem(WorldData& d, ImplicitData& s) {
   addLinkStiffness(d, s);
   if (d.nodes.dynamicEnd > 0) {
     s.lumped = s.diagonal;
-    s.lumpedBeside = s.beside;
+    std::fill(std::copy(s.beside.begin(), s.beside.end(), s.lumpedBeside.begin()), s.lumpedBeside.end(),
+              Block6::Zero());
     addCarriedMass(d, s.carriedMass, s.lumped, s.lumpedBeside);
+    addMassOnFrames(d, s);
     loadFactor(d, s, s.lumped, s.lumpedBeside);
   } else {
     loadFactor(d, s, s.diagonal, s.beside);
@@ -207,7 +209,7 @@ void assembleSystem(WorldData& d, ImplicitData& s) {
 void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y) {
   const std::size_t first = 2 * static_cast<std::size_t>(d.spheres.count);
   for (std::size_t i = 0; i < s.blocks.size(); ++i) s.blocks[i].noalias() = s.diagonal[i] * blockOf(x, i);
-  for (std::size_t k = 0; k < s.pairs.size(); ++k) {
+  for (std::size_t k = 0; k < s.beside.size(); ++k) {
     const auto [i, j] = s.pairs[k];
     if (j < 0) continue;
     s.blocks[i].noalias() += s.beside[k] * blockOf(x, j);

@@ -140,10 +140,7 @@ void addCarriedMass(const WorldData& d, const std::vector<double>& mass, std::ve
     beside[range.host] += m.topRightCorner<6, 6>();
   }
   for (const HostRange& range : d.nodes.onSpheres) {
-    if (range.onFrames) {
-      addCarriedMassOnFrames(d, range, mass, diagonal);
-      continue;
-    }
+    if (range.onFrames) continue;
     Lanes sum[21];
     for (Lanes& s : sum) s = splat(0);
     for (int g = range.firstGroup; g < range.endGroup; ++g) {

@@ -1,0 +1,168 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <map>
+
+#include "physics/dynamics/implicit_stages.h"
+#include "physics/dynamics/pair_numbers.h"
+#include "physics/model/cross_matrix.h"
+
+// What the spheres of an identified body feel of the nodes' masses, J^T m J, between all frames of a node. Seen from
+// home (skin_map.h) a node's velocity is, but for the second order and what stretch thins,
+//   v + omega x offset + sum map_k (v_k - v - omega x place_k, omega_k - omega),
+// with maps that never change. So the sum over a host's nodes is taken once, in the motions of home and of the frames
+// against it; where the frames are by now enters with their places. Node by node it took longer than all else of a
+// step.
+namespace medulla {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Rows3x6 = Eigen::Matrix<double, 3, 6>;
+
+// The motion of a point at `arm`: (v + omega x arm, omega) = X (v, omega). These are m X and X^T m.
+Block6 timesLever(const Block6& m, const Vector3d& arm) {
+  Block6 out = m;
+  out.rightCols<3>().noalias() -= m.leftCols<3>() * crossMatrix(arm);
+  return out;
+}
+Block6 leverTimes(const Vector3d& arm, const Block6& m) {
+  Block6 out = m;
+  out.bottomRows<3>().noalias() += crossMatrix(arm) * m.topRows<3>();
+  return out;
+}
+
+Block6 rotated(const Matrix3d& r, const Block6& m) {
+  Block6 out;
+  for (int i = 0; i < 6; i += 3)
+    for (int j = 0; j < 6; j += 3) out.block<3, 3>(i, j) = r * m.block<3, 3>(i, j) * r.transpose();
+  return out;
+}
+
+// Of one node: by home's motion, and by those of other frames against it.
+struct NodeMap {
+  int term;  // -1: home
+  Rows3x6 map;
+};
+
+std::vector<NodeMap> mapsOf(const Identified& s, const SkinGroup& g, int lane) {
+  NodeMap home{-1, {}};
+  home.map << Matrix3d::Identity(), -crossMatrix(vectorOf(g.restOffset, lane));
+  std::vector<NodeMap> out{home};
+  for (int k = g.firstShare; k < g.endShare; ++k) {
+    NodeMap of{s.shares[k].load, {}};
+    for (int e = 0; e < 18; ++e) of.map(e % 3, e / 3) = s.shares[k].map[e][lane];
+    if (!of.map.isZero(0)) out.push_back(of);
+  }
+  return out;
+}
+
+// kg, in the home frame.
+Matrix3d massOf(const WorldData& d, const ImplicitData& s, int node) {
+  const Vector3d area = vectorOf(d.nodes.groups[node / 4].restArea, node % 4);
+  return s.carriedMass[node] * Matrix3d::Identity() + s.carriedNormal[node] * area * area.transpose();
+}
+
+void layOutHost(const WorldData& d, const HostRange& range, PairNumbers& pairs, ImplicitData& s) {
+  const Identified& identified = d.identified;
+  const int number = identified.skin[identified.ofNodeGroup[range.firstGroup]].host;
+  const SkinHost& host = identified.hosts[number];
+  std::map<std::array<int, 2>, Block6> sums;  // by the places of two terms, the lower first
+  for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i) {
+    if (s.carriedMass[i] == 0) continue;
+    const std::vector<NodeMap> maps = mapsOf(identified, identified.skin[identified.ofNodeGroup[i / 4]], i % 4);
+    const Matrix3d mass = massOf(d, s, i);
+    for (const NodeMap& a : maps) {
+      for (const NodeMap& b : maps) {
+        if (a.term > b.term) continue;
+        Block6& sum = sums.try_emplace({a.term, b.term}, Block6::Zero()).first->second;
+        sum += a.map.transpose() * mass * b.map;
+      }
+    }
+  }
+  const auto sphereOf = [&](int term) {
+    const int frame =
+        term < 0 ? host.home : static_cast<int>(identified.terms[host.firstTerms + term / 4].frame[term % 4]);
+    return identified.carried[frame].sphere;
+  };
+  CarriedHost out{number, static_cast<int>(s.carriedBlocks.size()), 0};
+  for (const auto& [terms, sum] : sums) {
+    const int a = sphereOf(terms[0]), b = sphereOf(terms[1]);
+    const int pair = a >= 0 && b >= 0 && a != b ? pairs.of(a, b) : 0;
+    s.carriedBlocks.push_back({terms[0], terms[1], a, b, pair, sum});
+  }
+  out.end = static_cast<int>(s.carriedBlocks.size());
+  s.carriedHosts.push_back(out);
+  s.homeRow.resize(std::max<std::size_t>(s.homeRow.size(), 1 + 4 * (host.endTerms - host.firstTerms)));
+}
+
+// The host's frames as they stand, in its home frame.
+class PlacedFrames {
+ public:
+  PlacedFrames(const Identified& s, const SkinHost& host)
+      : s_(&s), host_(&host), rotation_(quaternionOf(s.frames[host.home].orientation).toRotationMatrix()) {}
+  Vector3d place(int term) const { return vectorOf(s_->termStates[host_->firstTerms + term / 4].place, term % 4); }
+  // Block of the spheres' own motions, in the world's frame.
+  Block6 ofSpheres(const CarriedBlock& b, const Block6& ofFrames) const {
+    return rotated(rotation_, leverTimes(arm(b.term0), timesLever(ofFrames, arm(b.term1))));
+  }
+
+ private:
+  Vector3d arm(int term) const {
+    const auto frame =
+        term < 0 ? host_->home : static_cast<int>(s_->terms[host_->firstTerms + term / 4].frame[term % 4]);
+    return rotation_.transpose() * vectorOf(s_->carried[frame].worldArm);
+  }
+
+  const Identified* s_;
+  const SkinHost* host_;
+  Matrix3d rotation_;
+};
+
+void give(const PlacedFrames& frames, const CarriedBlock& b, const Block6& ofFrames, ImplicitData& s) {
+  if (b.sphere0 < 0 || b.sphere1 < 0) return;
+  const Block6 m = frames.ofSpheres(b, ofFrames);
+  if (b.sphere0 == b.sphere1) {
+    s.lumped[b.sphere0] += m;
+  } else if (b.pair >= 0) {
+    s.lumpedBeside[b.pair] += m;
+  } else {
+    s.lumpedBeside[-1 - b.pair] += m.transpose();
+  }
+}
+
+}  // namespace
+
+void layOutMassOnFrames(const WorldData& d, ImplicitData& s) {
+  PairNumbers pairs(s.pairs);
+  for (const HostRange& range : d.nodes.onSpheres)
+    if (range.onFrames) layOutHost(d, range, pairs, s);
+}
+
+// With B the constant sums and X_k the levers of the places: between frames j and k B_jk, home's row
+//   C_k = B_0k - sum X_j^T B_jk,   and of home itself B_00 - sum X_j^T B_j0 - sum C_k X_k.
+void addMassOnFrames(const WorldData& d, ImplicitData& s) {
+  for (const CarriedHost& h : s.carriedHosts) {
+    const PlacedFrames frames(d.identified, d.identified.hosts[h.host]);
+    Block6* row = s.homeRow.data() + 1;  // by term, home before the first
+    std::fill(s.homeRow.begin(), s.homeRow.end(), Block6::Zero());
+    for (int k = h.first; k < h.end; ++k) {
+      const CarriedBlock& b = s.carriedBlocks[k];
+      if (b.term0 < 0) {
+        row[b.term1] += b.mass;
+      } else {
+        row[b.term1] -= leverTimes(frames.place(b.term0), b.mass);
+        give(frames, b, b.mass, s);
+      }
+      if (b.term0 != b.term1) row[b.term0] -= leverTimes(frames.place(b.term1), b.mass.transpose());
+    }
+    for (int k = h.end - 1; k >= h.first; --k) {  // home's own block, the first, last
+      const CarriedBlock& b = s.carriedBlocks[k];
+      if (b.term0 >= 0) continue;
+      give(frames, b, row[b.term1], s);
+      if (b.term1 >= 0) row[-1] -= timesLever(row[b.term1], frames.place(b.term1));
+    }
+  }
+}
+
+}  // namespace medulla
