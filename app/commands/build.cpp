@@ -79,6 +79,19 @@ void warnOfCover(const BuildJob& job) {
              chosen ? "; do more of them (--spheres) fit it better?" : "");
 }
 
+// Of what the scene will get: links of the network, or of the beams' formulas.
+void warnOfErrors(const BuildJob& job) {
+  constexpr double kLinks = 10, kElements = 5;  // %, RMS
+  if (!job.model.identified) return;
+  const IdentifiedNetwork& n = *job.model.identified;
+  const double links = n.usesFormulas ? job.formulas->rms : n.bulk.rms;
+  if (links > kLinks || n.ofFiniteElements.rms > kElements)
+    fmt::print(stderr,
+               "{}: note: the links are off by {:.2g} % RMS, finite elements by {:.2g}; do more spheres fit better, or "
+               "more that is held?\n",
+               job.meshPath, links, n.ofFiniteElements.rms);
+}
+
 // All that was repaired and found in one line.
 void tellRepairs(const std::string& path, const std::vector<std::string>& notes) {
   if (notes.empty()) return;
@@ -245,6 +258,7 @@ int runBuild(const BuildOptions& options) {
   const std::vector<Result> results = resultsOf(jobs);
   for (const BuildJob& job : jobs) writeModel(job.modelPath, job.model);
   for (const BuildJob& job : jobs) warnOfCover(job);
+  for (const BuildJob& job : jobs) warnOfErrors(job);
   if (!options.reportPath.empty()) writeReport(options.reportPath, results);
   printResults(results);
   return 0;

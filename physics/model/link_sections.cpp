@@ -30,13 +30,16 @@ static SectionMoments disc(double radius) {
 
 using Sections = std::array<SectionMoments, ElasticLink::kSections>;
 
-// Stations that the plane misses get the nearest other's section, the one before of two.
+// Stations that the plane misses get the nearest other's section, the one before of two. A corner of a cell that it
+// cuts off where the line lies outside is a miss, too; a neck, however thin, has the line in it.
 static void fillGaps(Sections& sections, double radius) {
   double largest = 0;
   for (const SectionMoments& s : sections) largest = std::max(largest, s.area);
   if (largest <= 0) sections.fill(disc(radius));
   const Sections measured = sections;
-  const auto isGap = [&](int k) { return measured[k].area <= 0.01 * largest; };
+  const auto isGap = [&](int k) {
+    return measured[k].area <= 0 || (!measured[k].holdsOrigin && measured[k].area <= 0.01 * largest);
+  };
   for (int k = 0; k < ElasticLink::kSections; ++k) {
     for (int away = 1; isGap(k) && away < ElasticLink::kSections; ++away) {
       const int before = k - away, after = k + away;

@@ -114,9 +114,8 @@ SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const 
     high = std::max({high, e[0].y(), e[1].y()});
   }
   const double step = (high - low) / scanLines;
-  Integrals sum;
-  for (int line = 0; line < scanLines; ++line) {
-    const double b = low + (line + 0.5) * step;
+  // Of the scan line at `b`, what is inside: one span after the other.
+  const auto visitSpans = [&](double b, const auto& visit) {
     std::array<Span, 2> parts = {{{-1e30, 1e30}, {0, 0}}};
     if (sites != nullptr) {
       const Vector3d start = plane.origin + b * plane.v;
@@ -124,13 +123,17 @@ SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const 
     }
     const std::vector<double> crossings = crossingsOf(outline, b);
     for (std::size_t k = 0; k + 1 < crossings.size(); k += 2) {
-      for (const Span& part : parts) {
-        sum.add(std::max(crossings[k], part.low), std::min(crossings[k + 1], part.high), b, step);
-      }
+      for (const Span& part : parts) visit(std::max(crossings[k], part.low), std::min(crossings[k + 1], part.high));
     }
+  };
+  Integrals sum;
+  for (int line = 0; line < scanLines; ++line) {
+    const double b = low + (line + 0.5) * step;
+    visitSpans(b, [&](double from, double to) { sum.add(from, to, b, step); });
   }
   if (sum.area <= 0) return section;
   section.area = sum.area;
+  visitSpans(0, [&](double from, double to) { section.holdsOrigin |= from <= 0 && 0 <= to; });
   section.centroid = sum.first / sum.area;
   sum.second(1, 0) = sum.second(0, 1);
   section.secondMoment = sum.second - sum.area * section.centroid * section.centroid.transpose();

@@ -19,6 +19,7 @@ struct SectionMoments {
   double area = 0;                                         // m2
   Eigen::Vector2d centroid = Eigen::Vector2d::Zero();      // m
   Eigen::Matrix2d secondMoment = Eigen::Matrix2d::Zero();  // m4, integral of r r^T about the centroid
+  bool holdsOrigin = false;                                // the plane's own origin is in it
 };
 
 // Section of the solid inside the mesh, on scan lines along u. With `sites`, only the part within the power cells of

@@ -11,6 +11,7 @@
 #include "physics/model/identify/end_loads.h"
 #include "physics/model/identify/held_give.h"
 #include "physics/model/identify/layer_fit.h"
+#include "physics/model/identify/necks.h"
 #include "physics/model/identify/parallel.h"
 #include "physics/model/identify/reduction.h"
 #include "physics/model/identify/skin_fit.h"
@@ -100,17 +101,29 @@ std::vector<double> volumesBehind(const SoftBodyModel& model) {
   return out;
 }
 
+// Of the links' sections, which may miss what several links pass, or pass aslant.
+CellSize orNarrower(const CellSize& found, const TriangleMesh& mesh, double widest, double perNeck, double leastPart,
+                    const std::function<bool(const Vector3d&)>& behind) {
+  constexpr double kMuch = 0.9;
+  const std::optional<Neck> neck = narrowestNeck(mesh, widest, leastPart);
+  if (!neck || neck->width / perNeck >= kMuch * found.size || behind(neck->place)) return found;
+  return {neck->width / perNeck,
+          fmt::format("the neck of {:.2g} mm near {} m", 1e3 * neck->width, placeText(neck->place))};
+}
+
 // Cells of the spheres span three cells of the grid or more, necks between parts of the body two; 1500 for the whole
 // body take four seconds of two processors at seven spheres. Where what is held ends, displacements go as the root of
 // the distance, which no polynomial follows, so that finer cells converge in the first order only: at 600 a gallbladder
 // held by its neck bends half a percent less.
-CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const Vector3d&)>& behind) {
+CellSize chooseSize(const SoftBodyModel& model, const TriangleMesh& mesh,
+                    const std::function<bool(const Vector3d&)>& behind) {
   constexpr double perSphere = 3, perNeck = 2, perBody = 1500;
   constexpr double partMin = 0.02;  // of the body: what hangs on a thinner neck moves with it alone
   double volume = 0;
   for (const FillingSphere& s : model.spheres) volume += s.volume;
   const double spheres = std::cbrt(volume / static_cast<double>(model.spheres.size())) / perSphere;
-  CellSize out{std::min(spheres, std::cbrt(volume / perBody)), ""};
+  const double ofBody = std::min(spheres, std::cbrt(volume / perBody));
+  CellSize out{ofBody, ""};
   const std::vector<double> beyond = volumesBehind(model);
   for (std::size_t l = 0; l < model.links.size(); ++l) {
     if (beyond[l] < partMin * volume) continue;
@@ -125,7 +138,7 @@ CellSize chooseSize(const SoftBodyModel& model, const std::function<bool(const V
                                          link.sphere0, link.sphere1, placeText(place))};
     }
   }
-  return out;
+  return orNarrower(out, mesh, perNeck * ofBody, perNeck, partMin, behind);
 }
 
 VoxelSolid makeSolid(const SoftBodyModel& model, const TriangleMesh& mesh, const CellSize& cell,
@@ -341,7 +354,7 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   };
   std::vector<Ball> balls;
   for (const FillingSphere& s : model.spheres) balls.push_back({s.restBallCentre, s.radius});
-  const CellSize cell = chooseSize(model, behindHeld(solidSettings.heldSpaces));
+  const CellSize cell = chooseSize(model, mesh, behindHeld(solidSettings.heldSpaces));
   Alongside<VoxelSolid> largerCells([&](const Progress& goOn) {
     return makeVoxelSolid(mesh, kLargerCells * metCellSize(mesh, cell.size), solidSettings, goOn);
   });
