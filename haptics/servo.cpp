@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -32,6 +33,7 @@ struct Tool {
   Vector3d lastFelt = Vector3d::Zero();  // unit; along which it was felt
   double largestPush = 0;                // N, of the coupling's spring during this contact
   DeviceMotion motion;                   // in this contact or grip
+  std::optional<Vector3d> pathEnd;       // m, of the device's path as handed over since the frame began
   double estimate = 0;                   // N, of the push at the last tick, before it was kept to the tissue's
   double springScale = 1;                // of the springs handed over: less than 1 beyond forceMax
   int ticks = 0;                         // in this frame
@@ -245,7 +247,9 @@ static void startFrame(double tickDuration, Tool& tool) {
   constexpr double memory = 0.05;  // s; half as long a force scatters by 16 % where this leaves 10
   tool.deviceAtFrameStart = tool.device;
   tool.deviceSum.setZero();
-  startFrame(tool.motion);
+  const bool holds = !tool.grip.held.empty() && tool.pathEnd;
+  startFrame(holds ? Vector3d(tool.device.position - *tool.pathEnd) : Vector3d::Zero(), tool.motion);
+  tool.pathEnd.reset();
   fadePatch(std::exp(-tool.ticks * tickDuration / memory), tool.patch);
   tool.ticks = 0;
 }
@@ -385,13 +389,14 @@ static void handOverGrip(const BlendedSurface& surface, const Tool& tool, const 
   }
 }
 
-void Servo::handOver(double frameDuration, Loads& out) const {
+void Servo::handOver(double frameDuration, Loads& out) {
   assert(frameDuration > 0);
   out.toolSprings.clear();
   out.heldNodes.clear();
   const BlendedSurface& surface = data_->surfaces.reading().surface();
-  for (const Tool& tool : data_->tools) {
+  for (Tool& tool : data_->tools) {
     const Path path = devicePath(tool, frameDuration, data_->tickDuration);
+    tool.pathEnd = path.end;
     if (!tool.grip.held.empty())
       handOverGrip(surface, tool, path, frameDuration, out);
     else

@@ -65,7 +65,7 @@ class Servo {
 
   // The springs that stand for the tools' contacts and grips during the next dynamics frame of `frameDuration` s.
   // `out` is cleared and filled; nothing is allocated after makeRoom().
-  void handOver(double frameDuration, Loads& out) const;
+  void handOver(double frameDuration, Loads& out);
   void makeRoom(Loads& out) const;
 
  private:

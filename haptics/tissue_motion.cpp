@@ -8,9 +8,10 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-void startFrame(DeviceMotion& device) {
+void startFrame(const Vector3d& lag, DeviceMotion& device) {
+  device.way[0] -= lag;
   std::rotate(device.way.begin(), device.way.end() - 1, device.way.end());
-  device.way[0].setZero();
+  device.way[0] = lag;
   device.sinceBefore = device.since;
   device.earlyBefore = device.early;
   device.since = 0;

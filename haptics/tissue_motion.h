@@ -17,7 +17,8 @@ namespace medulla {
 // Of one device while it touches or holds.
 struct DeviceMotion {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s, over the last tick
-  // m: the way that counts, in this dynamics frame so far and in the three before.
+  // m: the way that counts, in this dynamics frame so far and in the three before; in a grip from where the path that
+  // the dynamics was given ended to where it ended next.
   std::array<Eigen::Vector3d, 4> way{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
                                      Eigen::Vector3d::Zero()};
   // alpha from which on the device's own way counts, in this frame and in the one before; and m, what of the way came
@@ -30,7 +31,10 @@ struct DeviceMotion {
 void beginContact(const BlendedSurface& surface, double alpha, const ProxyContact& contact,
                   const Eigen::Vector3d& normal, double stiffness, DeviceMotion& device);
 void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness, DeviceMotion& device);
-void startFrame(DeviceMotion& device);
+// `lag`, m: how far the device is ahead of the end of the path that the dynamics was given. Tissue answers that path,
+// not the device: straight and with the frame's mean kept, it ends a T^2 / 12 behind a device that speeds up by a. Ways
+// of the device itself would leave a body that follows it behind by as much, felt as a mass of k T^2 / 12 more.
+void startFrame(const Eigen::Vector3d& lag, DeviceMotion& device);
 
 struct TissueMotion {
   Eigen::Vector3d lead = Eigen::Vector3d::Zero();      // m, by now ahead of the blended surface
