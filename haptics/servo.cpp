@@ -147,7 +147,7 @@ static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Too
     return surface.node(held.node, alpha) - heldTarget(tool.device, held);
   };
   return tool.settings.stiffness * meanOverHeld(tool.grip, gap) +
-         motionForce(tool, heldMotion(surface, alpha, tool.grip, tool.settings.stiffness, tool.motion));
+         motionForce(tool, heldMotion(surface, alpha, tool.grip, tool.motion));
 }
 
 // In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
@@ -243,12 +243,13 @@ void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
   data_->alpha = alpha;
 }
 
-static void startFrame(double tickDuration, Tool& tool) {
+static void startFrame(const BlendedSurface& surface, double tickDuration, Tool& tool) {
   constexpr double memory = 0.05;  // s; half as long a force scatters by 16 % where this leaves 10
   tool.deviceAtFrameStart = tool.device;
   tool.deviceSum.setZero();
-  const bool holds = !tool.grip.held.empty() && tool.pathEnd;
-  startFrame(holds ? Vector3d(tool.device.position - *tool.pathEnd) : Vector3d::Zero(), tool.motion);
+  const bool holds = !tool.grip.held.empty();
+  startFrame(holds && tool.pathEnd ? Vector3d(tool.device.position - *tool.pathEnd) : Vector3d::Zero(), tool.motion);
+  if (holds) learnFollowing(surface, tool.grip, tool.motion);
   tool.pathEnd.reset();
   fadePatch(std::exp(-tool.ticks * tickDuration / memory), tool.patch);
   tool.ticks = 0;
@@ -257,7 +258,7 @@ static void startFrame(double tickDuration, Tool& tool) {
 bool Servo::beginFrame() {
   if (!data_->surfaces.take()) return false;
   data_->alpha = 0;
-  for (Tool& tool : data_->tools) startFrame(data_->tickDuration, tool);
+  for (Tool& tool : data_->tools) startFrame(data_->surfaces.reading().surface(), data_->tickDuration, tool);
   return true;
 }
 
@@ -419,7 +420,7 @@ static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, int i
   tool.proxy = placeProxy(buckets, start.position, settings.radius);
   tool.grip.held.reserve(buckets.surface().from.size());
   tool.patch.entries.reserve(contactPatchCapacity);
-  startFrame(0, tool);
+  startFrame(buckets.surface(), 0, tool);
   return tool;
 }
 

@@ -76,13 +76,27 @@ void beginContact(const BlendedSurface& surface, double alpha, const ProxyContac
   device.way[0] = device.early = wayOfStep(device, alpha) - (1 - alpha) * device.way[1];
 }
 
+static Vector3d heldStep(const BlendedSurface& surface, const Grip& grip, int framesAgo) {
+  return meanOverHeld(grip, [&](const HeldOffset& held) { return surface.steps[framesAgo][held.node]; });
+}
+
 void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness, DeviceMotion& device) {
-  device = {.velocity = device.velocity};
   const double part = followedPart(stiffness, grip.give);
+  device = {.velocity = device.velocity, .followsAtOnce = part, .follows = {part, part}};
   if (!(part > 0)) return;
-  for (int k = 0; k < 3; ++k)
-    device.way[k + 1] = meanOverHeld(grip, [&](const HeldOffset& held) { return surface.steps[k][held.node]; }) / part;
+  for (int k = 0; k < 3; ++k) device.way[k + 1] = heldStep(surface, grip, k) / part;
   device.way[0] = wayOfLead(device, alpha) - (1 - alpha) * device.way[1];
+}
+
+void learnFollowing(const BlendedSurface& surface, const Grip& grip, DeviceMotion& device) {
+  constexpr double kMemory = 0.1;   // s; a half or two and a half times as long feels the same within a few per cent
+  constexpr double kLeast = 1e-12;  // m2, of changes of 1 um: less is as if the device stood still
+  const double kept = std::exp(-surface.duration / kMemory);
+  const Vector3d step = heldStep(surface, grip, 0) - heldStep(surface, grip, 1), way = device.way[1] - device.way[2];
+  device.stepChange = kept * device.stepChange + step.dot(way);
+  device.wayChange = kept * device.wayChange + way.squaredNorm();
+  const double part = (device.stepChange + kLeast * device.followsAtOnce) / (device.wayChange + kLeast);
+  device.follows = {std::clamp(part, device.followsAtOnce, 1.0), device.follows[0]};
 }
 
 TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
@@ -115,10 +129,9 @@ double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion
   return (1 - tissue.followed) * (tool.stiffness * longer + tool.damping * std::abs(normal.dot(device.velocity)));
 }
 
-TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,
-                        const DeviceMotion& device) {
+TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, const DeviceMotion& device) {
   if (!(surface.duration > 0)) return {};
-  const double part = followedPart(stiffness, grip.give);
+  const double part = (1 - alpha) * device.follows[1] + alpha * device.follows[0];
   const Vector3d beyond = latestWay(device, alpha) - wayOfLead(device, alpha);
   const Vector3d faster = device.velocity - wayOfStep(device, alpha) / surface.duration;
   const Vector3d lead = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeLead(h.node, alpha); });

@@ -25,6 +25,12 @@ struct DeviceMotion {
   // earlier in these frames, evenly, of tissue that had moved by itself.
   double since = 0, sinceBefore = 0;
   Eigen::Vector3d early = Eigen::Vector3d::Zero(), earlyBefore = Eigen::Vector3d::Zero();
+  // Of a grip, the part of the device's way by which what it holds follows: at once, by its give; and as it was seen
+  // to, up to the surface's `to` and `from`. Below these, m2: sums over frames, the older the less, of what the step
+  // changed by along the change of the way that it answers, and of that change's square.
+  double followsAtOnce = 0;
+  std::array<double, 2> follows{};
+  double stepChange = 0, wayChange = 0;
 };
 
 // Tissue that moved by itself begins to follow the device: its steps so far count as answers to ways of a device.
@@ -35,6 +41,10 @@ void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, do
 // not the device: straight and with the frame's mean kept, it ends a T^2 / 12 behind a device that speeds up by a. Ways
 // of the device itself would leave a body that follows it behind by as much, felt as a mass of k T^2 / 12 more.
 void startFrame(const Eigen::Vector3d& lag, DeviceMotion& device);
+// How far what is held follows, by the frame that begins: least squares of its steps' changes by those of the ways that
+// they answer. Its give tells what yields with the spheres still, within a frame; a limp organ swings along within a
+// few, a free body goes all the way. Steady ways tell nothing, as tissue may drift by itself.
+void learnFollowing(const BlendedSurface& surface, const Grip& grip, DeviceMotion& device);
 
 struct TissueMotion {
   Eigen::Vector3d lead = Eigen::Vector3d::Zero();      // m, by now ahead of the blended surface
@@ -55,7 +65,6 @@ double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion
                  const ToolSettings& tool, const DeviceMotion& device);
 
 // Mean over what a grip holds.
-TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness,
-                        const DeviceMotion& device);
+TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, const DeviceMotion& device);
 
 }  // namespace medulla

@@ -57,6 +57,7 @@ TEST(TissueMotion, WhatTissueGivesBringsTheForceNearThatOfShortFrames) {
 TEST(TissueMotion, AtASteadySpeedTheStepsAreTheWholeLead) {
   DeviceMotion device;
   device.velocity = {0, -0.05, 0};
+  device.follows = {0.9, 0.7};
   device.way.fill(0.02 * device.velocity);
   BlendedSurface surface;
   surface.duration = 0.02;
@@ -70,11 +71,10 @@ TEST(TissueMotion, AtASteadySpeedTheStepsAreTheWholeLead) {
   contact.share = 1;
   Grip grip;
   grip.held = {{0, Vector3d::Zero()}, {1, Vector3d::Zero()}};
-  grip.give = 0.05;
   for (const double alpha : {0.25, 0.5, 1.0}) {
     device.way[0] = alpha * device.way[1];
     for (const TissueMotion& motion : {contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), 400, device),
-                                       heldMotion(surface, alpha, grip, 400, device)}) {
+                                       heldMotion(surface, alpha, grip, device)}) {
       EXPECT_LT((motion.lead - surface.steps[0][0]).norm(), 1e-15);
       EXPECT_LT((motion.velocity - surface.steps[0][0] / 0.02).norm(), 1e-13);
     }
@@ -102,7 +102,7 @@ TEST(TissueMotion, AtFirstTouchTissueFollowsByThePartThatItsGiveTells) {
   EXPECT_LT((lead(0.8) - part * Vector3d(0, -3e-4, 0)).norm(), 1e-15);
   device.way[0] = {0, -5e-4, 0};
   const Vector3d end = lead(1);
-  startFrame(device);
+  startFrame(Vector3d::Zero(), device);
   EXPECT_LT((lead(1e-9) - end).norm(), 1e-11);  // no step from frame to frame
 }
 
@@ -129,12 +129,40 @@ TEST(TissueMotion, TissueThatAlreadyMovesIsTouchedWithoutAStepInItsLead) {
     };
     device.way[0] += (1 - began) * way;
     EXPECT_LT((lead(1) - part * way).norm(), 1e-15) << began;
-    startFrame(device);
+    startFrame(Vector3d::Zero(), device);
     for (const double alpha : {0.05, 0.3, 0.5, 0.75, 0.95, 1.0}) {
       device.way[0] = alpha * way;
       EXPECT_LT((lead(alpha) - part * way).norm(), 1e-15) << began << " " << alpha;
     }
   }
+}
+
+// Held tissue that drifts on its own and answers a part of what a device adds to its way.
+static double followedAfter(double answered, double atOnce, int frames) {
+  BlendedSurface surface;
+  surface.duration = 0.02;
+  for (auto& steps : surface.steps) steps.assign(1, Vector3d::Zero());
+  Grip grip;
+  grip.held = {{0, Vector3d::Zero()}};
+  grip.give = atOnce / (1 - atOnce) / 400;
+  DeviceMotion device;
+  beginHold(surface, 1, grip, 400, device);
+  for (int frame = 0; frame < frames; ++frame) {
+    const Vector3d way(1e-4 * std::sin(0.4 * frame), 2e-4 * std::cos(0.3 * frame), 0);
+    device.way[0] += way;
+    startFrame(Vector3d::Zero(), device);
+    surface.steps = {{{Vector3d(3e-5, 0, -4e-5) + answered * way}, surface.steps[0], surface.steps[1]}};
+    learnFollowing(surface, grip, device);
+  }
+  return device.follows[0];
+}
+
+TEST(TissueMotion, HowFarHeldTissueFollowsIsSeenFromItsSteps) {
+  EXPECT_NEAR(followedAfter(0.9, 0.5, 0), 0.5, 1e-12);  // by its give
+  EXPECT_NEAR(followedAfter(0.9, 0.5, 40), 0.9, 1e-3);
+  EXPECT_NEAR(followedAfter(0.9, 0, 40), 0.9, 1e-3);
+  EXPECT_NEAR(followedAfter(0.3, 0.5, 40), 0.5, 1e-12);  // not less than what it gives at once
+  EXPECT_NEAR(followedAfter(1.2, 0.5, 40), 1, 1e-12);    // nor beyond the device
 }
 
 // The other nodes beyond the neighbours, and the spheres, stand still.
