@@ -33,10 +33,12 @@ struct Tool {
   Vector3d lastFelt = Vector3d::Zero();  // unit; along which it was felt
   double largestPush = 0;                // N, of the coupling's spring during this contact
   DeviceMotion motion;                   // in this contact or grip
-  std::optional<Vector3d> pathEnd;       // m, of the device's path as handed over since the frame began
-  double estimate = 0;                   // N, of the push at the last tick, before it was kept to the tissue's
-  double springScale = 1;                // of the springs handed over: less than 1 beyond forceMax
-  int ticks = 0;                         // in this frame
+  // N, by how much the tissue's force changed over the frame up to the surface's `to`, and up to its `from`.
+  std::array<double, 2> change{};
+  std::optional<Vector3d> pathEnd;  // m, of the device's path as handed over since the frame began
+  double estimate = 0;              // N, of the force at the last tick, before it was kept to the tissue's
+  double springScale = 1;           // of the springs handed over: less than 1 beyond forceMax
+  int ticks = 0;                    // in this frame
   bool isLeaving = false;
 };
 }  // namespace
@@ -95,14 +97,18 @@ static std::span<const ProxyContact> touchedContacts(const Tool& tool) {
   return proxy.inContact() ? std::span(proxy.contacts).first(proxy.contactCount) : std::span(&tool.lastContact, 1);
 }
 
+// N, on the tissue, as the dynamics had it; to be asked only where it is known.
+static Vector3d givenForce(const BlendedSurface& surface, double alpha, const Tool& tool) {
+  return blendPoint(surface.toolForce[1][tool.index], surface.toolForce[0][tool.index], alpha);
+}
+
 // A push, as far as the dynamics can have it by now: what the tissue gave some frames ago, give or take what it can
 // have changed since. Where a stiff tool meets limp tissue, a place that is off by a tenth of a millimetre is several
 // times the force.
 static double keptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal,
                            const TissueMotion& tissue, const Tool& tool, double push) {
   if (surface.toolForce[0].empty()) return push;
-  const Vector3d force = blendPoint(surface.toolForce[1][tool.index], surface.toolForce[0][tool.index], alpha);
-  const double given = std::max(0.0, -force.dot(normal));
+  const double given = std::max(0.0, -givenForce(surface, alpha, tool).dot(normal));
   const double since = pushSince(surface, alpha, tissue, normal, tool.settings, tool.motion);
   return std::clamp(push, std::max(0.0, given - since), given + since);
 }
@@ -148,6 +154,16 @@ static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Too
   };
   return tool.settings.stiffness * meanOverHeld(tool.grip, gap) +
          motionForce(tool, heldMotion(surface, alpha, tool.grip, tool.motion));
+}
+
+// The same for what a grip feels, in all directions.
+static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const Tool& tool, const Vector3d& force) {
+  if (surface.toolForce[0].empty()) return force;
+  const double change = (1 - alpha) * tool.change[1] + alpha * tool.change[0];
+  const double since = heldSince(surface, alpha, change, tool.settings, tool.motion);
+  const Vector3d given = -givenForce(surface, alpha, tool), beyond = force - given;
+  const double size = beyond.norm();
+  return size > since ? Vector3d(given + since / size * beyond) : force;
 }
 
 // In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
@@ -206,8 +222,8 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
 static bool feelGrip(const BlendedSurface& surface, double alpha, const Vector3d& way, Tool& tool, ToolState& state) {
   if (tool.grip.held.empty()) return false;
   tool.motion.way[0] += way;
-  tool.estimate = 0;
-  const Vector3d force = heldForce(surface, alpha, tool);
+  const Vector3d estimate = heldForce(surface, alpha, tool), force = keptToTissue(surface, alpha, tool, estimate);
+  tool.estimate = estimate.norm();
   if (std::min(force.norm(), tool.settings.forceMax) > tool.settings.gripForceMax) {
     letSlip(tool.grip);
     tool.isLeaving = false;
@@ -251,6 +267,8 @@ static void startFrame(const BlendedSurface& surface, double tickDuration, Tool&
   startFrame(holds && tool.pathEnd ? Vector3d(tool.device.position - *tool.pathEnd) : Vector3d::Zero(), tool.motion);
   if (holds) learnFollowing(surface, tool.grip, tool.motion);
   tool.pathEnd.reset();
+  const auto& given = surface.toolForce;
+  tool.change = {given[0].empty() ? 0 : (given[0][tool.index] - given[1][tool.index]).norm(), tool.change[0]};
   fadePatch(std::exp(-tool.ticks * tickDuration / memory), tool.patch);
   tool.ticks = 0;
 }

@@ -64,6 +64,26 @@ Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyCon
   return blendPoint(meanOver(surface, contact, surface.steps[1]), meanOver(surface, contact, surface.steps[0]), alpha);
 }
 
+Vector3d heldStep(const BlendedSurface& surface, const Grip& grip, int framesAgo) {
+  return meanOverHeld(grip, [&](const HeldOffset& held) { return surface.steps[framesAgo][held.node]; });
+}
+
+double heldFollows(const DeviceMotion& device, double alpha) {
+  return (1 - alpha) * device.follows[1] + alpha * device.follows[0];
+}
+
+// m, of the device over the last `frames`, as the sum of `size` of its ways in them.
+template <class Size>
+double wayOver(double frames, double alpha, const DeviceMotion& device, const Size& size) {
+  double sum = 0;
+  for (std::size_t k = 0; frames > 0 && k < device.way.size(); ++k) {
+    const double within = std::min(frames, k == 0 ? alpha : 1.0);
+    sum += (k == 0 ? 1 : within) * size(device.way[k]);
+    frames -= within;
+  }
+  return sum;
+}
+
 }  // namespace
 
 void beginContact(const BlendedSurface& surface, double alpha, const ProxyContact& contact, const Vector3d& normal,
@@ -74,10 +94,6 @@ void beginContact(const BlendedSurface& surface, double alpha, const ProxyContac
   for (int k = 0; k < 3; ++k)
     device.way[k + 1] = normal.dot(meanOver(surface, contact, surface.steps[k])) / part * normal;
   device.way[0] = device.early = wayOfStep(device, alpha) - (1 - alpha) * device.way[1];
-}
-
-static Vector3d heldStep(const BlendedSurface& surface, const Grip& grip, int framesAgo) {
-  return meanOverHeld(grip, [&](const HeldOffset& held) { return surface.steps[framesAgo][held.node]; });
 }
 
 void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness, DeviceMotion& device) {
@@ -119,19 +135,22 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
 
 double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Vector3d& normal,
                  const ToolSettings& tool, const DeviceMotion& device) {
-  double way = 0, frames = surface.toolForceAge;  // of the device
-  for (std::size_t k = 0; frames > 0 && k < device.way.size(); ++k) {
-    const double within = std::min(frames, k == 0 ? alpha : 1.0);
-    way += (k == 0 ? 1 : within) * std::abs(normal.dot(device.way[k]));
-    frames -= within;
-  }
-  const double longer = std::max(way, surface.toolForceAge * std::abs(normal.dot(tissue.step)));
-  return (1 - tissue.followed) * (tool.stiffness * longer + tool.damping * std::abs(normal.dot(device.velocity)));
+  const auto along = [&](const Vector3d& v) { return std::abs(normal.dot(v)); };
+  const double way = wayOver(surface.toolForceAge, alpha, device, along);
+  const double longer = std::max(way, surface.toolForceAge * along(tissue.step));
+  return (1 - tissue.followed) * (tool.stiffness * longer + tool.damping * along(device.velocity));
+}
+
+double heldSince(const BlendedSurface& surface, double alpha, double changePerFrame, const ToolSettings& tool,
+                 const DeviceMotion& device) {
+  const double way = wayOver(surface.toolForceAge, alpha, device, [](const Vector3d& v) { return v.norm(); });
+  return 2 * surface.toolForceAge * changePerFrame +
+         (1 - heldFollows(device, alpha)) * (tool.stiffness * way + tool.damping * device.velocity.norm());
 }
 
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, const DeviceMotion& device) {
   if (!(surface.duration > 0)) return {};
-  const double part = (1 - alpha) * device.follows[1] + alpha * device.follows[0];
+  const double part = heldFollows(device, alpha);
   const Vector3d beyond = latestWay(device, alpha) - wayOfLead(device, alpha);
   const Vector3d faster = device.velocity - wayOfStep(device, alpha) / surface.duration;
   const Vector3d lead = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeLead(h.node, alpha); });

@@ -64,6 +64,11 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
 double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Eigen::Vector3d& normal,
                  const ToolSettings& tool, const DeviceMotion& device);
 
+// N: likewise of a grip's force, which tissue lately changed by `changePerFrame` (N). What a body that follows all the
+// way can change by beyond twice that, neither way nor stiffness tells.
+double heldSince(const BlendedSurface& surface, double alpha, double changePerFrame, const ToolSettings& tool,
+                 const DeviceMotion& device);
+
 // Mean over what a grip holds.
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, const DeviceMotion& device);
 
