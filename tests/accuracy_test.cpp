@@ -143,7 +143,7 @@ INSTANTIATE_TEST_SUITE_P(
         StaticCase{"cylinder_torsion", 7, 1.45, 0.52, 0.1}, StaticCase{"cylinder_poke_small", 7, 26, 4.7, 0.2},
         StaticCase{"cylinder_poke_large", 7, 28.5, 8.3, 0.5}, StaticCase{"gallbladder_tip", 7, 3.5, 1.7, 0.1},
         StaticCase{"gallbladder_tip_large", 7, 2.9, 1.4, 0.1}, StaticCase{"gallbladder_mid", 7, 3.3, 1.5, 0.1},
-        StaticCase{"gallbladder_axial", 7, 8.8, 3.5, 0.8}, StaticCase{"gallbladder_torsion", 7, 11.5, 3.3, 0.1},
+        StaticCase{"gallbladder_axial", 7, 8.81, 3.5, 0.8}, StaticCase{"gallbladder_torsion", 7, 11.5, 3.3, 0.1},
         StaticCase{"gallbladder_poke_small", 7, 51.2, 10, 0.2}, StaticCase{"gallbladder_poke_large", 7, 33, 18.7, 0.5},
         StaticCase{"liver_tip", 35, 14.1, 6.4, 0.1}, StaticCase{"cylinder_tip_large", 25, 3.6, 1.8, 0.1},
         StaticCase{"gallbladder_tip_large", 25, 6, 3, 0.2}, StaticCase{"liver_tip_in_plane", 35, 16.4, 9.7, 0.2},
