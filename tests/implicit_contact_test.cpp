@@ -112,6 +112,18 @@ TEST(ImplicitContact, AStackStays) {
   }
 }
 
+TEST(ImplicitContact, AThrownHeapComesToRest) {
+  for (const int order : {1, 2}) {
+    std::vector<BodyDescription> bodies;
+    for (int k = 0; k < 4; ++k)
+      bodies.push_back(raft("raft " + std::to_string(k), {0.01 * k, 0.03 + 0.03 * k, 0.007 * k}, 0.5));
+    World world(contactSettings(order), bodies, {floorOf(0.5)});
+    for (int k = 0; k < 4; ++k) throwBody(world, k, {0.6 - 0.3 * k, -0.5 * k, 0.2 * k});
+    run(world, 4);
+    EXPECT_LT(world.energies().kinetic, 1e-15) << "order " << order;
+  }
+}
+
 // A tissue's contact is damped critically: restitution 0.05. What comes back is asked for after whatever part of a step
 // the touch falls into.
 TEST(ImplicitContact, NothingBouncesHigh) {
@@ -128,6 +140,24 @@ TEST(ImplicitContact, NothingBouncesHigh) {
       EXPECT_LT(std::sqrt(2 * kGravity * highest), 0.3 * speed) << "order " << order << ", from " << height;
       EXPECT_NEAR(placeOf(world, 0).y(), 0.03, 1e-3) << "order " << order << ", from " << height;
     }
+  }
+}
+
+// A ball whose mass lies beside its centre rolls to and fro: contact's lever turns with it.
+TEST(ImplicitContact, RollingGainsNoEnergy) {
+  auto model = ballModel({{{0, 0, 0}, 0.03}});
+  model->spheres[0].restFrame = {0.006, 0, 0};
+  WorldSettings settings = contactSettings(1);
+  settings.frameDuration = 0.005;
+  settings.substeps = 1;
+  World world(settings, {ballBody("ball", model, {0, 0.03, 0}, 0.5)}, {floorOf(0.5)});
+  throwBody(world, 0, {0.2, 0, 0});
+  run(world, 0.5);
+  double least = energyOf(world);
+  for (int k = 0; k < 600; ++k) {
+    world.advance({});
+    EXPECT_LT(energyOf(world), least + 1e-3 * world.energies().kinetic);
+    least = std::min(least, energyOf(world));
   }
 }
 

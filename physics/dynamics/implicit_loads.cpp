@@ -50,15 +50,26 @@ void addRows(ImplicitData& s, bool isContact, std::size_t index, const Vector3d&
   s.loads.push_back(load);
 }
 
+// From the sphere's frame to its ball's centre, the mean of the stage's start and the present state: what a turning arm
+// adds to a way is its rate there times the duration, to third order, and its work is that of the gap that it opens.
+Quad meanArm(const WorldData& d, std::uint32_t sphere) {
+  const Vector3d now = quaternionOf(d.spheres.orientation[sphere]) * vectorOf(d.contact.restBall[sphere]);
+  return quadOf(0.5 * (now + vectorOf(d.contact.arm[sphere])));
+}
+
 void addContactRows(const WorldData& d, ImplicitData& s, std::size_t index) {
   const Contact& c = d.contact.contacts[index];
   const Vector3d normal(c.normal[0], c.normal[1], c.normal[2]);
+  std::array<Vector3d, 4> levers;
+  for (int e = 0; e < c.ends; ++e) {
+    Quad lever;
+    store(lever, leverOf(meanArm(d, c.sphere[e]), c, e));
+    levers[e] = vectorOf(lever);
+  }
   addRows(s, true, index, normal, [&](const Vector3d& axis) {
     for (int e = 0; e < c.ends; ++e) {
-      const Lanes arm = leverOf(d.contact.arm[c.sphere[e]], c, e);
-      const Vector3d lever(arm[0], arm[1], arm[2]);
       addTerm(s, 2 * static_cast<int>(c.sphere[e]), c.weight[e] * axis);
-      addTerm(s, 2 * static_cast<int>(c.sphere[e]) + 1, c.weight[e] * lever.cross(axis));
+      addTerm(s, 2 * static_cast<int>(c.sphere[e]) + 1, c.weight[e] * levers[e].cross(axis));
     }
   });
 }
