@@ -205,7 +205,7 @@ double leastResidual(const ImplicitData& s) {
 bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   constexpr int kIterations = 20;
   constexpr double kSolved = 0.03, kNear = 0.3;
-  const double share = d.settings.order == 2 ? 1e-6 : 1e-3;
+  const double share = s.duration < d.substep ? 1e-6 : 1e-3;  // of two stages, or one
   if (d.contact.mode != ContactMode::none) {
     findContacts(d);
     recallFriction(d, s);
