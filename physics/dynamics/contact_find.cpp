@@ -84,6 +84,7 @@ void findContacts(WorldData& d) {
 // that at most before they are, which neither a centre nor the middle of what is thin passes.
 bool outrunsContact(const WorldData& d, double time) {
   const ContactData& c = d.contact;
+  if (c.mode == ContactMode::none) return false;
   const double half = 0.5 * contactReach(d);
   for (std::size_t i = 0; i < c.ball.size(); ++i) {
     if (c.inverseCellMass[i] == 0) continue;

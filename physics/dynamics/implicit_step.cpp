@@ -375,6 +375,7 @@ Ending attempt(WorldData& d, ImplicitData& s, std::size_t halvings, const Loads&
 // twentieth, or folded to 180 degrees): it moves without speed, as long as it has no more energy than it has ever had,
 // or stays. Likewise frames that were a whole turn apart are so no longer.
 void creep(WorldData& d, const ImplicitData& s) {
+  notePenetration(d.contact);
   d.contact.held.clear();
   if (!(elasticEnergy(d) <= d.mostEnergy)) restore(d, s.before);
   slowDown(d, 0);
@@ -396,18 +397,15 @@ void advanceByHalves(WorldData& d, std::size_t halvings, const Loads& loads, con
   d.substep = 2 * half;
 }
 
-bool isTooFast(WorldData& d) {
-  if (d.contact.mode == ContactMode::none) return false;
-  placeBalls(d);
-  return outrunsContact(d, d.substep);
-}
-
 // One step of d.substep; where it fails, two of half of it; where these are the shortest, one of backward Euler's,
-// which damps what order 2 would follow. So does a step in which contacts push: an impulse that stops a ball within the
-// first stage is none that lasts, and led on into the second one it would throw the ball back faster than it came.
+// which damps what order 2 would follow. A step in which contacts push is one of backward Euler's too: an impulse that
+// stops a ball within the first stage does not last, and led on into the second one it throws the ball back faster than
+// it came.
 void advanceBy(WorldData& d, Part part, const Loads& loads, const StepTime& time, std::vector<Vector3d>& toolImpulse) {
   const bool deepest = part.halvings == kDeepest;
-  if (!deepest && !part.oneStage && isTooFast(d)) return advanceByHalves(d, part.halvings, loads, time, toolImpulse);
+  if (d.contact.mode != ContactMode::none) placeBalls(d);
+  if (!deepest && !part.oneStage && outrunsContact(d, d.substep))
+    return advanceByHalves(d, part.halvings, loads, time, toolImpulse);
   part.oneStage = part.oneStage || d.settings.order == 1 || !d.contact.held.empty();
   ImplicitData& s = dataOf(d, part);
   beginHere(d, s.before);
