@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include "physics/dynamics/node_motion.h"
+#include "physics/dynamics/stages.h"
 #include "tests/dynamics_states.h"
+#include "tests/identified_model.h"
 #include "tests/synthetic_model.h"
 
 // Tools on the surface: what they give the body is what they report.
@@ -118,6 +121,42 @@ TEST(DeadLoads, AFreeBodyGainsTheirForceAndMomentInOneSubstep) {
     EXPECT_LT((gained.linear - h * force).norm(), 1e-12 * h * force.norm());
     EXPECT_LT((gained.angular - h * moment).norm(), 1e-9 * h * moment.norm());
     EXPECT_GT(moment.norm(), 1e-5);
+  }
+}
+
+// All of a host's at once are what each of them would be alone, by the transpose of its node's velocity; of a body that
+// has moved, on links, spheres and frames.
+TEST(DeadLoads, ASkinGivesEachOfThemToItsSpheres) {
+  for (const LinkModel links : {LinkModel::springs, LinkModel::beam, LinkModel::identified}) {
+    BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
+    if (links == LinkModel::identified)
+      b = synthetic::identifiedBody(synthetic::withNetwork(*b.model, {.held = {0, 1, 2}, .uneven = 0.1}), 6e3);
+    b.links = links;
+    b.surface = SurfaceMode::skin;
+    Random random(5);
+    for (std::size_t i = 0; i < b.model->restNodes.size(); i += 3)
+      b.deadLoads.push_back({static_cast<int>(i), 0.01 * random.vector(), 0, 0.04});
+    b.deadLoads.push_back({3, {0.01, 0.02, 0}, 0, 0});  // a second one on its node
+    World world(WorldSettings{}, {b});
+    world.advance({});
+    WorldData& d = world.data();
+    runStage(d, evaluateForces);
+    const std::vector<Quad> velocity = d.spheres.velocity, momentum = d.spheres.angularMomentum;
+    applyDeadLoads(d, 0.03);
+    std::vector<Vector3d> linear(d.spheres.count, Vector3d::Zero()), angular = linear;
+    for (const NodeForce& load : d.deadLoads) {
+      const HostPoint host = hostPoint(d, load.node);
+      for (int k = 0; k < host.count; ++k) {
+        linear[host.spheres[k]] += d.substep * shareAt(d, load, 0.03) * host.force[k] * load.force;
+        angular[host.spheres[k]] += d.substep * shareAt(d, load, 0.03) * host.torque[k] * load.force;
+      }
+    }
+    for (int i = 0; i < d.spheres.count; ++i) {
+      const Vector3d gained = vectorOf(d.spheres.velocity[i]) - vectorOf(velocity[i]);
+      EXPECT_LT((gained - d.spheres.groups[i / 4].inverseMass[i % 4] * linear[i]).norm(), 1e-9 * gained.norm());
+      const Vector3d turned = vectorOf(d.spheres.angularMomentum[i]) - vectorOf(momentum[i]);
+      EXPECT_LT((turned - angular[i]).norm(), 1e-9 * angular[i].norm());
+    }
   }
 }
 

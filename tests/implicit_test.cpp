@@ -112,6 +112,60 @@ TEST_P(ImplicitLinks, TheMatrixIsTheForcesDerivativeAtRest) {
   }
 }
 
+// An identified tube whose attachments are a hundred times as stiff along the normals as across, as of bodies whose
+// skin follows finite elements closely.
+static BodyDescription tubeStiffAlongNormals(double damping) {
+  BodyDescription b = tube(SurfaceMode::full, true, damping, LinkModel::identified);
+  auto model = std::make_shared<SoftBodyModel>(*b.model);
+  auto network = std::make_shared<IdentifiedNetwork>(*model->identified);
+  network->layer.normal = 100 * network->layer.tangential;
+  model->identified = network;
+  b.model = model;
+  return b;
+}
+
+// Preconditioned by what nodes are held with along their normals, too, whatever damping makes of it.
+TEST(Implicit, NormalsStifferThanAllElseCostFewIterations) {
+  for (const double damping : {0.1, 1.0, 3.0}) {
+    WorldSettings settings = implicitly(0.005, 1, {0, -9.81, 0});
+    World world(settings, {tubeStiffAlongNormals(damping)});
+    run(world, 0.5);
+    const ImplicitData& s = *world.data().implicit.at(0);
+    EXPECT_GE(s.solves, 100);
+    EXPECT_LE(static_cast<double>(s.iterations), 6 * static_cast<double>(s.solves)) << damping;
+  }
+}
+
+// What spheres feel of the masses that hang on frames, pairs of frames included: as much as these have, carried along.
+TEST(Implicit, MassesOnFramesAreThoseOfTheCarriedNodes) {
+  World world(implicitly(0.005), {tubeStiffAlongNormals(0.3)});
+  world.advance({});  // lays everything out; nothing moves
+  WorldData& d = world.data();
+  ImplicitData& s = *d.implicit.at(0);
+  runStage(d, evaluateForces);
+  s.lumped.assign(s.lumped.size(), Block6::Zero());
+  s.lumpedBeside.assign(s.lumpedBeside.size(), Block6::Zero());
+  addMassOnFrames(d, s);
+  Random random(3);
+  Motion x(s.freedom.size());
+  for (Quad& q : x) q = quadOf(random.vector());
+  carryMotion(d, x, s.carried);
+  double ofNodes = 0, ofBlocks = 0;
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
+    const Vector3d v = vectorOf(s.carried[i]);
+    const double along = v.dot(vectorAt(d.nodes.area, i));
+    ofNodes += s.carriedMass[i] * v.squaredNorm() + s.carriedNormal[i] * along * along;
+  }
+  const auto motionOf = [&](int i) { return (Vector6() << vectorOf(x[2 * i]), vectorOf(x[2 * i + 1])).finished(); };
+  for (int i = 0; i < d.spheres.count; ++i) ofBlocks += motionOf(i).dot(s.lumped[i] * motionOf(i));
+  for (std::size_t k = 0; k < s.pairs.size(); ++k) {
+    const auto [i, j] = s.pairs[k];
+    if (j >= 0) ofBlocks += 2 * motionOf(i).dot(s.lumpedBeside[k] * motionOf(j));
+  }
+  EXPECT_NEAR(ofBlocks, ofNodes, 1e-6 * ofNodes);
+  EXPECT_GT(s.lumpedBeside.back().norm(), 0);
+}
+
 TEST_P(ImplicitLinks, RestsWhereTheExplicitStepRests) {
   for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
     BodyDescription body = tube(surface, true, 1, GetParam());

@@ -6,6 +6,7 @@
 #include "physics/model/ball_choice.h"
 #include "physics/model/build.h"
 #include "physics/model/build_report.h"
+#include "physics/model/identify/necks.h"
 #include "physics/model/link_sections.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
@@ -94,6 +95,42 @@ TEST(LinkSections, StraightTubeGivesItsBeam) {
     EXPECT_NEAR(link.restU.norm(), 1, 1e-12);
     EXPECT_NEAR(link.restU.dot(line.normalized()), 0, 1e-12);
   }
+}
+
+// Two blocks and a bar between them with less than a hundredth of their section.
+static TriangleMesh dumbbell(double neckRadius) {
+  TriangleMesh mesh = cylinderMesh(0.08, 1, 24, 80);
+  for (Vector3d& x : mesh.vertices) {
+    const bool inNeck = x.x() > 0.0305 && x.x() < 0.0495;
+    x.tail<2>() *= inNeck ? neckRadius : 0.015;
+  }
+  return mesh;
+}
+
+TEST(LinkSections, ANeckIsNoGap) {
+  const double radius = 0.0008, pi = 3.14159265358979;
+  BuildSettings settings;
+  settings.spheres = 2;
+  BuildReport report;
+  const SoftBodyModel model = build(dumbbell(radius), settings, report);
+  ASSERT_EQ(model.links.size(), 1u);
+  double least = 1;
+  for (const LinkSection& s : model.links[0].sections) least = std::min(least, s.area);
+  EXPECT_NEAR(least / (pi * radius * radius), 1, 0.1);
+}
+
+TEST(Necks, TheNarrowestIsFoundWhereItIs) {
+  for (const double radius : {0.0008, 0.002, 0.003}) {
+    const auto neck = narrowestNeck(dumbbell(radius), 0.0066, 0.02);
+    ASSERT_TRUE(neck.has_value()) << radius;
+    EXPECT_NEAR(neck->width / (2 * radius), 1, 0.1);
+    EXPECT_GT(neck->place.x(), 0.03);
+    EXPECT_LT(neck->place.x(), 0.05);
+    EXPECT_LT(neck->place.tail<2>().norm(), radius);
+  }
+  EXPECT_FALSE(narrowestNeck(dumbbell(0.004), 0.0066, 0.02).has_value());
+  EXPECT_FALSE(narrowestNeck(dumbbell(0.002), 0.0066, 0.6).has_value());  // no part is as large
+  EXPECT_FALSE(narrowestNeck(cylinderMesh(0.1, 0.01, 24, 20), 0.0066, 0.02).has_value());
 }
 
 TEST(BuildReportTest, ConeOfTwoBalls) {

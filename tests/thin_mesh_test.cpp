@@ -59,10 +59,16 @@ TEST(ThinMesh, ANeckThatAsksForMoreFiniteElementsThanMemoryHoldsIsRefusedWithIts
 }
 
 // So short that no station of a link lies in it.
+// Which several links pass, aslant: none of their sections is as narrow.
+TEST(ThinMesh, ANeckThatNoLinkMeasuresIsRefusedWithItsPlace) {
+  expectRefused([](double x) { return std::abs(x - 60) < 8 ? 1 : 20; },
+                {"expected at most ", "too thin for its size: the neck of "}, 0.06);
+}
+
 TEST(ThinMesh, AHairThinNeckIsRefusedWithItsPlace) {
   for (const double neck : {0.3, 0.1})
     expectRefused([&](double x) { return lobes(x, neck, 8); },
-                  {"too thin near (", "the neck of 0.", "is lost among finite elements"}, 0.06);
+                  {"finite elements of 0.", "too thin for its size: the neck of 0."}, 0.06);
 }
 
 // What hangs on a neck and is less than a fiftieth of the body asks for no smaller elements: it moves with the neck,

@@ -1,11 +1,8 @@
 #include "physics/dynamics/loads.h"
 
-#include <fmt/format.h>
-
 #include <cassert>
 #include <cmath>
 #include <cstddef>
-#include <stdexcept>
 
 #include "physics/dynamics/anchor.h"
 #include "physics/dynamics/node_motion.h"
@@ -159,50 +156,6 @@ PointSpring pointSpring(const WorldData& d, const Loads& loads, std::size_t k, d
     p.damping = held.damping;
   }
   return p;
-}
-
-std::vector<DeadLoad> spreadLoad(const SoftBodyModel& model, const std::vector<int>& nodes, const DeadLoad& whole) {
-  double area = 0;
-  for (const int node : nodes) area += model.attachments[node].area;
-  std::vector<DeadLoad> out;
-  for (const int node : nodes) {
-    out.push_back(whole);
-    out.back().node = node;
-    out.back().force *= model.attachments[node].area / area;
-  }
-  return out;
-}
-
-void layOutDeadLoads(WorldData& d) {
-  for (std::size_t b = 0; b < d.bodies.size(); ++b) {
-    const std::vector<int>& node = d.ranges[b].node;
-    for (const DeadLoad& load : d.bodies[b].deadLoads) {
-      const auto require = [&](bool condition, const std::string& message) {
-        if (!condition)
-          throw std::runtime_error(fmt::format("body '{}' cannot be simulated: {}", d.bodies[b].name, message));
-      };
-      require(load.node >= 0 && load.node < static_cast<int>(node.size()),
-              fmt::format("it loads node {}: expected 0 to {}", load.node, node.size() - 1));
-      require(load.force.allFinite(), fmt::format("the load on its node {} is not finite", load.node));
-      require(std::isfinite(load.from) && std::isfinite(load.to) && load.from <= load.to,
-              fmt::format("the load on its node {} grows from {} s to {} s: expected the earlier time first", load.node,
-                          load.from, load.to));
-      d.deadLoads.push_back({node[load.node], load.force, load.from, load.to});
-    }
-  }
-}
-
-double shareAt(const WorldData& d, const NodeForce& load, double time) {
-  if (d.frame < 0 || time < load.from) return 0;
-  return time < load.to ? (time - load.from) / (load.to - load.from) : 1;
-}
-
-// A constant force bounds no step: explicit, and by the same way to the hosts of a skin as the tools' forces.
-void applyDeadLoads(WorldData& d, double time) {
-  for (const NodeForce& load : d.deadLoads) {
-    const double share = shareAt(d, load, time);
-    if (share > 0) addNodeImpulse(d, load.node, hostPoint(d, load.node), d.substep * share * load.force);
-  }
 }
 
 void applyLoads(WorldData& d, const Loads& loads, double remaining, std::vector<Vector3d>& toolImpulse) {

@@ -25,7 +25,7 @@ void sumSphereForces(WorldData&, const Batch&);  // spheres.cpp
 void dampBodies(WorldData&, const Batch&);      // body_damping.cpp: Rayleigh's alpha
 void dragVelocities(WorldData&, const Batch&);  // driven.cpp: the medium's resistance
 void stepVelocities(WorldData&, const Batch&);  // spheres and nodes
-// loads.cpp: dead loads as they are at `time`, the substep's end (s).
+// dead_loads.cpp: as they are at `time`, the substep's end (s).
 void applyDeadLoads(WorldData&, double time);
 // How much of such a load acts at `time` (s), 0 to 1: none while bodies settle.
 double shareAt(const WorldData&, const NodeForce& load, double time);
@@ -74,7 +74,7 @@ inline void runStage(WorldData& d, Stage stage) {
   for (const Batch& batch : d.awake.batches) stage(d, batch);
 }
 
-// loads.cpp: the bodies' dead loads into WorldData::deadLoads. Throws std::runtime_error naming the body where one is
+// dead_loads.cpp: the bodies' into WorldData::deadLoads. Throws std::runtime_error naming the body where one is
 // on no node, not finite, or ends before it begins.
 void layOutDeadLoads(WorldData&);
 

@@ -308,6 +308,22 @@ struct NodeForce {
   double from = 0, to = 0;                          // s
 };
 
+// Dead loads on skins, by what carries these: an explicit substep gives them to the spheres host by host.
+struct LoadedGroup {
+  int group;     // of four nodes
+  Lanes3 force;  // N, at present
+};
+struct LoadedHost {
+  enum class Kind { frames, link, sphere } kind;
+  int host;        // in Identified::hosts, or link, or sphere
+  int first, end;  // in SkinLoads::groups
+};
+struct SkinLoads {
+  std::vector<LoadedGroup> groups;
+  std::vector<LoadedHost> hosts;
+  std::vector<int> groupOfLoad;  // per dead load: in `groups`; -1 of nodes with masses
+};
+
 struct ImplicitData;  // implicit_data.h
 
 struct WorldData {
@@ -327,6 +343,7 @@ struct WorldData {
   Awake awake;
   std::vector<SphereDrive> drives;
   std::vector<NodeForce> deadLoads;  // body after body, as described
+  SkinLoads skinLoads;
   ContactData contact;
   std::vector<std::shared_ptr<ImplicitData>> implicit;  // per halving of the step; made when it is first needed
   double mostEnergy = 0;  // J, kinetic and elastic, at the beginning of any implicit step so far
