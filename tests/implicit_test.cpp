@@ -112,8 +112,8 @@ TEST_P(ImplicitLinks, TheMatrixIsTheForcesDerivativeAtRest) {
   }
 }
 
-// An identified tube whose attachments are a hundred times as stiff along the normals as across, as of bodies whose
-// skin follows finite elements closely.
+// An identified tube whose attachments are a hundred times as stiff along the normals as across.
+
 static BodyDescription tubeStiffAlongNormals(double damping) {
   BodyDescription b = tube(SurfaceMode::full, true, damping, LinkModel::identified);
   auto model = std::make_shared<SoftBodyModel>(*b.model);

@@ -20,22 +20,26 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Rows3x6 = Eigen::Matrix<double, 3, 6>;
 
-// The motion of a point at `arm`: (v + omega x arm, omega) = X (v, omega). These are m X and X^T m.
+// m X, where X is the motion of what `arm` carries: (v, omega) -> (v + omega x arm, omega).
 Block6 timesLever(const Block6& m, const Vector3d& arm) {
   Block6 out = m;
-  out.rightCols<3>().noalias() -= m.leftCols<3>() * crossMatrix(arm);
-  return out;
-}
-Block6 leverTimes(const Vector3d& arm, const Block6& m) {
-  Block6 out = m;
-  out.bottomRows<3>().noalias() += crossMatrix(arm) * m.topRows<3>();
+  for (int j = 0; j < 3; ++j) {
+    const int next = (j + 1) % 3, last = (j + 2) % 3;
+    const Six with = fma(splat(-arm[last]), loadSix(m.col(next).data()), loadSix(m.col(3 + j).data()));
+    storeSix(out.col(3 + j).data(), fma(splat(arm[next]), loadSix(m.col(last).data()), with));
+  }
   return out;
 }
 
-Block6 rotated(const Matrix3d& r, const Block6& m) {
+// m with each three columns times R^T.
+Block6 timesTurn(const Block6& m, const Matrix3d& r) {
   Block6 out;
-  for (int i = 0; i < 6; i += 3)
-    for (int j = 0; j < 6; j += 3) out.block<3, 3>(i, j) = r * m.block<3, 3>(i, j) * r.transpose();
+  for (int j = 0; j < 6; ++j) {
+    const int first = j - j % 3;
+    Six sum = splatSix(0);
+    for (int i = 0; i < 3; ++i) sum = fma(splat(r(j % 3, i)), loadSix(m.col(first + i).data()), sum);
+    storeSix(out.col(j).data(), sum);
+  }
   return out;
 }
 
@@ -93,7 +97,7 @@ void layOutHost(const WorldData& d, const HostRange& range, PairNumbers& pairs, 
   }
   out.end = static_cast<int>(s.carriedBlocks.size());
   s.carriedHosts.push_back(out);
-  s.homeRow.resize(std::max<std::size_t>(s.homeRow.size(), 1 + 4 * (host.endTerms - host.firstTerms)));
+  s.homeColumn.resize(std::max<std::size_t>(s.homeColumn.size(), 1 + 4 * (host.endTerms - host.firstTerms)));
 }
 
 // The host's frames as they stand, in its home frame.
@@ -104,7 +108,8 @@ class PlacedFrames {
   Vector3d place(int term) const { return vectorOf(s_->termStates[host_->firstTerms + term / 4].place, term % 4); }
   // Block of the spheres' own motions, in the world's frame.
   Block6 ofSpheres(const CarriedBlock& b, const Block6& ofFrames) const {
-    return rotated(rotation_, leverTimes(arm(b.term0), timesLever(ofFrames, arm(b.term1))));
+    const Block6 right = timesTurn(timesLever(ofFrames, arm(b.term1)), rotation_).transpose();
+    return timesTurn(timesLever(right, arm(b.term0)), rotation_).transpose();
   }
 
  private:
@@ -139,28 +144,29 @@ void layOutMassOnFrames(const WorldData& d, ImplicitData& s) {
     if (range.onFrames) layOutHost(d, range, pairs, s);
 }
 
-// With B the constant sums and X_k the levers of the places: between frames j and k B_jk, home's row
-//   C_k = B_0k - sum X_j^T B_jk,   and of home itself B_00 - sum X_j^T B_j0 - sum C_k X_k.
+// With B the constant sums and X_k the levers of the places: between frames j and k B_jk, home's column
+//   C_k = B_k0 - sum B_kj X_j,   and of home itself B_00 - sum B_0j X_j - sum C_k^T X_k.
 void addMassOnFrames(const WorldData& d, ImplicitData& s) {
   for (const CarriedHost& h : s.carriedHosts) {
     const PlacedFrames frames(d.identified, d.identified.hosts[h.host]);
-    Block6* row = s.homeRow.data() + 1;  // by term, home before the first
-    std::fill(s.homeRow.begin(), s.homeRow.end(), Block6::Zero());
+    Block6* column = s.homeColumn.data() + 1;  // by term, home before the first
+    std::fill(s.homeColumn.begin(), s.homeColumn.end(), Block6::Zero());
     for (int k = h.first; k < h.end; ++k) {
       const CarriedBlock& b = s.carriedBlocks[k];
       if (b.term0 < 0) {
-        row[b.term1] += b.mass;
+        column[b.term1] += b.mass.transpose();
       } else {
-        row[b.term1] -= leverTimes(frames.place(b.term0), b.mass);
+        column[b.term1] -= timesLever(b.mass.transpose(), frames.place(b.term0));
         give(frames, b, b.mass, s);
       }
-      if (b.term0 != b.term1) row[b.term0] -= leverTimes(frames.place(b.term1), b.mass.transpose());
+      if (b.term0 != b.term1) column[b.term0] -= timesLever(b.mass, frames.place(b.term1));
     }
     for (int k = h.end - 1; k >= h.first; --k) {  // home's own block, the first, last
       const CarriedBlock& b = s.carriedBlocks[k];
       if (b.term0 >= 0) continue;
-      give(frames, b, row[b.term1], s);
-      if (b.term1 >= 0) row[-1] -= timesLever(row[b.term1], frames.place(b.term1));
+      const Block6 beside = column[b.term1].transpose();
+      give(frames, b, beside, s);
+      if (b.term1 >= 0) column[-1] -= timesLever(beside, frames.place(b.term1));
     }
   }
 }

@@ -85,7 +85,7 @@ struct ImplicitData {
   // Of the present iteration.
   std::vector<Block6> diagonal, beside;      // spheres and links alone, per sphere and per stiff pair
   std::vector<Block6> lumped, lumpedBeside;  // and with the surface's share in them; per pair
-  std::vector<Block6> homeRow;               // while one host's share is added
+  std::vector<Block6> homeColumn;            // while one host's share is added
   BlockCholesky spheres;                     // of the latter and of loads
   std::vector<Vector6> starRate;             // (N/m)^1/2, as starSphere
   std::vector<LoadRow> rows;

@@ -13,9 +13,10 @@
 //   | S + J^T G J   -J^T G |  spheres
 //   |   -G J         M + G |  nodes
 //
-// The preconditioner eliminates the nodes by the diagonal of M + G, and takes for what is left of J^T ... J the masses
-// that a node behind an attachment alone would have: exact but for the edges' springs, the pressure, and what
-// identified attachments are stiffer along the normal. Contacts and tools are rows of rank one on top; in the
+// The preconditioner eliminates the nodes by their own blocks of M + G, and takes for what is left of J^T ... J the
+// masses that a node behind an attachment alone would have: exact but for the edges' springs and the pressure. What
+// such a block D lacks of M + G, e say, weighs a motion of hosts and nodes alike by e^2 / D more than its mass: nothing
+// that is much stiffer than the rest may be left out. Contacts and tools are rows of rank one on top; in the
 // preconditioner a contact stands with its own spheres' blocks alone.
 namespace medulla {
 

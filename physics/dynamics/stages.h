@@ -74,8 +74,8 @@ inline void runStage(WorldData& d, Stage stage) {
   for (const Batch& batch : d.awake.batches) stage(d, batch);
 }
 
-// dead_loads.cpp: the bodies' into WorldData::deadLoads. Throws std::runtime_error naming the body where one is
-// on no node, not finite, or ends before it begins.
+// dead_loads.cpp: the bodies' into WorldData::deadLoads. Throws std::runtime_error naming the body where one is on no
+// node, not finite, or ends before it begins.
 void layOutDeadLoads(WorldData&);
 
 // carried_nodes.cpp: nodes of a skin, and others that do not move by themselves, to where they hang from their hosts;
