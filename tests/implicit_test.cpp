@@ -113,7 +113,6 @@ TEST_P(ImplicitLinks, TheMatrixIsTheForcesDerivativeAtRest) {
 }
 
 // An identified tube whose attachments are a hundred times as stiff along the normals as across.
-
 static BodyDescription tubeStiffAlongNormals(double damping) {
   BodyDescription b = tube(SurfaceMode::full, true, damping, LinkModel::identified);
   auto model = std::make_shared<SoftBodyModel>(*b.model);
@@ -132,7 +131,7 @@ TEST(Implicit, NormalsStifferThanAllElseCostFewIterations) {
     run(world, 0.5);
     const ImplicitData& s = *world.data().implicit.at(0);
     EXPECT_GE(s.solves, 100);
-    EXPECT_LE(static_cast<double>(s.iterations), 6 * static_cast<double>(s.solves)) << damping;
+    EXPECT_LE(static_cast<double>(s.iterations), 10 * static_cast<double>(s.solves)) << damping;
   }
 }
 
@@ -185,10 +184,11 @@ TEST_P(ImplicitLinks, RestsWhereTheExplicitStepRests) {
   }
 }
 
-// A bending tube, let go: errors against a far finer run shrink as the step and as its square.
+// A bending tube, let go: errors against a far finer run shrink as the step and as its square. It falls fast enough for
+// these to be far above what the iteration leaves, 1e-5 m/s2 or a tenth of a micrometre by then.
 TEST_P(ImplicitLinks, ConvergesWithItsOrder) {
   const auto end = [](double step, int order) {
-    auto world = std::make_unique<World>(implicitly(step, order, {0, -2, 0.5}),
+    auto world = std::make_unique<World>(implicitly(step, order, {0, -8, 2}),
                                          std::vector{tube(SurfaceMode::full, true, 0.3, GetParam())});
     run(*world, 0.16);
     return world;

@@ -116,7 +116,8 @@ TEST(LinkSections, ANeckIsNoGap) {
   ASSERT_EQ(model.links.size(), 1u);
   double least = 1;
   for (const LinkSection& s : model.links[0].sections) least = std::min(least, s.area);
-  EXPECT_NEAR(least / (pi * radius * radius), 1, 0.1);
+  EXPECT_GT(least, 0.75 * pi * radius * radius);  // less by the steepest taper: its blocks are beside it
+  EXPECT_LT(least, 1.02 * pi * radius * radius);
 }
 
 TEST(Necks, TheNarrowestIsFoundWhereItIs) {
