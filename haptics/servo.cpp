@@ -216,6 +216,10 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
   for (HeldOffset& held : grip.held) held.offset += toolFromWorld * surface.nodeLead(held.node, alpha);
   const Vector3d shift = (heldForce(surface, alpha, tool) - felt) / tool.settings.stiffness;
   for (HeldOffset& held : grip.held) held.offset += toolFromWorld * shift;
+  if (surface.toolForce[0].empty()) return;
+  // What the tissue gave is that of a contact still, and no bound before the grip's own has come.
+  const double off = (felt + givenForce(surface, alpha, tool)).norm();
+  for (double& change : tool.change) change = std::max(change, off);
 }
 
 // Whether the grip holds on, its force recorded.
