@@ -160,7 +160,7 @@ static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Too
 static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const Tool& tool, const Vector3d& force) {
   if (surface.toolForce[0].empty()) return force;
   const double change = (1 - alpha) * tool.change[1] + alpha * tool.change[0];
-  const double since = heldSince(surface, alpha, change, tool.settings, tool.motion);
+  const double since = heldSince(surface, alpha, tool.grip, change, tool.settings, tool.motion);
   const Vector3d given = -givenForce(surface, alpha, tool), beyond = force - given;
   const double size = beyond.norm();
   return size > since ? Vector3d(given + since / size * beyond) : force;

@@ -24,7 +24,7 @@ struct ToolState {
   // m, centre of the proxy sphere; while holding it rides on the held patch
   Eigen::Vector3d proxy = Eigen::Vector3d::Zero();
   // N, on the hand, clamped: stiffness (proxy + its shading - device) + damping, the push kept to what the tissue gave;
-  // while holding, the sum of the held nodes' springs
+  // while holding, the sum of the held nodes' springs, kept likewise
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   bool inContact = false;
   bool holding = false;

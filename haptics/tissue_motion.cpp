@@ -141,11 +141,13 @@ double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion
   return (1 - tissue.followed) * (tool.stiffness * longer + tool.damping * along(device.velocity));
 }
 
-double heldSince(const BlendedSurface& surface, double alpha, double changePerFrame, const ToolSettings& tool,
-                 const DeviceMotion& device) {
+double heldSince(const BlendedSurface& surface, double alpha, const Grip& grip, double changePerFrame,
+                 const ToolSettings& tool, const DeviceMotion& device) {
   const double way = wayOver(surface.toolForceAge, alpha, device, [](const Vector3d& v) { return v.norm(); });
+  const double step = blendPoint(heldStep(surface, grip, 1), heldStep(surface, grip, 0), alpha).norm();
+  const double longer = std::max(way, surface.toolForceAge * step);
   return 2 * surface.toolForceAge * changePerFrame +
-         (1 - heldFollows(device, alpha)) * (tool.stiffness * way + tool.damping * device.velocity.norm());
+         (1 - heldFollows(device, alpha)) * (tool.stiffness * longer + tool.damping * device.velocity.norm());
 }
 
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, const DeviceMotion& device) {

@@ -64,10 +64,10 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
 double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Eigen::Vector3d& normal,
                  const ToolSettings& tool, const DeviceMotion& device);
 
-// N: likewise of a grip's force, which tissue lately changed by `changePerFrame` (N). What a body that follows all the
-// way can change by beyond twice that, neither way nor stiffness tells.
-double heldSince(const BlendedSurface& surface, double alpha, double changePerFrame, const ToolSettings& tool,
-                 const DeviceMotion& device);
+// N: likewise of a grip's force, in any direction, and by twice what the tissue's force lately changed by in a frame,
+// `changePerFrame` (N): a body that follows all the way changes it by its mass alone, which no stiffness tells.
+double heldSince(const BlendedSurface& surface, double alpha, const Grip& grip, double changePerFrame,
+                 const ToolSettings& tool, const DeviceMotion& device);
 
 // Mean over what a grip holds.
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, const DeviceMotion& device);
