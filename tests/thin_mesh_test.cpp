@@ -58,13 +58,13 @@ TEST(ThinMesh, ANeckThatAsksForMoreFiniteElementsThanMemoryHoldsIsRefusedWithIts
       0.06);
 }
 
-// So short that no station of a link lies in it.
-// Which several links pass, aslant: none of their sections is as narrow.
-TEST(ThinMesh, ANeckThatNoLinkMeasuresIsRefusedWithItsPlace) {
-  expectRefused([](double x) { return std::abs(x - 60) < 8 ? 1 : 20; },
+// Of less than a hundredth of the section beside it: no gap that its neighbours' sections fill.
+TEST(ThinMesh, AWaistIsRefusedWithItsPlace) {
+  expectRefused([](double x) { return std::abs(x - 60) < 4 ? 1 : 20; },
                 {"expected at most ", "too thin for its size: the neck of "}, 0.06);
 }
 
+// So short that no station of a link lies in it.
 TEST(ThinMesh, AHairThinNeckIsRefusedWithItsPlace) {
   for (const double neck : {0.3, 0.1})
     expectRefused([&](double x) { return lobes(x, neck, 8); },
