@@ -44,7 +44,7 @@ class VoxelGraph {
   Vector3d middleOf(int v) const { return body_.pieces[body_.pieceAt[v]].centre; }
   double faceArea() const { return body_.size * body_.size; }
 
-  // `visit(voxel, direction)` of the neighbours in the body; the box has a margin on no side.
+  // `visit(voxel, direction)` of the neighbours in the body: twice the axis, and one more upwards.
   template <class Visit>
   void visitNeighbours(int v, const Visit& visit) const {
     int rest = v;
