@@ -9,7 +9,8 @@
 #include "tests/temporary_folder.h"
 #include "tests/test_shapes.h"
 
-// Bodies too thin for the finite elements that they may have: refused with the part of them that is.
+// Bodies too thin for the finite elements that they may have: refused with the part of them that is. Others that links
+// do not follow: told.
 namespace medulla {
 namespace {
 
@@ -84,6 +85,24 @@ TEST(ThinMesh, AKnobOnAHairIsRefusedWithThePlaceBeforeIt) {
     return x < 70 ? 20 : std::max(0.2, 20 * std::exp((70 - x) / 3));
   };
   expectRefused(radius, {"too thin near (", "finite elements of", "fall apart there"}, 0.093);
+}
+
+// Few spheres for a block that is no bar: what a scene of it would be off by is said.
+TEST(IdentifiedBuild, SaysWhereItIsFarOff) {
+  const TemporaryFolder folder;
+  folder.write("block.obj",
+               "v 0 0 0\nv 0.05 0 0\nv 0.05 0.05 0\nv 0 0.05 0\nv 0 0 0.05\nv 0.05 0 0.05\nv 0.05 0.05 0.05\n"
+               "v 0 0.05 0.05\nf 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\n"
+               "f 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n");
+  const ProgramResult far = runProgram({"build", folder / "block.obj", "-o", folder / "a.xml", "--spheres", "4",
+                                        "--render-levels", "0", "--identify", "--fix", "plane=1,0,0,0.01"});
+  EXPECT_EQ(far.exitCode, 0) << far.err;
+  EXPECT_NE(far.err.find("the links are off by "), std::string::npos) << far.err;
+  const ProgramResult near =
+      runProgram({"build", MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj", "-o", folder / "b.xml", "--spheres", "5",
+                  "--render-levels", "0", "--identify", "--fix", "plane=1,0,0,0.001"});
+  EXPECT_EQ(near.exitCode, 0) << near.err;
+  EXPECT_EQ(near.err.find("the links are off by "), std::string::npos) << near.err;
 }
 
 TEST(ThinMesh, PlacesAreSaidWithoutNegativeZeros) {
