@@ -155,7 +155,12 @@ TEST(Implicit, MassesOnFramesAreThoseOfTheCarriedNodes) {
     const double along = v.dot(vectorAt(d.nodes.area, i));
     ofNodes += s.carriedMass[i] * v.squaredNorm() + s.carriedNormal[i] * along * along;
   }
-  const auto motionOf = [&](int i) { return (Vector6() << vectorOf(x[2 * i]), vectorOf(x[2 * i + 1])).finished(); };
+  const auto motionOf = [&](int i) {
+    Vector6 both;
+    both.head<3>() = vectorOf(x[2 * i]);
+    both.tail<3>() = vectorOf(x[2 * i + 1]);
+    return both;
+  };
   for (int i = 0; i < d.spheres.count; ++i) ofBlocks += motionOf(i).dot(s.lumped[i] * motionOf(i));
   for (std::size_t k = 0; k < s.pairs.size(); ++k) {
     const auto [i, j] = s.pairs[k];

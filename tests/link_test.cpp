@@ -65,7 +65,9 @@ TEST(Link, BendingCostsEnergyWhateverTheTwist) {
       const double energy = elastic(d) - straight;
       if (step == 0) untwisted = energy;
       EXPECT_GT(energy, 1e-3 * untwisted) << "twisted by " << 10 * step << " degrees";
-      if (step == 36) EXPECT_NEAR(energy, untwisted, 1e-6 * untwisted);
+      if (step == 36) {
+        EXPECT_NEAR(energy, untwisted, 1e-6 * untwisted);
+      }
       setOrientation(d, 1, twisted);
       turnBy(d, 1, 2 * std::numbers::pi / 36 * line);
     }
