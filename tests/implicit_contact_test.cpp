@@ -47,7 +47,7 @@ static StaticShape floorOf(double friction) {
   return floor;
 }
 
-static void run(World& world, double until) {
+static void runUntil(World& world, double until) {
   while (world.time() < until - 1e-9) world.advance({});
 }
 
@@ -58,7 +58,7 @@ static Vector3d placeOf(const World& world, int body) {
   return sum / r.sphereCount;
 }
 
-static double energyOf(const World& world) {
+static double totalEnergy(const World& world) {
   const Energies e = world.energies();
   return e.kinetic + e.elastic + e.gravity;
 }
@@ -75,9 +75,9 @@ TEST(ImplicitContact, ASlopeHoldsWithoutCreeping) {
       WorldSettings settings = contactSettings(order, kGravity * Vector3d(std::sin(0.35), -std::cos(0.35), 0));
       settings.substeps = substeps;
       World world(settings, {raft("raft", {0, kRadius, 0}, 0.5)}, {floorOf(0.5)});
-      run(world, 1);
+      runUntil(world, 1);
       const Vector3d before = placeOf(world, 0);
-      run(world, 2);
+      runUntil(world, 2);
       EXPECT_LT((placeOf(world, 0) - before).norm(), 1e-6) << "order " << order << ", " << substeps << " substeps";
     }
   }
@@ -89,7 +89,7 @@ TEST(ImplicitContact, WhatSlidesIsHeldBackByCoulombsFriction) {
   World world(contactSettings(1, kGravity * Vector3d(std::sin(slope), -std::cos(slope), 0)),
               {raft("raft", {0, kRadius, 0}, friction)}, {floorOf(friction)});
   throwBody(world, 0, {-speed, 0, 0});
-  run(world, 1);
+  runUntil(world, 1);
   const double up = kGravity * (std::sin(slope) + friction * std::cos(slope)),
                down = kGravity * (std::sin(slope) - friction * std::cos(slope)), turn = speed / up;
   const double expected = -0.5 * speed * turn + 0.5 * down * (1 - turn) * (1 - turn);
@@ -104,10 +104,10 @@ TEST(ImplicitContact, AStackStays) {
       bodies.push_back(
           raft("raft " + std::to_string(k), {1e-4 * (k == 1), (2 * k + 1) * kRadius, 5e-5 * (k == 2)}, 0.4));
     World world(contactSettings(order), bodies, {floorOf(0.4)});
-    run(world, 1);
+    runUntil(world, 1);
     std::vector<Vector3d> before;
     for (int k = 0; k < 3; ++k) before.push_back(placeOf(world, k));
-    run(world, 8);
+    runUntil(world, 8);
     for (int k = 0; k < 3; ++k) EXPECT_LT((placeOf(world, k) - before[k]).norm(), 1e-5) << order << ", raft " << k;
   }
 }
@@ -119,7 +119,7 @@ TEST(ImplicitContact, AThrownHeapComesToRest) {
       bodies.push_back(raft("raft " + std::to_string(k), {0.01 * k, 0.03 + 0.03 * k, 0.007 * k}, 0.5));
     World world(contactSettings(order), bodies, {floorOf(0.5)});
     for (int k = 0; k < 4; ++k) throwBody(world, k, {0.6 - 0.3 * k, -0.5 * k, 0.2 * k});
-    run(world, 4);
+    runUntil(world, 4);
     EXPECT_LT(world.energies().kinetic, 1e-15) << "order " << order;
   }
 }
@@ -131,7 +131,7 @@ TEST(ImplicitContact, NothingBouncesHigh) {
     for (const double height : {0.1, 0.31, 0.7, 1.016, 1.023, 1.03, 2.0}) {
       World world(contactSettings(order), {synthetic::ball("ball", 0.03, {0, 0.03 + height, 0})}, {floorOf(0.2)});
       const double falling = std::sqrt(2 * height / kGravity), speed = kGravity * falling;
-      run(world, falling + 0.01);
+      runUntil(world, falling + 0.01);
       double highest = 0;
       for (int k = 0; k < 40; ++k) {
         world.advance({});
@@ -152,12 +152,12 @@ TEST(ImplicitContact, RollingGainsNoEnergy) {
   settings.substeps = 1;
   World world(settings, {ballBody("ball", model, {0, 0.03, 0}, 0.5)}, {floorOf(0.5)});
   throwBody(world, 0, {0.2, 0, 0});
-  run(world, 0.5);
-  double least = energyOf(world);
+  runUntil(world, 0.5);
+  double least = totalEnergy(world);
   for (int k = 0; k < 600; ++k) {
     world.advance({});
-    EXPECT_LT(energyOf(world), least + 1e-3 * world.energies().kinetic);
-    least = std::min(least, energyOf(world));
+    EXPECT_LT(totalEnergy(world), least + 1e-3 * world.energies().kinetic);
+    least = std::min(least, totalEnergy(world));
   }
 }
 
@@ -170,7 +170,7 @@ TEST(ImplicitContact, NothingFastPassesAThinBox) {
       for (int k = 0; k < 8; ++k) {  // the step's length of the way, in eighths
         World world(contactSettings(order, Vector3d::Zero()), {rod("rod", {0, 0.1 + speed * 0.005 * k / 8, 0})}, {box});
         throwBody(world, 0, {0, -speed, 0});
-        run(world, 0.1);
+        runUntil(world, 0.1);
         EXPECT_GT(placeOf(world, 0).y(), 0.002 + 0.5 * kRadius) << "order " << order << ", " << speed << " m/s, " << k;
       }
     }
@@ -185,7 +185,7 @@ TEST(ImplicitContact, FastBodiesDoNotPassEachOther) {
                   {rod("left", {0, 0.1, 0}), rod("right", {0, -0.1 - speed * 0.005 * k / 8, 0})});
       throwBody(world, 0, {0, -speed, 0});
       throwBody(world, 1, {0, speed, 0});
-      run(world, 0.1);
+      runUntil(world, 0.1);
       EXPECT_GT(placeOf(world, 0).y(), placeOf(world, 1).y() + kRadius) << "order " << order << ", " << k;
     }
   }
@@ -196,23 +196,23 @@ TEST(ImplicitContact, FrictionThatHeldGivesBackNoMoreThanItTookIn) {
   const double slope = 0.35;
   World world(contactSettings(1, kGravity * Vector3d(std::sin(slope), -std::cos(slope), 0)),
               {raft("raft", {0, kRadius, 0}, 0.5)}, {floorOf(0.5)});
-  run(world, 1);
+  runUntil(world, 1);
   double stored = 0;
   for (const HeldFriction& held : world.data().contact.held) stored += held.energy;
   const double mass = 4 * world.data().spheres.groups[0].mass[0], along = kGravity * std::sin(slope), step = 0.005;
   EXPECT_NEAR(stored, mass * along * along * step * step / (2 * std::numbers::pi * (2 + std::numbers::pi)),
               0.2 * stored);
-  const double before = energyOf(world) - world.energies().gravity;
+  const double before = totalEnergy(world) - world.energies().gravity;
   world.data().gravity = quadOf({0, -kGravity * std::cos(slope), 0});
   for (int k = 0; k < 10; ++k) {
     world.advance({});
-    EXPECT_LT(energyOf(world) - world.energies().gravity, before + 1.1 * stored);
+    EXPECT_LT(totalEnergy(world) - world.energies().gravity, before + 1.1 * stored);
   }
 }
 
 TEST(ImplicitContact, TheHashKnowsWhatFrictionHoldsWith) {
   World world(contactSettings(1), {raft("raft", {0, kRadius, 0}, 0.5)}, {floorOf(0.5)});
-  run(world, 0.1);
+  runUntil(world, 0.1);
   ASSERT_FALSE(world.data().contact.held.empty());
   const std::uint64_t before = world.stateHash();
   world.data().contact.held[0].force.v[0] += 1e-9;
