@@ -98,9 +98,9 @@ TEST(IdentifiedBuild, SaysWhereItIsFarOff) {
                                         "--render-levels", "0", "--identify", "--fix", "plane=1,0,0,0.01"});
   EXPECT_EQ(far.exitCode, 0) << far.err;
   EXPECT_NE(far.err.find("the links are off by "), std::string::npos) << far.err;
-  const ProgramResult near =
-      runProgram({"build", MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj", "-o", folder / "b.xml", "--spheres", "5",
-                  "--render-levels", "0", "--identify", "--fix", "plane=1,0,0,0.001"});
+  const std::string cylinder = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
+  const ProgramResult near = runProgram({"build", cylinder, "-o", folder / "b.xml", "--spheres", "5", "--render-levels",
+                                         "0", "--identify", "--fix", "plane=1,0,0,0.001"});
   EXPECT_EQ(near.exitCode, 0) << near.err;
   EXPECT_EQ(near.err.find("the links are off by "), std::string::npos) << near.err;
 }

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <ranges>
 #include <vector>
 
 #include "physics/dynamics/contact_data.h"
@@ -213,8 +212,20 @@ struct BodyRange {
   bool held = false;       // some sphere is fixed: deformation is motion against it rather than against a rigid motion
   int batch = 0;           // bodies of different batches share no group of spheres or links
 };
-inline auto spheresOf(const BodyRange& r) {
-  return std::views::iota(r.firstSphere, r.firstSphere + r.sphereCount);
+// Its spheres' numbers, to loop over; std::views::iota is beyond clang++ 14.
+struct SphereNumbers {
+  struct Iterator {
+    int i;
+    int operator*() const { return i; }
+    Iterator& operator++() { return ++i, *this; }
+    bool operator!=(const Iterator& other) const { return i != other.i; }
+  };
+  int first, past;
+  Iterator begin() const { return {first}; }
+  Iterator end() const { return {past}; }
+};
+inline SphereNumbers spheresOf(const BodyRange& r) {
+  return {r.firstSphere, r.firstSphere + r.sphereCount};
 }
 
 // ---- SurfaceMode::contact: the nodes of a host move by themselves, or they are carried and their mass is the

@@ -113,7 +113,7 @@ int VoxelGraph::search(const IsSource& isSource, const IsAim& isAim, bool turned
       if (from_[next] != kUnseen) return;
       const int axis = direction / 2;
       const bool onward = (direction % 2 == 1) != turned;
-      const int flow = flow_[direction % 2 == 1 ? v : next][axis];
+      const auto flow = flow_[direction % 2 == 1 ? v : next][axis];
       if (onward ? flow >= 1 : flow <= -1) return;
       from_[next] = static_cast<signed char>(direction);
       queue_.push_back(next);
@@ -195,7 +195,7 @@ double sectionWidth(const TriangleMesh& mesh, const Neck& neck) {
   const PowerSites near{{neck.place}, {0}, {1.5 * neck.width}};
   double least = std::numeric_limits<double>::infinity();
   for (int k = 1; k < 27; ++k) {
-    const Vector3d normal(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+    const Vector3d normal = Eigen::Vector3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1).cast<double>();
     if (normal.isZero(0)) continue;
     const SectionMoments s = planeSection(mesh, planeAcross(neck.place, normal.normalized()), &near, {0, 0});
     if (s.holdsOrigin) least = std::min(least, s.area / 2);  // the same cell twice
