@@ -99,14 +99,13 @@ TEST(ImplicitContact, WhatSlidesIsHeldBackByCoulombsFriction) {
 // Balls on balls: without friction that holds they roll off each other, ever faster.
 TEST(ImplicitContact, AStackStays) {
   for (const int order : {1, 2}) {
-    std::vector<BodyDescription> bodies;
+    std::vector<BodyDescription> bodies(3);
     for (int k = 0; k < 3; ++k)
-      bodies.push_back(
-          raft("raft " + std::to_string(k), {1e-4 * (k == 1), (2 * k + 1) * kRadius, 5e-5 * (k == 2)}, 0.4));
+      bodies[k] = raft("raft " + std::to_string(k), {1e-4 * (k == 1), (2 * k + 1) * kRadius, 5e-5 * (k == 2)}, 0.4);
     World world(contactSettings(order), bodies, {floorOf(0.4)});
     runUntil(world, 1);
-    std::vector<Vector3d> before;
-    for (int k = 0; k < 3; ++k) before.push_back(placeOf(world, k));
+    std::vector<Vector3d> before(3);
+    for (int k = 0; k < 3; ++k) before[k] = placeOf(world, k);
     runUntil(world, 8);
     for (int k = 0; k < 3; ++k) EXPECT_LT((placeOf(world, k) - before[k]).norm(), 1e-5) << order << ", raft " << k;
   }
@@ -114,9 +113,9 @@ TEST(ImplicitContact, AStackStays) {
 
 TEST(ImplicitContact, AThrownHeapComesToRest) {
   for (const int order : {1, 2}) {
-    std::vector<BodyDescription> bodies;
+    std::vector<BodyDescription> bodies(4);
     for (int k = 0; k < 4; ++k)
-      bodies.push_back(raft("raft " + std::to_string(k), {0.01 * k, 0.03 + 0.03 * k, 0.007 * k}, 0.5));
+      bodies[k] = raft("raft " + std::to_string(k), {0.01 * k, 0.03 + 0.03 * k, 0.007 * k}, 0.5);
     World world(contactSettings(order), bodies, {floorOf(0.5)});
     for (int k = 0; k < 4; ++k) throwBody(world, k, {0.6 - 0.3 * k, -0.5 * k, 0.2 * k});
     runUntil(world, 4);
