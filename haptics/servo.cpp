@@ -148,19 +148,19 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
 }
 
 // The springs share the tool's stiffness equally.
-static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Tool& tool) {
+static Vector3d heldForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Tool& tool) {
   const auto gap = [&](const HeldOffset& held) -> Vector3d {
     return surface.node(held.node, alpha) - heldTarget(tool.device, held);
   };
-  return tool.settings.stiffness * meanOverHeld(tool.grip, gap) +
-         motionForce(tool, heldMotion(surface, alpha, tool.grip, tool.motion));
+  return tool.settings.stiffness * meanOverHeld(tool.grip, gap) + motionForce(tool, tissue);
 }
 
 // The same for what a grip feels, in all directions.
-static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const Tool& tool, const Vector3d& force) {
+static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Tool& tool,
+                             const Vector3d& force) {
   if (surface.toolForce[0].empty()) return force;
   const double change = (1 - alpha) * tool.change[1] + alpha * tool.change[0];
-  const double since = heldSince(surface, alpha, tool.grip, change, tool.settings, tool.motion);
+  const double since = heldSince(surface, alpha, tissue, change, tool.settings, tool.motion);
   const Vector3d given = -givenForce(surface, alpha, tool), beyond = force - given;
   const double size = beyond.norm();
   return size > since ? Vector3d(given + since / size * beyond) : force;
@@ -214,7 +214,8 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
   beginHold(surface, alpha, grip, tool.settings.stiffness, tool.motion);
   const Eigen::Quaterniond toolFromWorld = tool.device.worldFromTool.conjugate();
   for (HeldOffset& held : grip.held) held.offset += toolFromWorld * surface.nodeLead(held.node, alpha);
-  const Vector3d shift = (heldForce(surface, alpha, tool) - felt) / tool.settings.stiffness;
+  const TissueMotion tissue = heldMotion(surface, alpha, grip, tool.motion);
+  const Vector3d shift = (heldForce(surface, alpha, tissue, tool) - felt) / tool.settings.stiffness;
   for (HeldOffset& held : grip.held) held.offset += toolFromWorld * shift;
   if (surface.toolForce[0].empty()) return;
   // What the tissue gave is that of a contact still, and no bound before the grip's own has come.
@@ -226,7 +227,9 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
 static bool feelGrip(const BlendedSurface& surface, double alpha, const Vector3d& way, Tool& tool, ToolState& state) {
   if (tool.grip.held.empty()) return false;
   tool.motion.way[0] += way;
-  const Vector3d estimate = heldForce(surface, alpha, tool), force = keptToTissue(surface, alpha, tool, estimate);
+  const TissueMotion tissue = heldMotion(surface, alpha, tool.grip, tool.motion);
+  const Vector3d estimate = heldForce(surface, alpha, tissue, tool);
+  const Vector3d force = keptToTissue(surface, alpha, tissue, tool, estimate);
   tool.estimate = estimate.norm();
   if (std::min(force.norm(), tool.settings.forceMax) > tool.settings.gripForceMax) {
     letSlip(tool.grip);

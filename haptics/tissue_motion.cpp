@@ -141,13 +141,12 @@ double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion
   return (1 - tissue.followed) * (tool.stiffness * longer + tool.damping * along(device.velocity));
 }
 
-double heldSince(const BlendedSurface& surface, double alpha, const Grip& grip, double changePerFrame,
+double heldSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, double changePerFrame,
                  const ToolSettings& tool, const DeviceMotion& device) {
   const double way = wayOver(surface.toolForceAge, alpha, device, [](const Vector3d& v) { return v.norm(); });
-  const double step = blendPoint(heldStep(surface, grip, 1), heldStep(surface, grip, 0), alpha).norm();
-  const double longer = std::max(way, surface.toolForceAge * step);
+  const double longer = std::max(way, surface.toolForceAge * tissue.step.norm());
   return 2 * surface.toolForceAge * changePerFrame +
-         (1 - heldFollows(device, alpha)) * (tool.stiffness * longer + tool.damping * device.velocity.norm());
+         (1 - tissue.followed) * (tool.stiffness * longer + tool.damping * device.velocity.norm());
 }
 
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, const DeviceMotion& device) {
@@ -157,7 +156,7 @@ TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip&
   const Vector3d faster = device.velocity - wayOfStep(device, alpha) / surface.duration;
   const Vector3d lead = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeLead(h.node, alpha); });
   const Vector3d step = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeStep(h.node, alpha); });
-  return {lead + part * beyond, step / surface.duration + part * faster};
+  return {lead + part * beyond, step / surface.duration + part * faster, step, part};
 }
 
 }  // namespace medulla

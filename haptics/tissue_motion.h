@@ -49,7 +49,7 @@ void learnFollowing(const BlendedSurface& surface, const Grip& grip, DeviceMotio
 struct TissueMotion {
   Eigen::Vector3d lead = Eigen::Vector3d::Zero();      // m, by now ahead of the blended surface
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s, by now
-  // Of touched tissue: what it moves within a frame, m, and the part of the device's way by which it follows.
+  // What it moves within a frame, m, and the part of the device's way by which it follows.
   Eigen::Vector3d step = Eigen::Vector3d::Zero();
   double followed = 0;
 };
@@ -66,7 +66,7 @@ double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion
 
 // N: likewise of a grip's force, in any direction, and by twice what the tissue's force lately changed by in a frame,
 // `changePerFrame` (N): a body that follows all the way changes it by its mass alone, which no stiffness tells.
-double heldSince(const BlendedSurface& surface, double alpha, const Grip& grip, double changePerFrame,
+double heldSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, double changePerFrame,
                  const ToolSettings& tool, const DeviceMotion& device);
 
 // Mean over what a grip holds.

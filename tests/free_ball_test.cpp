@@ -19,13 +19,7 @@ struct FreeBall {
   Vector3d way = Vector3d::Zero(), velocity = Vector3d::Zero();
   double time = 0;
 
-  DynamicsFrame frame() const {
-    DynamicsFrame out;
-    out.time = time;
-    out.bodies.resize(1);
-    out.bodies[0].nodes = position;
-    return out;
-  }
+  DynamicsFrame frame() const { return frameOf(time, position); }
 
   // N, `left` s before the frame's end.
   Vector3d spring(const HeldNode& held, double left) const {

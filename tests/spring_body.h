@@ -27,13 +27,7 @@ struct SpringBody {
         if (triangle[k] < triangle[(k + 1) % 3]) edges.push_back({triangle[k], triangle[(k + 1) % 3]});
   }
 
-  DynamicsFrame frame() const {
-    DynamicsFrame out;
-    out.time = time;
-    out.bodies.resize(1);
-    out.bodies[0].nodes = position;
-    return out;
-  }
+  DynamicsFrame frame() const { return frameOf(time, position); }
 
   void addElasticForces() {
     for (std::size_t n = 0; n < position.size(); ++n)

@@ -34,6 +34,15 @@ inline void fillBuckets(SoftBodyModel& model, int count) {
   for (std::size_t t = 0; t < owner.size(); ++t) model.buckets[owner[t]].push_back(int(t));
 }
 
+// Of one body whose nodes are here.
+inline DynamicsFrame frameOf(double time, const std::vector<Eigen::Vector3d>& nodes) {
+  DynamicsFrame out;
+  out.time = time;
+  out.bodies.resize(1);
+  out.bodies[0].nodes = nodes;
+  return out;
+}
+
 // A closed ellipsoid, 0.2 m long, around the x axis; 2 around (along - 1) triangles: 18, 14 gives 468.
 inline TouchShape ellipsoid(int around, int along, int bucketCount, double bumpiness = 1) {
   auto model = std::make_shared<SoftBodyModel>();
