@@ -47,6 +47,7 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   for (const SceneTool& tool : loaded.scene.tools) tools.push_back(tool.settings);
   servo_ = std::make_unique<Servo>(bodies, tools, tickDuration_, current_, inputs_, embree);
 
+  totals_.touched.resize(tools.size());
   record_.duration = frameDuration_;
   record_.from = record_.to = current_;
   record_.inputs.assign(ticksPerFrame_ + 1, inputs_);
@@ -114,6 +115,7 @@ void Simulation::accountTicks() {
       const ToolState& tool = record_.tools[tick][k];
       totals_.forceMax = std::max(totals_.forceMax, tool.force.norm());
       totals_.clampedTicks += tool.clamped;
+      if (tool.inContact || tool.holding) totals_.touched[k] = true;
       totals_.gripSlips += tool.slipped && !record_.tools[tick - 1][k].slipped;
       totals_.userEnergyMax = std::max(totals_.userEnergyMax, tool.energy);
     }

@@ -87,6 +87,15 @@ TEST(Program, TellsThatBodiesDoNotSleepUnderTheImplicitIntegrator) {
   EXPECT_FALSE(told("explicit"));
 }
 
+TEST(Program, TellsOfAToolThatTouchesNothing) {
+  const TemporaryFolder folder;
+  folder.write("away.csv", "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,0,1,0,1,0,0,0,0\n0.1,0.1,1,0,1,0,0,0,0\n");
+  const ProgramResult away = runProgram(command({"replay", kScene, "--trajectory", folder / "away.csv"}));
+  EXPECT_EQ(complaints(away), std::vector<std::string>{"note: tool 'grasper' touched nothing in its whole motion"});
+  EXPECT_TRUE(complaints(runProgram(command({"replay", kScene}))).empty());  // ends before the grasper arrives
+  EXPECT_TRUE(complaints(runProgram({"replay", kScene})).empty());
+}
+
 TEST(Program, DrawingOptionsLeaveTheHashAlone) {
   const TemporaryFolder folder;
   const std::string hash = valueOf(runProgram(command({"replay", kScene})).out, "hash");

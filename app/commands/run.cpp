@@ -318,6 +318,18 @@ void printWarnings(const Scene& scene, const World& world) {
     fmt::print(stderr, "warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
 }
 
+// What a run came to that was hardly meant. A run that ends before a tool's motion does says nothing of the tool.
+static void printNotes(const LoadedScene& loaded, const RunTotals& totals) {
+  for (std::size_t k = 0; k < loaded.trajectories.size(); ++k)
+    if (!totals.touched[k] && motionEnd(loaded.trajectories[k]) <= totals.simulated + 1e-9)
+      fmt::print(stderr, "note: tool '{}' touched nothing in its whole motion\n", loaded.scene.tools[k].name);
+  if (totals.volumeRatioMin <= 0)
+    fmt::print(stderr,
+               "note: a body was turned inside out (volume_ratio_min {:.3g}): its model is too coarse, its tissue too "
+               "soft for what acts on it, or a step too long\n",
+               totals.volumeRatioMin);
+}
+
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
                              const std::function<void()>& afterFrame, const std::function<void()>& finish,
                              const std::function<void()>& advance) {
@@ -355,11 +367,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   motions.commit();
   frameTimes.commit();
   surfaces.write(simulation);
-  if (simulation.totals().volumeRatioMin <= 0)
-    fmt::print(stderr,
-               "note: a body was turned inside out (volume_ratio_min {:.3g}): its model is too coarse, its tissue too "
-               "soft for what acts on it, or a step too long\n",
-               simulation.totals().volumeRatioMin);
+  printNotes(loaded, simulation.totals());
   return forceResults(loaded, forces);
 }
 
