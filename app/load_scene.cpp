@@ -196,10 +196,10 @@ static Trajectory loadTrajectory(const Scene& scene, SceneTool& tool) {
 static void requireNearby(const Scene& scene, const SceneStatic& item, const TriangleMesh& mesh) {
   double most = 0;
   for (const Eigen::Vector3d& x : mesh.vertices) most = std::max(most, x.lpNorm<Eigen::Infinity>());
-  if (most <= anyPlace.most) return;
+  if (most <= kAnyPlace.most) return;
   throw valueError(scene, item.line, "mesh",
                    fmt::format("{} reaches {:.3g} m from its origin, expected at most {} m; is its unit right?",
-                               item.meshPath, most, anyPlace.most));
+                               item.meshPath, most, kAnyPlace.most));
 }
 
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories) {

@@ -86,11 +86,10 @@ CarriedLink carriedLink(const BodyDescription& body, const BodyFrame& frame, con
 std::vector<CarriedLink> carriedLinks(const BodyDescription& body, const BodyFrame& frame) {
   const SoftBodyModel& model = *body.model;
   std::vector<CarriedLink> out;
-  if (body.links == LinkModel::identified) {
+  if (body.links == LinkModel::identified)
     for (const IdentifiedLink& link : model.identified->links) out.push_back(carriedLink(body, frame, link));
-  } else {
+  else
     for (const ElasticLink& link : model.links) out.push_back(carriedLink(body, frame, link));
-  }
   return out;
 }
 

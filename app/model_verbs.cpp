@@ -33,9 +33,9 @@ BuildOptions buildOptions(const BuildArguments& a) {
   options.identification.links = static_cast<LinkForm>(form - kLinkForms.begin());
   if (options.identify && options.meshes.size() > 1)
     usageError("--identify", "", fmt::format("a single mesh, not {}", options.meshes.size()));
-  if (options.identify && s.method == BuildMethod::cover && s.gap == 0 && s.spheres > identifiedSpheresMax)
+  if (options.identify && s.method == BuildMethod::cover && s.gap == 0 && s.spheres > kIdentifiedSpheresMax)
     usageError("--spheres", fmt::format("{}", s.spheres),
-               fmt::format("at most {} with --identify: its time grows with their cube", identifiedSpheresMax));
+               fmt::format("at most {} with --identify: its time grows with their cube", kIdentifiedSpheresMax));
   return options;
 }
 
@@ -45,7 +45,7 @@ void addCoverOptions(CLI::App& c, BuildArguments& a) {
            "--spheres", a.options.settings.spheres,
            "number of filling spheres; of several meshes together: shared out so that the largest gap, in metres, "
            "is about the same for all")
-          ->check(wholeNumberFrom(1, spheresMax))
+          ->check(wholeNumberFrom(1, kSpheresMax))
           ->capture_default_str();
   CLI::Option* gap =
       c.add_option(
@@ -131,7 +131,7 @@ Verb addNew(CLI::App& app) {
       ->type_name("DIR")
       ->required();
   c->add_option("--spheres", o.build.settings.spheres, "number of filling spheres")
-      ->check(wholeNumberFrom(1, spheresMax))
+      ->check(wholeNumberFrom(1, kSpheresMax))
       ->capture_default_str();
   c->add_option("--unit", o.build.unit, "unit of the mesh file")
       ->check(CLI::IsMember(lengthUnits()))

@@ -419,13 +419,12 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
       const double now = energy();
       out.largestEnergy = std::max(out.largestEnergy, now);
       if (t <= handTime) out.startEnergy = out.largestEnergy;
-      if (!(farthestFromRest(world.data(), body) <= 0.01 * diagonal)) {
+      if (!(farthestFromRest(world.data(), body) <= 0.01 * diagonal))
         out.recoveredAt.reset();
-      } else if (!out.recoveredAt) {
+      else if (!out.recoveredAt)
         out.recoveredAt = world.time();
-      } else if (world.time() > handTime && now < 1e-6 * out.startEnergy) {
+      else if (world.time() > handTime && now < 1e-6 * out.startEnergy)
         break;
-      }
     }
     out.survived = true;
   } catch (const std::runtime_error&) {  // not finite

@@ -16,9 +16,9 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-// Bounds are grown beyond the sphere's radius by what float rays within toolReach can be off. Embree's ROBUST flag does
-// not reach user geometry.
-static constexpr double boundsFactor = 1.001, boundsMargin = 1e-5;  // -, m
+// Bounds are grown beyond the sphere's radius by what float rays within kToolReach can be off. Embree's ROBUST flag
+// does not reach user geometry.
+static constexpr double kBoundsFactor = 1.001, kBoundsMargin = 1e-5;  // -, m
 
 namespace {
 struct Bucket {
@@ -248,7 +248,7 @@ Buckets::Buckets(const std::vector<TouchableBody>& bodies, double largestRadius,
     bucket.surface = &surface;
     bucket.index = int(k);
     bucket.largestRadius = largestRadius;
-    bucket.inflation = largestRadius * boundsFactor + boundsMargin;
+    bucket.inflation = largestRadius * kBoundsFactor + kBoundsMargin;
     openBucket(data_->device, bucket);
     data_->bounds[k] = boundingSphere(bucket);
   }
@@ -311,7 +311,7 @@ void Buckets::refitNear(const Vector3d& centre, double distance) {
 // ---- Servo side ------------------------------------------------------------------------------------------
 
 static bool isQueryable(const Vector3d& p) {
-  return p.allFinite() && p.lpNorm<Eigen::Infinity>() <= 2 * toolReach;
+  return p.allFinite() && p.lpNorm<Eigen::Infinity>() <= 2 * kToolReach;
 }
 
 static double distanceToSegment2(const Vector3d& p, const Vector3d& start, const Vector3d& motion, double motion2) {
@@ -394,7 +394,7 @@ const std::vector<int>& Buckets::near(const Vector3d& centre, double distance) c
       return;
     }
     RTCPointQuery point{float(centre.x()), float(centre.y()), float(centre.z()), 0,
-                        float(distance * boundsFactor + boundsMargin)};
+                        float(distance * kBoundsFactor + kBoundsMargin)};
     RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
     rtcPointQuery(bucket.scene, &point, &context, addCandidate, &query);

@@ -81,7 +81,7 @@ class Buckets {
 
   // First touch of a sphere that moves from `centre` to `centre + motion` while the surface stands at alpha; of equal
   // times the lowest triangle. `firstBucket`, the one touched last, is tried first; it affects only speed, never the
-  // result. Finite input within toolReach is asserted: Embree would abort the process on NaN.
+  // result. Finite input within kToolReach is asserted: Embree would abort the process on NaN.
   bool sweep(const Eigen::Vector3d& centre, const Eigen::Vector3d& motion, double radius, double alpha, int firstBucket,
              SurfaceHit& hit) const;
 

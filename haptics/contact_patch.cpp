@@ -29,7 +29,7 @@ void addContacts(const Proxy& proxy, double push, ContactPatch& patch) {
     auto entry = std::find_if(patch.entries.begin(), patch.entries.end(),
                               [&](const ContactPatch::Entry& e) { return e.triangle == contact.triangle; });
     if (entry == patch.entries.end()) {
-      if (patch.entries.size() == contactPatchCapacity) {
+      if (patch.entries.size() == kContactPatchCapacity) {
         const auto least = std::min_element(patch.entries.begin(), patch.entries.end(),
                                             [](const auto& a, const auto& b) { return a.share < b.share; });
         patch.total -= least->share;

@@ -22,7 +22,7 @@ struct ContactPatch {
   bool isTouched = false;      // in this frame
 };
 
-constexpr int contactPatchCapacity = 64;  // triangles; beyond, a new one takes the place of the least share
+constexpr int kContactPatchCapacity = 64;  // triangles; beyond, a new one takes the place of the least share
 
 // Begins a frame: pushes of those before count `factor` (0 to 1) times as much, and nothing after a frame without any.
 void fadePatch(double factor, ContactPatch& patch);

@@ -6,7 +6,7 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-constexpr double cosineOfCrease = 0.7316888688738209;  // cos 0.75
+constexpr double kCosineOfCrease = 0.7316888688738209;  // cos 0.75
 
 static Vector3d doubleArea(const Triangle& t) {
   return (t.b - t.a).cross(t.c - t.a);
@@ -29,10 +29,10 @@ Vector3d shadedNormal(const BlendedSurface& surface, double alpha, int triangle,
   Vector3d sum = Vector3d::Zero();
   for (int k = 0; k < 3; ++k) {
     const Vector3d corner = side * nodeNormal(surface, alpha, surface.triangles[triangle][k]);
-    sum += weights[k] * (corner.dot(face) > cosineOfCrease ? corner : normal);
+    sum += weights[k] * (corner.dot(face) > kCosineOfCrease ? corner : normal);
   }
   sum = sum.stableNormalized();
-  return sum.dot(normal) > cosineOfCrease ? sum : normal;
+  return sum.dot(normal) > kCosineOfCrease ? sum : normal;
 }
 
 }  // namespace medulla

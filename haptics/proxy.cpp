@@ -17,11 +17,11 @@ using Eigen::Vector3d;
 
 // The proxy stops this far short of a surface, so that rounding never puts it inside; farther than `touching` a contact
 // is over. Both in metres.
-static constexpr double standOff = 5e-8, touching = 1e-6;
+static constexpr double kStandOff = 5e-8, kTouching = 1e-6;
 // Below this a proxy has arrived, m.
-static constexpr double arrived = 1e-9;
+static constexpr double kArrived = 1e-9;
 // Enough for every groove and corner met in a tick; what is left is done in the next.
-static constexpr int maxSweeps = 10, maxPushes = 10, maxPasses = 4;
+static constexpr int kMaxSweeps = 10, kMaxPushes = 10, kMaxPasses = 4;
 
 // ---- Nearest point in half-spaces ----------------------------------------------------------------------
 
@@ -103,8 +103,8 @@ static void dropPlane(TouchedPlanes& touched, int k) {
 
 // ---- The device moves ------------------------------------------------------------------------------------
 
-// Moves the proxy to `target` or standOff short of the first surface on the way. The step back along the path grows at
-// grazing incidence, so that the distance to the surface stays standOff.
+// Moves the proxy to `target` or kStandOff short of the first surface on the way. The step back along the path grows at
+// grazing incidence, so that the distance to the surface stays kStandOff.
 static bool moveTo(const Buckets& buckets, double alpha, const Vector3d& target, Proxy& proxy, SurfaceHit& hit) {
   const Vector3d motion = target - proxy.centre;
   if (!buckets.sweep(proxy.centre, motion, proxy.radius, alpha, proxy.lastBucket, hit)) {
@@ -113,7 +113,7 @@ static bool moveTo(const Buckets& buckets, double alpha, const Vector3d& target,
   }
   proxy.lastBucket = hit.bucket;
   const double length = motion.norm(), incidence = std::max(0.02, -hit.normal.dot(motion) / length);
-  proxy.centre += std::max(0.0, hit.t - standOff / (incidence * length)) * motion;
+  proxy.centre += std::max(0.0, hit.t - kStandOff / (incidence * length)) * motion;
   return true;
 }
 
@@ -124,7 +124,8 @@ static double distanceTo(const Buckets& buckets, double alpha, int triangle, con
 // A sphere that rolled over an edge has left the plane it first met there.
 static void dropLeftPlanes(const Buckets& buckets, double alpha, const Proxy& proxy, TouchedPlanes& touched) {
   for (int k = touched.count - 1; k >= 0; --k)
-    if (distanceTo(buckets, alpha, touched.triangles[k], proxy.centre) > proxy.radius + touching) dropPlane(touched, k);
+    if (distanceTo(buckets, alpha, touched.triangles[k], proxy.centre) > proxy.radius + kTouching)
+      dropPlane(touched, k);
 }
 
 // God-object search: sweep towards the target; at a hit, the target becomes the point nearest to the goal that the
@@ -132,12 +133,12 @@ static void dropLeftPlanes(const Buckets& buckets, double alpha, const Proxy& pr
 static TouchedPlanes slideTo(const Buckets& buckets, double alpha, const Vector3d& goal, Proxy& proxy) {
   TouchedPlanes touched;
   Vector3d target = goal;
-  for (int k = 0; k < maxSweeps && (target - proxy.centre).norm() >= arrived; ++k) {
+  for (int k = 0; k < kMaxSweeps && (target - proxy.centre).norm() >= kArrived; ++k) {
     SurfaceHit hit;
     if (moveTo(buckets, alpha, target, proxy, hit))
       addPlane(touched, {hit.normal, hit.normal.dot(proxy.centre)}, hit.triangle);
     // Not at the end: a proxy that is still rolling over an edge has not lost contact.
-    if (k + 1 < maxSweeps) dropLeftPlanes(buckets, alpha, proxy, touched);
+    if (k + 1 < kMaxSweeps) dropLeftPlanes(buckets, alpha, proxy, touched);
     if (nearestInHalfSpaces(goal, touched.planes.data(), touched.count, target, touched.pressure)) continue;
     // Wedged between walls that leave no point free: it stays, and presses on what opposes the goal.
     for (int i = 0; i < touched.count; ++i)
@@ -156,7 +157,7 @@ static void keepPressingContacts(const Buckets& buckets, double alpha, const Tou
   proxy.contactCount = 0;
   double sum = 0;
   for (int k = 0; k < touched.count; ++k) {
-    if (!(touched.pressure[k] > arrived)) continue;
+    if (!(touched.pressure[k] > kArrived)) continue;
     ProxyContact& contact = proxy.contacts[proxy.contactCount++];
     contact = contactAt(buckets, alpha, touched.triangles[k], proxy.centre);
     contact.share = touched.pressure[k];
@@ -178,7 +179,7 @@ static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& tou
   int count = 0;
   bool isFlat = true;
   for (int k = 0; k < touched.count; ++k) {
-    if (!(touched.pressure[k] > arrived)) continue;
+    if (!(touched.pressure[k] > kArrived)) continue;
     const ProxyContact contact = contactAt(buckets, alpha, touched.triangles[k], proxy.centre);
     const Vector3d normal = shadedNormal(buckets.surface(), alpha, contact.triangle, contact.weights, contact.normal);
     isFlat = isFlat && (normal - contact.normal).norm() < flat;
@@ -223,7 +224,7 @@ void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool
   const Vector3d start = proxy.centre;
   TouchedPlanes touched = slideTo(buckets, alpha, device, proxy);
   shade(buckets, alpha, touched, device, proxy);
-  const bool pressed = touched.count > 0 && (proxy.centre - device).norm() > arrived;
+  const bool pressed = touched.count > 0 && (proxy.centre - device).norm() > kArrived;
   if (pressed && tool.staticFriction > 0) {
     const Vector3d goal = frictionGoal(tool, start, proxy.centre, device, proxy.slipping);
     proxy.centre = start;
@@ -251,16 +252,16 @@ static Vector3d carriedBy(const Buckets& buckets, double alpha, const Proxy& pro
 // is moved back to the touched side. Repeated, because moving back from one triangle may meet another.
 static Vector3d notPassedOver(const Buckets& buckets, double alphaBefore, double alpha, double radius,
                               const Vector3d& start, Vector3d end) {
-  for (int pass = 0; pass < maxPasses; ++pass) {
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
     Vector3d corrected = end;
     double largest = 0;
-    for (const int t : buckets.near(0.5 * (start + end), 0.5 * (end - start).norm() + standOff)) {
+    for (const int t : buckets.near(0.5 * (start + end), 0.5 * (end - start).norm() + kStandOff)) {
       const Triangle before = buckets.surface().triangle(t, alphaBefore), now = buckets.surface().triangle(t, alpha);
       const TrianglePoint closest = closestPoint(before, start);
       const Vector3d adjusted = start + pointAt(now, closest.weights) - closest.point;
       SweepHit hit;
       if (!sweepSphere(adjusted, end - adjusted, radius, now, 1, hit)) continue;
-      const Vector3d outside = adjusted + hit.t * (end - adjusted) + standOff * hit.normal;
+      const Vector3d outside = adjusted + hit.t * (end - adjusted) + kStandOff * hit.normal;
       if ((outside - end).norm() <= largest) continue;
       largest = (outside - end).norm();
       corrected = outside;
@@ -287,19 +288,19 @@ static void addClearance(const Buckets& buckets, double alpha, int triangle, dou
                          TouchedPlanes& touched) {
   const Vector3d q = closestPoint(buckets.surface().triangle(triangle, alpha), centre).point;
   const Vector3d normal = (centre - q).normalized();
-  addPlane(touched, {normal, normal.dot(q) + toolRadius + standOff}, triangle);
+  addPlane(touched, {normal, normal.dot(q) + toolRadius + kStandOff}, triangle);
 }
 
-// Moves the proxy out to standOff beyond the tool's radius from every triangle, by the shortest way that the planes
+// Moves the proxy out to kStandOff beyond the tool's radius from every triangle, by the shortest way that the planes
 // found so far allow. Each move is swept with the clearance there is, so that pushing out of one surface never leads
 // through another; where no room is found the proxy keeps the clearance it has.
 static void pushOut(const Buckets& buckets, double alpha, double toolRadius, Proxy& proxy) {
   TouchedPlanes touched;
   const Vector3d start = proxy.centre;
-  for (int k = 0; k <= maxPushes; ++k) {
+  for (int k = 0; k <= kMaxPushes; ++k) {
     proxy.radius = toolRadius;
     const int nearest = nearestTriangle(buckets, alpha, proxy.centre, proxy.radius);
-    if (nearest < 0 || k == maxPushes) return;
+    if (nearest < 0 || k == kMaxPushes) return;
     addClearance(buckets, alpha, nearest, toolRadius, proxy.centre, touched);
     Vector3d target;
     if (!nearestInHalfSpaces(start, touched.planes.data(), touched.count, target, touched.pressure)) return;
@@ -313,8 +314,8 @@ static void pushOut(const Buckets& buckets, double alpha, double toolRadius, Pro
 
 void followSurface(const Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy) {
   const Vector3d start = proxy.centre, carried = start + carriedBy(buckets, alpha, proxy);
-  if (!(carried.lpNorm<Eigen::Infinity>() <= toolReach))
-    throw std::runtime_error("a touched surface carried the tool beyond " + std::to_string(int(toolReach)) +
+  if (!(carried.lpNorm<Eigen::Infinity>() <= kToolReach))
+    throw std::runtime_error("a touched surface carried the tool beyond " + std::to_string(int(kToolReach)) +
                              " m: the state of its body is not finite any more in effect; use more substeps");
   proxy.centre = notPassedOver(buckets, alphaBefore, alpha, proxy.radius, start, carried);
   pushOut(buckets, alpha, toolRadius, proxy);
@@ -362,7 +363,7 @@ Proxy placeProxy(const Buckets& buckets, const Vector3d& device, double toolRadi
     if (winding < 0.5) return proxy;
     // Straight on through the nearest point of the surface.
     const Vector3d outward = nearest > 0 ? Vector3d((closest.point - proxy.centre) / nearest) : Vector3d::UnitY();
-    proxy.centre = closest.point + standOff * outward;
+    proxy.centre = closest.point + kStandOff * outward;
   }
   return proxy;
 }

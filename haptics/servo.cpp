@@ -58,10 +58,10 @@ struct Servo::Data {
 // ---- Checks ----------------------------------------------------------------------------------------------
 
 static void checkSample(const ToolSample& sample, std::size_t tool) {
-  const bool inReach = sample.position.allFinite() && sample.position.lpNorm<Eigen::Infinity>() <= toolReach;
+  const bool inReach = sample.position.allFinite() && sample.position.lpNorm<Eigen::Infinity>() <= kToolReach;
   if (!inReach)
     throw std::runtime_error("tool " + std::to_string(tool) + ": device position is not finite or more than " +
-                             std::to_string(int(toolReach)) + " m from the origin");
+                             std::to_string(int(kToolReach)) + " m from the origin");
   if (!(std::abs(sample.worldFromTool.norm() - 1) < 1e-3) || !std::isfinite(sample.grip))
     throw std::runtime_error("tool " + std::to_string(tool) + ": expected a unit quaternion and a finite grip");
 }
@@ -431,7 +431,7 @@ void Servo::handOver(double frameDuration, Loads& out) {
 }
 
 void Servo::makeRoom(Loads& out) const {
-  out.toolSprings.reserve(data_->tools.size() * contactPatchCapacity);
+  out.toolSprings.reserve(data_->tools.size() * kContactPatchCapacity);
   out.heldNodes.reserve(data_->tools.size() * data_->surfaces.reading().surface().from.size());
 }
 
@@ -444,7 +444,7 @@ static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, int i
   tool.device = start;
   tool.proxy = placeProxy(buckets, start.position, settings.radius);
   tool.grip.held.reserve(buckets.surface().from.size());
-  tool.patch.entries.reserve(contactPatchCapacity);
+  tool.patch.entries.reserve(kContactPatchCapacity);
   startFrame(buckets.surface(), 0, tool);
   return tool;
 }
@@ -467,7 +467,7 @@ Servo::Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSet
   assert(tools.size() == start.size() && tickDuration > 0);
   const Buckets& buckets = data_->surfaces.reading();
   data_->steps = buckets.surface().steps;
-  data_->contacts.reserve(contactPatchCapacity);
+  data_->contacts.reserve(kContactPatchCapacity);
   data_->tools.reserve(tools.size());
   data_->states.reserve(tools.size());
   for (std::size_t k = 0; k < tools.size(); ++k) {

@@ -58,7 +58,7 @@ class Servo {
   bool beginFrame();
 
   // One servo tick at the blend alpha (0..1], not falling within a frame, for one sample per tool. Throws
-  // std::runtime_error naming the tool whose device is not finite or beyond toolReach.
+  // std::runtime_error naming the tool whose device is not finite or beyond kToolReach.
   void tick(double alpha, const std::vector<ToolSample>& inputs);
 
   const std::vector<ToolState>& tools() const;

@@ -9,11 +9,11 @@ namespace medulla {
 using Eigen::Vector3d;
 
 // Below this squared ratio of height to length a triangle is a needle without a usable normal.
-static constexpr double degenerateArea = 1e-20;
+static constexpr double kDegenerateArea = 1e-20;
 
 static bool isDegenerate(const Vector3d& ab, const Vector3d& ac, const Vector3d& doubleArea) {
   const double longest = std::max({ab.squaredNorm(), ac.squaredNorm(), (ac - ab).squaredNorm()});
-  return doubleArea.squaredNorm() <= degenerateArea * longest * longest;
+  return doubleArea.squaredNorm() <= kDegenerateArea * longest * longest;
 }
 
 static TrianglePoint closestOnEdges(const Triangle& triangle, const Vector3d& p) {

@@ -8,7 +8,7 @@ namespace medulla {
 
 // m; device positions lie within this of the origin on every axis. The ray queries run in float: farther out their
 // rounding would outgrow the 10 um by which the surface's bounds are padded. Also catches trajectories in millimetres.
-constexpr double toolReach = 20;
+constexpr double kToolReach = 20;
 
 // One row of a haptic trajectory: where the device is and how far its grip is closed.
 struct ToolSample {

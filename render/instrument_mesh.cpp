@@ -140,12 +140,11 @@ void addJaw(Builder& b, float side, float angle) {
                    turned({x / j.halfWidth, std::sin(phi) / j.height, lean / j.height}), kSteel);
       if (a == 0) first = i;
     }
-    for (std::uint32_t a = 0; k > 0 && a < kArc; ++a) {
+    for (std::uint32_t a = 0; k > 0 && a < kArc; ++a)
       if (side > 0)
         b.quad(previous + a, first + a, first + a + 1, previous + a + 1);
       else
         b.quad(previous + a, previous + a + 1, first + a + 1, first + a);
-    }
     previous = first;
   }
   // Bite: transverse ridges, flat faces; smooth near the hinge and at the very tip.

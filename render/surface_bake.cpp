@@ -233,12 +233,11 @@ void bakeOpenness(SceneMesh& mesh) {
   const std::vector<float> zero(n, 0.f);
   Gathered sum{zero, zero, zero, zero};
   Parts staying;
-  for (const MeshPart& part : mesh.parts) {
+  for (const MeshPart& part : mesh.parts)
     if (part.travels)
       gatherLight(mesh, {&part}, sum);
     else
       staying.push_back(&part);
-  }
   gatherLight(mesh, staying, sum);
   for (std::size_t i = 0; i < n; ++i) {
     mesh.openness[i] = sum.total[i] > 0 ? sum.light[i] / sum.total[i] : 1.f;

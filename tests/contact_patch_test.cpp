@@ -17,16 +17,16 @@ static Proxy touching(int triangle) {
 
 TEST(ContactPatch, WhatIsTouchedNowCountsHoweverManyTrianglesWereBefore) {
   ContactPatch patch;
-  patch.entries.reserve(contactPatchCapacity);
-  const int last = 2 * contactPatchCapacity;
+  patch.entries.reserve(kContactPatchCapacity);
+  const int last = 2 * kContactPatchCapacity;
   for (int triangle = 0; triangle <= last; ++triangle) {
     fadePatch(0.99, patch);
     addContacts(touching(triangle), 1, patch);
   }
-  ASSERT_EQ(patch.entries.size(), contactPatchCapacity);
+  ASSERT_EQ(patch.entries.size(), kContactPatchCapacity);
   double total = 0;
   for (const ContactPatch::Entry& entry : patch.entries) {
-    EXPECT_GT(entry.triangle, last - contactPatchCapacity);  // those touched last
+    EXPECT_GT(entry.triangle, last - kContactPatchCapacity);  // those touched last
     EXPECT_NEAR(entry.weights.sum(), entry.share, 1e-12);
     total += entry.share;
   }

@@ -63,7 +63,7 @@ TEST(LiveServo, WhatTheServoRefusesReachesTheCaller) {
   LoadedScene loaded = gallbladder(1);
   ToolSample lost = loaded.trajectories[0].samples.front();
   lost.time = 0.1;
-  lost.position.x() = 1.5 * toolReach;
+  lost.position.x() = 1.5 * kToolReach;
   loaded.trajectories[0].samples = {loaded.trajectories[0].samples.front(), lost};
   Simulation simulation(loaded);
   LiveServo live(simulation);

@@ -225,9 +225,8 @@ void identifyModel(const BuildOptions& options, BuildJob& job) {
 std::vector<Result> resultsOf(const std::vector<BuildJob>& jobs) {
   if (jobs.size() == 1) {
     std::vector<Result> results = buildResults(jobs[0].report);
-    if (jobs[0].model.identified) {
+    if (jobs[0].model.identified)
       for (const Result& r : identifiedResults(*jobs[0].model.identified, jobs[0].formulas)) results.push_back(r);
-    }
     return results;
   }
   std::vector<Result> results;

@@ -27,7 +27,7 @@ static std::string nameFrom(const std::string& meshPath) {
 
 // A tool starts outside of the body, not farther away than the body is large.
 static void requireWithinReach(const std::string& mesh, double metresPerUnit) {
-  const double reach = toolReach / 3;
+  const double reach = kToolReach / 3;
   for (const Eigen::Vector3d& x : readMesh(mesh, metresPerUnit).vertices)
     if (x.lpNorm<Eigen::Infinity>() > reach)
       throw std::runtime_error(

@@ -56,9 +56,8 @@ TriangleMesh readWithAssimp(const std::string& path) {
     const int offset = static_cast<int>(mesh.vertices.size());
     for (unsigned v = 0; v < part.mNumVertices; ++v) {
       const aiVector3D& p = part.mVertices[v];
-      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
+      if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
         throw inputError(path, 0, "vertex " + std::to_string(mesh.vertices.size()) + " is not finite");
-      }
       mesh.vertices.emplace_back(p.x, p.y, p.z);
     }
     for (unsigned f = 0; f < part.mNumFaces; ++f) {

@@ -108,11 +108,10 @@ void readSkin(const std::string& path, const XmlElement& element, std::size_t no
       SkinFrame& f = frames.emplace_back();
       f.frame = rows.index(spheres + network.patches.size());
       rows.get(f.weight);
-      if (f.frame < static_cast<int>(spheres)) {
+      if (f.frame < static_cast<int>(spheres))
         f.restPoint = network.frames[f.frame].restPosition;
-      } else {
+      else
         rows.get(f.restPoint);
-      }
       rows.get(f.map);
       rows.require(f.weight >= 0, "a negative weight");
       sum += f.weight;
@@ -124,7 +123,7 @@ void readSkin(const std::string& path, const XmlElement& element, std::size_t no
 }
 
 IdentifiedError readError(const XmlElement& element, const char* name) {
-  const std::vector<double> values = readNumbers(element, name, 2, notNegative);
+  const std::vector<double> values = readNumbers(element, name, 2, kNotNegative);
   return {values[0], values[1]};
 }
 
@@ -175,9 +174,8 @@ void putIdentified(std::string& out, const IdentifiedNetwork& network) {
   putRows(out, "identified_links", network.links.size(), [&](std::size_t k) {
     const IdentifiedLink& l = network.links[k];
     put(out, l.frame0, l.frame1, l.restPoint1, l.axes);
-    for (int b = 0; b < 6; ++b) {
+    for (int b = 0; b < 6; ++b)
       for (int a = b; a < 6; ++a) put(out, l.stiffness(a, b));
-    }
   });
   if (hasStrains(network)) {
     putRows(out, "identified_strains", network.links.size(), [&](std::size_t k) {
@@ -194,10 +192,10 @@ std::shared_ptr<const IdentifiedNetwork> readIdentified(const std::string& path,
                                                         const SoftBodyModel& model) {
   auto network = std::make_shared<IdentifiedNetwork>();
   network->poisson = readNumber(element, "poisson", 0, {0, 0.5, false, true});
-  network->lengthScale = readNumber(element, "length_scale", 0, positive);
-  network->voxel = readNumber(element, "voxel", 0, positive);
+  network->lengthScale = readNumber(element, "length_scale", 0, kPositive);
+  network->voxel = readNumber(element, "voxel", 0, kPositive);
   network->usesFormulas = readChoice(element, "formulas", {"no", "yes"}, 0) == 1;
-  const std::vector<double> layer = readNumbers(element, "layer", 3, notNegative);
+  const std::vector<double> layer = readNumbers(element, "layer", 3, kNotNegative);
   network->layer = {layer[0], layer[1], layer[2]};
   network->bulk = readError(element, "error_bulk");
   network->poke = readError(element, "error_poke");

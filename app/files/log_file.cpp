@@ -26,9 +26,8 @@ LogFile::LogFile(const std::string& path, const std::vector<std::string>& tools,
     : file_(path), toolCount_(tools.size()), bodyCount_(bodies.size()) {
   std::string header = "t";
   for (const std::string& tool : tools) {
-    for (const char* quantity : {"device", "proxy", "force"}) {
+    for (const char* quantity : {"device", "proxy", "force"})
       header += fmt::format(",{0}.{1}.x,{0}.{1}.y,{0}.{1}.z", tool, quantity);
-    }
     header += fmt::format(",{0}.contact,{0}.held,{0}.clamped,{0}.slipped,{0}.energy", tool);
   }
   for (const std::string& body : bodies) header += fmt::format(",{0}.volume_ratio,{0}.dynamic_nodes", body);

@@ -20,7 +20,7 @@ namespace medulla {
 
 namespace {
 
-constexpr int formatVersion = 4;
+constexpr int kFormatVersion = 4;
 
 const XmlRules& modelRules() {
   static const XmlRules rules = [] {
@@ -75,9 +75,8 @@ std::uint64_t readMeshHash(const XmlElement& root) {
   const std::string text = readText(root, "mesh_hash");
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
-  if (error != std::errc() || end != text.data() + text.size() || text.size() != 16) {
+  if (error != std::errc() || end != text.data() + text.size() || text.size() != 16)
     refuse(root, "mesh_hash", "expected 16 hexadecimal digits");
-  }
   return value;
 }
 
@@ -211,7 +210,7 @@ void readRenderSurface(const std::string& path, const XmlElement& root, std::siz
 void writeModel(const std::string& path, const SoftBodyModel& model) {
   OutputFile file(path);
   std::string out = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
-  out += fmt::format("<model version=\"{}\" name=\"{}\" mesh_hash=\"{:016x}\" settings=\"{}\">\n", formatVersion,
+  out += fmt::format("<model version=\"{}\" name=\"{}\" mesh_hash=\"{:016x}\" settings=\"{}\">\n", kFormatVersion,
                      escapedXml(model.name), model.meshHash, escapedXml(model.settings));
   putArray(out, "input_vertices", model.nodeOfInputVertex);
   putArray(out, "nodes", model.restNodes);
@@ -229,9 +228,9 @@ void writeModel(const std::string& path, const SoftBodyModel& model) {
 SoftBodyModel readModel(const std::string& path) {
   // Another version may have other elements: it is the first thing to be told.
   const auto checkVersion = [](const XmlElement& root) {
-    const int version = readInteger(root, "version", formatVersion);
-    if (version == formatVersion) return;
-    refuse(root, "version", "expected " + std::to_string(formatVersion) + "; make the model anew with medulla build");
+    const int version = readInteger(root, "version", kFormatVersion);
+    if (version == kFormatVersion) return;
+    refuse(root, "version", "expected " + std::to_string(kFormatVersion) + "; make the model anew with medulla build");
   };
   const XmlElement root = readXml(path, modelRules(), checkVersion);
   SoftBodyModel model;

@@ -55,7 +55,7 @@ class Rows {
   Rows(const std::string& path, const XmlElement& element) : path_(path), element_(element) {
     rest_ = element_.text;
     line_ = std::max(element_.textLine, element_.line);
-    rows_ = readInteger(element_, "rows", 0, notNegative);
+    rows_ = readInteger(element_, "rows", 0, kNotNegative);
   }
 
   // Calls readRow() for every row; afterwards no text may be left.
@@ -113,11 +113,10 @@ class Rows {
 
   template <typename T>
   void getValue(T& value) {
-    if constexpr (std::is_arithmetic_v<T>) {
+    if constexpr (std::is_arithmetic_v<T>)
       value = next<T>();
-    } else {
+    else
       for (long k = 0; k < static_cast<long>(value.size()); ++k) getValue(value.data()[k]);
-    }
   }
 
   const std::string& path_;

@@ -21,11 +21,9 @@ Eigen::Vector3d vertex(const TextLines& lines) {
 int corner(const TextLines& lines, std::string_view word, std::size_t vertices) {
   const std::size_t slash = word.find('/');
   const long long given = lines.integer(word.substr(0, slash));
-  for (const char c : word.substr(std::min(slash, word.size()))) {
-    if (c != '/' && c != '-' && !std::isdigit(static_cast<unsigned char>(c))) {
+  for (const char c : word.substr(std::min(slash, word.size())))
+    if (c != '/' && c != '-' && !std::isdigit(static_cast<unsigned char>(c)))
       lines.fail("expected a face corner v, v/vt, v//vn or v/vt/vn, found " + inQuotes(word));
-    }
-  }
   const long long count = static_cast<long long>(vertices);
   if (given == 0) lines.fail("vertex 0 in a face: OBJ counts from 1");
   if (given < -count)

@@ -60,9 +60,8 @@ void readFace(const TextLines& lines, long long vertices, std::vector<int>& poly
   polygon.clear();
   for (long long i = 1; i <= corners; ++i) {
     const long long index = lines.integer(words[i]);
-    if (index < 0 || index >= vertices) {
+    if (index < 0 || index >= vertices)
       lines.fail("face refers to vertex " + std::to_string(index) + ", expected 0 to " + std::to_string(vertices - 1));
-    }
     polygon.push_back(static_cast<int>(index));
   }
 }
@@ -77,18 +76,16 @@ TriangleMesh parseOff(std::string_view text, const std::string& name) {
   mesh.vertices.reserve(counts.vertices);
   mesh.triangles.reserve(counts.faces);
   for (long long i = 0; i < counts.vertices; ++i) {
-    if (!lines.next()) {
+    if (!lines.next())
       lines.fail("the file ends after " + std::to_string(i) + " of " + std::to_string(counts.vertices) + " vertices");
-    }
     const auto& words = lines.words();
     if (words.size() < 3) lines.fail("expected a vertex 'x y z'");
     mesh.vertices.emplace_back(lines.number(words[0]), lines.number(words[1]), lines.number(words[2]));
   }
   std::vector<int> polygon;
   for (long long i = 0; i < counts.faces; ++i) {
-    if (!lines.next()) {
+    if (!lines.next())
       lines.fail("the file ends after " + std::to_string(i) + " of " + std::to_string(counts.faces) + " faces");
-    }
     readFace(lines, counts.vertices, polygon);
     for (std::size_t k = 2; k < polygon.size(); ++k) mesh.triangles.push_back({polygon[0], polygon[k - 1], polygon[k]});
   }

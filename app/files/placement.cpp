@@ -16,16 +16,15 @@ Eigen::Quaterniond readOrientation(const XmlElement& element, const std::string&
   if (q.empty()) return Eigen::Quaterniond::Identity();
   const Eigen::Quaterniond orientation(q[0], q[1], q[2], q[3]);
   // Rounded figures are normalised; anything further off is a mistake rather than rounding.
-  if (!(std::abs(orientation.norm() - 1) <= 1e-3)) {
+  if (!(std::abs(orientation.norm() - 1) <= 1e-3))
     refuse(element, attribute, "expected a unit quaternion w x y z (length within 1e-3 of 1)");
-  }
   return orientation.normalized();
 }
 
 Eigen::Isometry3d readPlacement(const XmlElement& element) {
   Eigen::Isometry3d out = Eigen::Isometry3d::Identity();
   if (element.find("orientation")) out.linear() = readOrientation(element, "orientation").toRotationMatrix();
-  out.translation() = readVector(element, "position", Eigen::Vector3d::Zero(), anyPlace);
+  out.translation() = readVector(element, "position", Eigen::Vector3d::Zero(), kAnyPlace);
   return out;
 }
 

@@ -9,7 +9,7 @@
 namespace medulla {
 
 Eigen::Vector3d readVector(const XmlElement& element, const std::string& attribute, const Eigen::Vector3d& fallback,
-                           Range range = anyNumber);
+                           Range range = kAnyNumber);
 
 // A quaternion w x y z, within 1e-3 of unit length; identity where absent.
 Eigen::Quaterniond readOrientation(const XmlElement& element, const std::string& attribute);

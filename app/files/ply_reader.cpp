@@ -289,14 +289,13 @@ void readRow(Values& values, const Element& element, long long vertices, PlyRow&
   row.corners.clear();
   for (const Property& p : element.properties) {
     const long long length = p.count ? values.listLength(p) : 1;
-    for (long long k = 0; k < length; ++k) {
+    for (long long k = 0; k < length; ++k)
       if (p.use == Use::corners)
         row.corners.push_back(static_cast<int>(values.whole(p.type, vertices - 1, "a corner at vertex")));
       else if (p.use == Use::none)
         values.next(p.type);
       else
         row.position[static_cast<int>(p.use) - static_cast<int>(Use::x)] = values.next(p.type);
-    }
   }
 }
 

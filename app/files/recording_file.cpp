@@ -46,17 +46,16 @@ std::string locate(const ColumnChoice& choice, const std::vector<std::string>& h
   for (const std::string& column : choice) {
     const auto number = parseNumber<int>(column);
     const auto found = std::find(header.begin(), header.end(), column);
-    if (found != header.end()) {
+    if (found != header.end())
       out.push_back(static_cast<std::size_t>(found - header.begin()));
-    } else if (number && *number >= 1 && static_cast<std::size_t>(*number) <= count) {
+    else if (number && *number >= 1 && static_cast<std::size_t>(*number) <= count)
       out.push_back(static_cast<std::size_t>(*number) - 1);
-    } else if (number) {
+    else if (number)
       return fmt::format("column {} is wanted, but there are {}", *number, count);
-    } else if (header.empty()) {
+    else if (header.empty())
       return fmt::format("column {} is wanted, but the file has no header", inQuotes(column));
-    } else {
+    else
       return fmt::format("no column {}; did you mean {}?", inQuotes(column), inQuotes(nearestName(column, header)));
-    }
   }
   return "";
 }

@@ -82,7 +82,7 @@ bool readColumns(const XmlElement& e, const std::string& attribute, std::vector<
 void readLayout(const XmlElement& e, RecordingColumns& columns) {
   if (e.find("time") && e.find("rate")) refuse(e, "rate", "expected either a time column or a rate");
   if (readColumns(e, "time", {1, 2}, columns.time)) columns.rate = 0;
-  columns.rate = readNumber(e, "rate", columns.rate, positive);
+  columns.rate = readNumber(e, "rate", columns.rate, kPositive);
   if (e.find("rate")) columns.time.clear();
   readColumns(e, "position", {3}, columns.position);
   if (e.find("quaternion") && e.find("matrix")) refuse(e, "matrix", "expected either a quaternion or a matrix");
@@ -108,16 +108,16 @@ void readGrip(const XmlElement& e, RecordingMap& map) {
 
 void readFrame(const XmlElement& e, RecordingMap& map) {
   if (e.find("mirror")) map.mirror[readChoice(e, "mirror", {"x", "y", "z"}, 0)] = -1;
-  map.scale = readNumber(e, "scale", map.scale, positive);
+  map.scale = readNumber(e, "scale", map.scale, kPositive);
   map.worldFromRecording = readPlacement(e);
   map.deviceFromTool = readOrientation(e, "tool");
 }
 
 void readSpan(const XmlElement& e, RecordingMap& map) {
-  map.from = readNumber(e, "from", map.from, notNegative);
-  map.to = readNumber(e, "to", map.to, notNegative);
+  map.from = readNumber(e, "from", map.from, kNotNegative);
+  map.to = readNumber(e, "to", map.to, kNotNegative);
   if (!(map.to > map.from)) refuse(e, e.find("to") ? "to" : "from", "expected from < to");
-  map.delay = readNumber(e, "delay", map.delay, notNegative);
+  map.delay = readNumber(e, "delay", map.delay, kNotNegative);
   map.smooth = readNumber(e, "smooth", map.smooth, {0, 1});
 }
 

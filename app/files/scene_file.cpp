@@ -39,9 +39,7 @@ std::string readName(const XmlElement& element) {
   const auto plain = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
   };
-  if (!std::all_of(name.begin(), name.end(), plain)) {
-    refuse(element, "name", "expected letters, digits, _ and - only");
-  }
+  if (!std::all_of(name.begin(), name.end(), plain)) refuse(element, "name", "expected letters, digits, _ and - only");
   return name;
 }
 
@@ -71,8 +69,8 @@ void readDynamics(const XmlElement& dynamics, WorldSettings& out) {
   if (out.order == 2 && out.integrator != Integrator::implicit)
     refuse(dynamics, "order", "expected 1 with integrator=\"explicit\": order 2 needs integrator=\"implicit\"");
   out.gravity = readVector(dynamics, "gravity", out.gravity);
-  out.ambientDrag = readNumber(dynamics, "ambient_drag", out.ambientDrag, notNegative);
-  out.sleepAfter = readNumber(dynamics, "sleep_after", out.sleepAfter, notNegative);
+  out.ambientDrag = readNumber(dynamics, "ambient_drag", out.ambientDrag, kNotNegative);
+  out.sleepAfter = readNumber(dynamics, "sleep_after", out.sleepAfter, kNotNegative);
   out.substeps = readInteger(dynamics, "substeps", out.substeps, {0, 100000});
   out.contact = readEnum(dynamics, "contact", out.contact);
 }
@@ -87,11 +85,11 @@ std::vector<NamedTissue> readTissues(const XmlElement& root) {
   std::set<std::string> taken;
   for (const XmlElement* e : childrenOf(root, "tissue")) {
     Tissue t;
-    t.young = readNumber(*e, "young", t.young, positive);
+    t.young = readNumber(*e, "young", t.young, kPositive);
     t.poisson = readNumber(*e, "poisson", t.poisson, {0, 0.5, false, true});
-    t.density = readNumber(*e, "density", t.density, positive);
-    t.damping = readNumber(*e, "damping", t.damping, notNegative);
-    t.friction = readNumber(*e, "friction", t.friction, notNegative);
+    t.density = readNumber(*e, "density", t.density, kPositive);
+    t.damping = readNumber(*e, "damping", t.damping, kNotNegative);
+    t.friction = readNumber(*e, "friction", t.friction, kNotNegative);
     out.push_back({readUniqueName(*e, taken), t});
   }
   return out;
@@ -143,10 +141,8 @@ void readFixations(const XmlElement& body, const std::string& scenePath, SceneBo
       out.fixes.push_back({fix->line, nodes, freedom});
       continue;
     }
-    for (const int sphere : readIntegers(*fix, "spheres", 0, notNegative)) {
-      if (!taken.insert(sphere).second) {
-        refuse(*fix, "spheres", "sphere " + std::to_string(sphere) + " is fixed twice");
-      }
+    for (const int sphere : readIntegers(*fix, "spheres", 0, kNotNegative)) {
+      if (!taken.insert(sphere).second) refuse(*fix, "spheres", "sphere " + std::to_string(sphere) + " is fixed twice");
       out.fixed.push_back({sphere, freedom});
     }
   }
@@ -163,8 +159,8 @@ std::vector<SceneLoad> readLoads(const XmlElement& body, const std::string& scen
     if (fromFile && e->find("force")) refuse(*e, "force", "the file has the forces, expected one of the two");
     if (!fromFile && !e->find("force")) refuse(*e, "force", "expected the attribute \"force\"");
     load.whole.force = readVector(*e, "force", load.whole.force);
-    load.whole.from = readNumber(*e, "from", load.whole.from, notNegative);
-    load.whole.to = readNumber(*e, "to", load.whole.to, notNegative);
+    load.whole.from = readNumber(*e, "from", load.whole.from, kNotNegative);
+    load.whole.to = readNumber(*e, "to", load.whole.to, kNotNegative);
     if (load.whole.to < load.whole.from)
       refuse(*e, e->find("to") ? "to" : "from",
              fmt::format("the load grows from {} s to {} s, expected the earlier time first", load.whole.from,
@@ -178,14 +174,14 @@ std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::v
   std::vector<DrivenSphere> out;
   for (const XmlElement* drive : childrenOf(body, "drive")) {
     DrivenSphere d;
-    d.sphere = readInteger(*drive, "sphere", d.sphere, notNegative);
+    d.sphere = readInteger(*drive, "sphere", d.sphere, kNotNegative);
     const auto isThis = [&](const auto& other) { return other.sphere == d.sphere; };
     if (std::any_of(fixed.begin(), fixed.end(), isThis)) refuse(*drive, "sphere", "this sphere is fixed");
     if (std::any_of(out.begin(), out.end(), isThis)) refuse(*drive, "sphere", "this sphere is driven twice");
     d.axis = readVector(*drive, "axis", d.axis);
     if (d.axis.isZero()) refuse(*drive, "axis", "expected a direction");
-    d.amplitude = readNumber(*drive, "amplitude", d.amplitude, {.low = 0, .most = anyLength.most});
-    d.frequency = readNumber(*drive, "frequency", d.frequency, positive);
+    d.amplitude = readNumber(*drive, "amplitude", d.amplitude, {.low = 0, .most = kAnyLength.most});
+    d.frequency = readNumber(*drive, "frequency", d.frequency, kPositive);
     d.phase = readNumber(*drive, "phase", d.phase);
     d.velocity = readVector(*drive, "velocity", d.velocity);
     d.freedom = readEnum(*drive, "dof", d.freedom);
@@ -196,9 +192,9 @@ std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::v
 
 LinkFactors readLinkFactors(const XmlElement& links) {
   LinkFactors out;
-  out.elongation = readNumber(links, "elongation", out.elongation, positive);
-  out.flexion = readNumber(links, "flexion", out.flexion, positive);
-  out.torsion = readNumber(links, "torsion", out.torsion, positive);
+  out.elongation = readNumber(links, "elongation", out.elongation, kPositive);
+  out.flexion = readNumber(links, "flexion", out.flexion, kPositive);
+  out.torsion = readNumber(links, "torsion", out.torsion, kPositive);
   return out;
 }
 
@@ -269,10 +265,10 @@ void readShape(const XmlElement& e, StaticShape& shape) {
     if (!(normal.norm() > 0)) refuse(e, "normal", "expected a direction");
     shape.worldFromShape.linear() = rotationBetween(Eigen::Vector3d::UnitY(), normal).toRotationMatrix();
   }
-  const std::vector<double> size = readNumbers(e, "size", 3, anyLength);
+  const std::vector<double> size = readNumbers(e, "size", 3, kAnyLength);
   if (box) shape.size = {size[0], size[1], size[2]};
-  shape.radius = readNumber(e, "radius", shape.radius, anyLength);
-  shape.friction = readNumber(e, "friction", shape.friction, notNegative);
+  shape.radius = readNumber(e, "radius", shape.radius, kAnyLength);
+  shape.friction = readNumber(e, "friction", shape.friction, kNotNegative);
 }
 
 void readStatics(const XmlElement& root, Scene& scene) {
@@ -291,7 +287,7 @@ void readStatics(const XmlElement& root, Scene& scene) {
 }
 
 void readTools(const XmlElement& root, Scene& scene) {
-  constexpr Range toolLength{.low = 0, .lowExcluded = true, .most = toolReach / 4};  // queries go little beyond a tool
+  constexpr Range toolLength{.low = 0, .lowExcluded = true, .most = kToolReach / 4};  // queries go little beyond a tool
   std::set<std::string> taken;
   for (const XmlElement* e : childrenOf(root, "tool")) {
     SceneTool tool;
@@ -302,12 +298,12 @@ void readTools(const XmlElement& root, Scene& scene) {
       refuse(*e, "name", "a <body> has this name, and columns of logs are named after both");
     tool.trajectoryPath = readPath(*e, "trajectory", scene.path);
     s.radius = readNumber(*e, "radius", s.radius, toolLength);
-    s.stiffness = readNumber(*e, "stiffness", s.stiffness, positive);
-    s.damping = readNumber(*e, "damping", s.damping, notNegative);
-    s.forceMax = readNumber(*e, "force_max", s.forceMax, positive);
+    s.stiffness = readNumber(*e, "stiffness", s.stiffness, kPositive);
+    s.damping = readNumber(*e, "damping", s.damping, kNotNegative);
+    s.forceMax = readNumber(*e, "force_max", s.forceMax, kPositive);
     s.gripRadius = readNumber(*e, "grip_radius", s.gripRadius, toolLength);
-    s.gripForceMax = readNumber(*e, "grip_force_max", s.gripForceMax, positive);
-    const std::vector<double> friction = readNumbers(*e, "friction", 2, notNegative);
+    s.gripForceMax = readNumber(*e, "grip_force_max", s.gripForceMax, kPositive);
+    const std::vector<double> friction = readNumbers(*e, "friction", 2, kNotNegative);
     if (!friction.empty()) {
       if (friction[0] < friction[1]) refuse(*e, "friction", "expected static >= dynamic friction");
       s.staticFriction = friction[0];
@@ -320,9 +316,9 @@ void readTools(const XmlElement& root, Scene& scene) {
 // A key says what changes; what it leaves out is the camera's own.
 CameraKey readCameraKey(const XmlElement& e, CameraKey key) {
   key.line = e.line;
-  key.time = readNumber(e, "t", 0, notNegative);
-  key.position = readVector(e, "position", key.position, anyPlace);
-  key.target = readVector(e, "target", key.target, anyPlace);
+  key.time = readNumber(e, "t", 0, kNotNegative);
+  key.position = readVector(e, "position", key.position, kAnyPlace);
+  key.target = readVector(e, "target", key.target, kAnyPlace);
   key.fovDegrees = readNumber(e, "fov", key.fovDegrees, {0, 180, true, true});
   if (key.position == key.target) refuse(e, "position", "position and target are the same point");
   return key;
@@ -333,9 +329,8 @@ void readCamera(const XmlElement& camera, Scene& scene) {
   for (const XmlElement* e : childrenOf(camera, "key")) {
     const CameraKey key = readCameraKey(*e, own);
     if (scene.camera.empty() && key.time > 0) scene.camera.push_back(own);
-    if (!scene.camera.empty() && key.time <= scene.camera.back().time) {
+    if (!scene.camera.empty() && key.time <= scene.camera.back().time)
       refuse(*e, "t", "expected a later time than the key before it");
-    }
     scene.camera.push_back(key);
   }
   if (scene.camera.empty()) scene.camera.push_back(own);
@@ -343,18 +338,18 @@ void readCamera(const XmlElement& camera, Scene& scene) {
 }
 
 void readLight(const XmlElement& light, Scene& scene) {
-  scene.lightOffset = readVector(light, "offset", scene.lightOffset, anyPlace);
-  scene.lightIntensity = readNumber(light, "intensity", scene.lightIntensity, notNegative);
-  if (light.find("position")) scene.lightPosition = readVector(light, "position", Eigen::Vector3d::Zero(), anyPlace);
+  scene.lightOffset = readVector(light, "offset", scene.lightOffset, kAnyPlace);
+  scene.lightIntensity = readNumber(light, "intensity", scene.lightIntensity, kNotNegative);
+  if (light.find("position")) scene.lightPosition = readVector(light, "position", Eigen::Vector3d::Zero(), kAnyPlace);
   const CameraKey& first = scene.camera.front();
   const double away = (first.target - scene.lightPosition.value_or(first.position)).norm();
   scene.lightReferenceDistance =
-      readNumber(light, "reference_distance", away > 0 ? away : scene.lightReferenceDistance, anyLength);
+      readNumber(light, "reference_distance", away > 0 ? away : scene.lightReferenceDistance, kAnyLength);
   if (scene.lightPosition && light.find("offset"))
     refuse(light, "offset", "the light has a position in the world, expected one of the two");
-  const std::vector<double> haze = readNumbers(light, "haze", 3, notNegative);
+  const std::vector<double> haze = readNumbers(light, "haze", 3, kNotNegative);
   if (!haze.empty()) scene.haze = Eigen::Vector3d(haze[0], haze[1], haze[2]);
-  scene.hazeDistance = readNumber(light, "haze_distance", scene.hazeDistance, anyLength);
+  scene.hazeDistance = readNumber(light, "haze_distance", scene.hazeDistance, kAnyLength);
   if (!scene.haze && light.find("haze_distance")) refuse(light, "haze_distance", "expected a haze beside it");
   scene.caustics = readNumber(light, "caustics", scene.caustics, {0, 1});
   if (!scene.lightPosition && scene.caustics > 0) refuse(light, "caustics", "expected a light with a position");
@@ -362,7 +357,7 @@ void readLight(const XmlElement& light, Scene& scene) {
 
 void readCaptions(const XmlElement& output, Scene& scene) {
   for (const XmlElement* e : childrenOf(output, "caption")) {
-    SceneCaption caption{readNumber(*e, "from", 0, notNegative), readNumber(*e, "to", 0, notNegative),
+    SceneCaption caption{readNumber(*e, "from", 0, kNotNegative), readNumber(*e, "to", 0, kNotNegative),
                          readText(*e, "text")};
     if (caption.text.empty()) refuse(*e, "text", "expected words");
     const auto drawable = [](char c) { return ' ' <= c && c <= '~'; };  // others would be boxes
@@ -384,16 +379,14 @@ void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene)
     scene.height = size[1];
   }
   scene.fps = readNumber(output, "fps", scene.fps, {1, 240});
-  scene.goldenTimes = readNumbers(output, "golden", 0, notNegative);
-  for (std::size_t k = 1; k < scene.goldenTimes.size(); ++k) {
+  scene.goldenTimes = readNumbers(output, "golden", 0, kNotNegative);
+  for (std::size_t k = 1; k < scene.goldenTimes.size(); ++k)
     if (scene.goldenTimes[k] <= scene.goldenTimes[k - 1]) refuse(output, "golden", "expected increasing times");
-  }
   // A run cut short from the command line is still a run; a scene file that contradicts itself is a mistake.
   const bool overridden = durationOverridden && !scene.goldenTimes.empty();
   if (overridden) std::erase_if(scene.goldenTimes, [&](double t) { return t > scene.duration; });
-  if (!scene.goldenTimes.empty() && scene.goldenTimes.back() > scene.duration) {
+  if (!scene.goldenTimes.empty() && scene.goldenTimes.back() > scene.duration)
     refuse(output, "golden", "a time beyond the scene's duration");
-  }
   readCaptions(output, scene);
 }
 

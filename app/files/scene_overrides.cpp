@@ -19,9 +19,8 @@ struct Target {
 
 void listTargets(XmlElement& element, const std::string& prefix, std::vector<Target>& out) {
   const XmlRule& rule = ruleOf(sceneRules(), element.name);
-  for (const auto* attributes : {&rule.required, &rule.optional}) {
+  for (const auto* attributes : {&rule.required, &rule.optional})
     for (const std::string& a : *attributes) out.push_back({prefix + a, &element, a});
-  }
   for (XmlElement& child : element.children) {
     const bool known = std::any_of(rule.children.begin(), rule.children.end(),
                                    [&](const XmlRule::Child& c) { return c.name == child.name; });
@@ -45,9 +44,8 @@ void addOptionalSingles(XmlElement& element) {
     added.line = element.line;
     element.children.push_back(added);
   }
-  for (XmlElement& child : element.children) {
+  for (XmlElement& child : element.children)
     if (child.name == "body") addOptionalSingles(child);
-  }
 }
 
 OverriddenAttribute applyOverride(XmlElement& root, const SceneOverride& override) {
@@ -64,9 +62,8 @@ OverriddenAttribute applyOverride(XmlElement& root, const SceneOverride& overrid
     throw std::runtime_error(where + ": the scene has nothing of this name; did you mean " +
                              nearestName(override.path, known) + "?");
   }
-  if (std::count_if(targets.begin(), targets.end(), matches) > 1) {
+  if (std::count_if(targets.begin(), targets.end(), matches) > 1)
     throw std::runtime_error(where + ": several elements answer to this, expected one");
-  }
   XmlElement& element = *found->element;
   std::erase_if(element.attributes, [&](const XmlAttribute& a) { return a.name == found->attribute; });
   element.attributes.push_back({found->attribute, override.value, where});

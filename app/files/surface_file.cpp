@@ -35,9 +35,8 @@ std::vector<int> nodesOfVertices(const SoftBodyModel& model) {
     kept = node;
     present[node] = true;
   }
-  for (std::size_t node = 0; node < present.size(); ++node) {
+  for (std::size_t node = 0; node < present.size(); ++node)
     if (!present[node]) nodes.push_back(static_cast<int>(node));
-  }
   return nodes;
 }
 

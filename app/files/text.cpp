@@ -26,7 +26,7 @@ std::string shellWord(std::string_view word) {
 
 std::string escapedXml(std::string_view text) {
   std::string out;
-  for (const char c : text) {
+  for (const char c : text)
     if (c == '&')
       out += "&amp;";
     else if (c == '<')
@@ -37,7 +37,6 @@ std::string escapedXml(std::string_view text) {
       out += "&quot;";
     else
       out += c;
-  }
   return out;
 }
 

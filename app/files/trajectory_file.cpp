@@ -20,7 +20,7 @@ namespace medulla {
 static constexpr std::array<std::string_view, 12> columnNames = {"t[s]", "x[m]", "y[m]", "z[m]",  "qw",    "qx",
                                                                  "qy",   "qz",   "grip", "fx[N]", "fy[N]", "fz[N]"};
 static constexpr std::size_t requiredColumns = 9;
-static constexpr double timeReach = 1e9;  // s; doubles still tell 1 us apart, and no difference overflows
+static constexpr double kTimeReach = 1e9;  // s; doubles still tell 1 us apart, and no difference overflows
 enum Column { time, x, y, z, qw, qx, qy, qz, grip, fx, fy, fz };
 
 static std::string requiredHeader() {
@@ -42,13 +42,13 @@ static void checkHeader(const std::vector<std::string_view>& cells, const std::s
 }
 
 void addSample(Trajectory& trajectory, ToolSample sample, const std::string& name, int line) {
-  if (!(std::abs(sample.time) <= timeReach))
-    throw inputError(name, line, fmt::format("time is {} s, expected within {:.0e} s", sample.time, timeReach));
+  if (!(std::abs(sample.time) <= kTimeReach))
+    throw inputError(name, line, fmt::format("time is {} s, expected within {:.0e} s", sample.time, kTimeReach));
   for (int k = 0; k < 3; ++k)
-    if (!(std::abs(sample.position[k]) <= toolReach))
+    if (!(std::abs(sample.position[k]) <= kToolReach))
       throw inputError(name, line,
                        fmt::format("position {} is {} m, expected within {} m of the origin", "xyz"[k],
-                                   sample.position[k], toolReach));
+                                   sample.position[k], kToolReach));
   const double squaredLength = sample.worldFromTool.squaredNorm();
   if (!(std::abs(std::sqrt(squaredLength) - 1) <= 1e-3))
     throw inputError(name, line, fmt::format("quaternion has length {:.6g}, expected 1", std::sqrt(squaredLength)));

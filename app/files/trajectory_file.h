@@ -18,7 +18,7 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name);
 
 // Appends what a file of whatever format says at a line. The orientation may be off unit length by 1e-3 and is
 // normalised; one that is unit up to rounding stays as it is, so that what was written is read back to the bit. Throws
-// "FILE:LINE: ..." for another length, a position beyond toolReach, a time beyond 1e9 s and one that is not after the
+// "FILE:LINE: ..." for another length, a position beyond kToolReach, a time beyond 1e9 s and one that is not after the
 // one before.
 void addSample(Trajectory& trajectory, ToolSample sample, const std::string& name, int line);
 

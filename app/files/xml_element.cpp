@@ -55,9 +55,8 @@ void copyText(const std::string& path, const tinyxml2::XMLText& text, XmlElement
   const std::size_t start = value.find_first_not_of(" \t\r\n");
   if (start == std::string::npos) return;
   // Lines of the text are counted from its start, which only holds for one piece.
-  if (!out.text.empty()) {
+  if (!out.text.empty())
     throw inputError(path, text.GetLineNum(), "<" + out.name + ">: text in several pieces, expected one");
-  }
   out.text = value.substr(start, value.find_last_not_of(" \t\r\n") + 1 - start);
   out.textLine = text.GetLineNum();
 }
@@ -67,9 +66,8 @@ XmlElement copyElement(const std::string& path, const tinyxml2::XMLElement& elem
   out.name = element.Name();
   out.line = element.GetLineNum();
   out.where = place(path, out.line);
-  for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next()) {
+  for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next())
     out.attributes.push_back({a->Name(), a->Value(), place(path, a->GetLineNum())});
-  }
   for (const tinyxml2::XMLNode* n = element.FirstChild(); n; n = n->NextSibling()) {
     if (const tinyxml2::XMLElement* child = n->ToElement()) out.children.push_back(copyElement(path, *child));
     if (const tinyxml2::XMLText* text = n->ToText()) copyText(path, *text, out);
@@ -85,16 +83,13 @@ XmlElement parseXml(const std::string& path) {
   if (const std::size_t start = text.find_first_not_of(" \t\r\n"); start != std::string::npos && text[start] != '<')
     throw inputError(path, 0, "is no XML: expected a file that begins with <");
   tinyxml2::XMLDocument document;
-  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
+  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
     throw inputError(path, document.ErrorLineNum(), std::string("broken XML: ") + describe(document.ErrorID()));
-  }
   const tinyxml2::XMLElement* root = document.RootElement();
   if (!root) throw inputError(path, 0, "broken XML: no element");
-  for (const tinyxml2::XMLNode* n = document.FirstChild(); n; n = n->NextSibling()) {
-    if (n != root && (n->ToElement() || n->ToText())) {
+  for (const tinyxml2::XMLNode* n = document.FirstChild(); n; n = n->NextSibling())
+    if (n != root && (n->ToElement() || n->ToText()))
       throw inputError(path, n->GetLineNum(), "broken XML: more than one element or text at the top");
-    }
-  }
   return copyElement(path, *root);
 }
 
@@ -111,10 +106,9 @@ void checkAttributes(const XmlElement& element, const XmlRule& rule) {
     throw complaint(a.where,
                     "<" + element.name + "> has no attribute " + inQuotes(a.name, '"') + suggestion(a.name, known));
   }
-  for (const std::string& name : rule.required) {
+  for (const std::string& name : rule.required)
     if (!element.find(name))
       throw complaint(element.where, "<" + element.name + "> lacks the attribute " + inQuotes(name, '"'));
-  }
 }
 
 void checkElement(const XmlElement& element, const XmlRules& rules) {
@@ -139,11 +133,9 @@ void checkElement(const XmlElement& element, const XmlRules& rules) {
     }
     checkElement(child, rules);
   }
-  for (std::size_t k = 0; k < known.size(); ++k) {
-    if (count[k] < rule.children[k].least) {
+  for (std::size_t k = 0; k < known.size(); ++k)
+    if (count[k] < rule.children[k].least)
       throw complaint(element.where, "<" + element.name + "> lacks a <" + known[k] + ">");
-    }
-  }
 }
 
 std::string describe(Range range) {
@@ -184,9 +176,8 @@ std::vector<T> readList(const XmlElement& element, const std::string& attribute,
   const std::string kind = std::is_integral_v<T> ? "integer" : "number";
   const std::string expected = "expected " + (count == 0 ? "one or more" : std::to_string(count)) + " " + kind +
                                (count == 1 ? "" : "s") + describe(range);
-  if (count == 0 ? texts.empty() : texts.size() != static_cast<std::size_t>(count)) {
+  if (count == 0 ? texts.empty() : texts.size() != static_cast<std::size_t>(count))
     refuse(element, attribute, expected);
-  }
   std::vector<T> values;
   for (const std::string& text : texts) {
     const std::optional<T> value = parseNumber<T>(text);
@@ -203,17 +194,15 @@ std::vector<T> readList(const XmlElement& element, const std::string& attribute,
 }  // namespace
 
 const XmlAttribute* XmlElement::find(const std::string& attribute) const {
-  for (const XmlAttribute& a : attributes) {
+  for (const XmlAttribute& a : attributes)
     if (a.name == attribute) return &a;
-  }
   return nullptr;
 }
 
 std::vector<const XmlElement*> childrenOf(const XmlElement& parent, const std::string& name) {
   std::vector<const XmlElement*> out;
-  for (const XmlElement& child : parent.children) {
+  for (const XmlElement& child : parent.children)
     if (child.name == name) out.push_back(&child);
-  }
   return out;
 }
 
@@ -230,9 +219,8 @@ std::string rootElementOf(const std::string& path) {
 XmlElement readXml(const std::string& path, const XmlRules& rules, const std::function<void(XmlElement&)>& edit) {
   XmlElement root = parseXml(path);
   const std::string& expected = rules.front().element;
-  if (root.name != expected) {
+  if (root.name != expected)
     throw complaint(root.where, "the root element is <" + root.name + ">, expected <" + expected + ">");
-  }
   if (edit) edit(root);
   checkElement(root, rules);
   return root;

@@ -59,25 +59,25 @@ struct Range {
   bool lowExcluded = false, highExcluded = false;
   double most = 1e30;  // either way: products of larger numbers overflow
 };
-inline constexpr Range anyNumber{};
-inline constexpr Range positive{0, std::numeric_limits<double>::infinity(), true, false};
-inline constexpr Range notNegative{0};
+inline constexpr Range kAnyNumber{};
+inline constexpr Range kPositive{0, std::numeric_limits<double>::infinity(), true, false};
+inline constexpr Range kNotNegative{0};
 // In metres, of what is drawn and felt: both is done in single precision.
-inline constexpr Range anyPlace{.most = 1000};
-inline constexpr Range anyLength{.low = 0, .lowExcluded = true, .most = anyPlace.most};
+inline constexpr Range kAnyPlace{.most = 1000};
+inline constexpr Range kAnyLength{.low = 0, .lowExcluded = true, .most = kAnyPlace.most};
 
 // Complaint about one attribute: "WHERE: <element> name="value": message".
 [[noreturn]] void refuse(const XmlElement& element, const std::string& attribute, const std::string& message);
 
 // Attribute readers: `fallback` where the attribute is absent. Numbers are finite and within `range`; lists are
 // separated by white space. All throw std::runtime_error through refuse().
-double readNumber(const XmlElement& element, const std::string& attribute, double fallback, Range range = anyNumber);
-int readInteger(const XmlElement& element, const std::string& attribute, int fallback, Range range = anyNumber);
+double readNumber(const XmlElement& element, const std::string& attribute, double fallback, Range range = kAnyNumber);
+int readInteger(const XmlElement& element, const std::string& attribute, int fallback, Range range = kAnyNumber);
 // `count` numbers, or one and more for a count of 0; empty where the attribute is absent.
 std::vector<double> readNumbers(const XmlElement& element, const std::string& attribute, int count,
-                                Range range = anyNumber);
+                                Range range = kAnyNumber);
 std::vector<int> readIntegers(const XmlElement& element, const std::string& attribute, int count,
-                              Range range = anyNumber);
+                              Range range = kAnyNumber);
 std::string readText(const XmlElement& element, const std::string& attribute, const std::string& fallback = "");
 // Separated by white space; none where the attribute is absent.
 std::vector<std::string> readWords(const XmlElement& element, const std::string& attribute);

@@ -92,13 +92,12 @@ void BlockCholesky::clear() {
 
 void BlockCholesky::addBlock(int k, const Block6& block) {
   Block6& to = entry_[slot_[k]];
-  if (!isFirst_[k]) {
+  if (!isFirst_[k])
     to += turned_[k] ? Block6(block.transpose()) : block;
-  } else if (turned_[k]) {
+  else if (turned_[k])
     to = block.transpose();
-  } else {
+  else
     to = block;
-  }
 }
 
 bool BlockCholesky::factorise() {

@@ -263,9 +263,8 @@ std::vector<double> nodeGive(const BodyDescription& body, const BodyMechanics& m
   std::vector<double> own = mechanics.attachmentStiffness, all;  // N/m
   for (std::size_t i = 0; i < mechanics.normalExcess.size(); ++i) own[i] += mechanics.normalExcess[i];
   all = own;
-  for (std::size_t e = 0; e < edges.size(); ++e) {
+  for (std::size_t e = 0; e < edges.size(); ++e)
     for (const int n : edges[e]) all[n] += mechanics.edgeStiffness[e];
-  }
   for (std::size_t e = 0; e < edges.size(); ++e) {
     for (int k = 0; k < 2; ++k) {
       const int beside = edges[e][1 - k];

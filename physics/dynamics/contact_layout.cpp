@@ -151,11 +151,10 @@ void noteStartOverlaps(ContactData& c) {
     if (!(gap < 0) || b0 == b1) return;
     const auto same = [&](const BodyOverlap& o) { return o.body0 == b0 && o.body1 == b1; };
     const auto found = std::find_if(c.startOverlaps.begin(), c.startOverlaps.end(), same);
-    if (found == c.startOverlaps.end()) {
+    if (found == c.startOverlaps.end())
       c.startOverlaps.push_back({b0, b1, -gap});
-    } else {
+    else
       found->depth = std::max(found->depth, -gap);
-    }
   });
   std::sort(c.startOverlaps.begin(), c.startOverlaps.end(), [](const BodyOverlap& a, const BodyOverlap& b) {
     return a.body0 != b.body0 ? a.body0 < b.body0 : a.body1 < b.body1;

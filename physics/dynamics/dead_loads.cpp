@@ -116,15 +116,13 @@ void pushSphere(WorldData& d, const LoadedHost& loaded) {
 }
 
 void pushSkins(WorldData& d) {
-  for (const LoadedHost& host : d.skinLoads.hosts) {
-    if (host.kind == LoadedHost::Kind::frames) {
+  for (const LoadedHost& host : d.skinLoads.hosts)
+    if (host.kind == LoadedHost::Kind::frames)
       pushFrames(d, host);
-    } else if (host.kind == LoadedHost::Kind::link) {
+    else if (host.kind == LoadedHost::Kind::link)
       pushLink(d, host);
-    } else {
+    else
       pushSphere(d, host);
-    }
-  }
 }
 
 }  // namespace

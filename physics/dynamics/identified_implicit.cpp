@@ -134,13 +134,11 @@ void addStarBlocks(ImplicitData& s) {
     for (int a = star.first; a < star.end; ++a) {
       const Vector6 scaled = scale * s.starRate[a];
       s.diagonal[s.starSphere[a]].noalias() += scaled * s.starRate[a].transpose();
-      for (int b = a + 1; b < star.end; ++b, ++pair) {
-        if (*pair >= 0) {
+      for (int b = a + 1; b < star.end; ++b, ++pair)
+        if (*pair >= 0)
           s.beside[*pair].noalias() += scaled * s.starRate[b].transpose();
-        } else {
+        else
           s.beside[-1 - *pair].noalias() += s.starRate[b] * scaled.transpose();
-        }
-      }
     }
   }
 }

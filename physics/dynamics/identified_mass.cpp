@@ -127,13 +127,12 @@ class PlacedFrames {
 void give(const PlacedFrames& frames, const CarriedBlock& b, const Block6& ofFrames, ImplicitData& s) {
   if (b.sphere0 < 0 || b.sphere1 < 0) return;
   const Block6 m = frames.ofSpheres(b, ofFrames);
-  if (b.sphere0 == b.sphere1) {
+  if (b.sphere0 == b.sphere1)
     s.lumped[b.sphere0] += m;
-  } else if (b.pair >= 0) {
+  else if (b.pair >= 0)
     s.lumpedBeside[b.pair] += m;
-  } else {
+  else
     s.lumpedBeside[-1 - b.pair] += m.transpose();
-  }
 }
 
 }  // namespace

@@ -210,11 +210,10 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   }
   for (std::size_t k = 0; k < s.loads.size(); ++k) {
     LoadRow* rows = &s.rows[3 * k];
-    if (s.loads[k].isContact) {
+    if (s.loads[k].isContact)
       settleContact(d, s, s.loads[k], rows);
-    } else {
+    else
       settleTool(d, s, s.loads[k], stage, rows);
-    }
   }
   addDeadLoads(d, s, stage.time.end);
   for (const LoadRow& row : s.rows) {

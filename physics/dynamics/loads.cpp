@@ -82,11 +82,10 @@ void prepare(const WorldData& d, const PointSpring& p, SettlingSpring& out) {
     out.hosts[i] = hostPoint(d, p.nodes[i]);
     out.place += w * nodePosition(d, p.nodes[i]);
     const double m = mobility(d, p.nodes[i], out.hosts[i]);
-    if (out.hosts[i].count > 0) {
+    if (out.hosts[i].count > 0)
       rootOfSkin += std::abs(w) * std::sqrt(m);
-    } else {
+    else
       ofMasses += w * w * m;
-    }
   }
   out.mobility = ofMasses + rootOfSkin * rootOfSkin;
 }

@@ -38,17 +38,14 @@ static CoverTargets targetsOf(const BodyShape& shape, int count) {
   CoverTargets targets;
   targets.diagonal = shape.diagonal;
   targets.overshoot = shape.overshoot;
-  for (const SurfaceSample& s : sampleSurface(shape.mesh, std::max(3000, 3 * count), 2)) {
+  for (const SurfaceSample& s : sampleSurface(shape.mesh, std::max(3000, 3 * count), 2))
     targets.surface.push_back(s.point);
-  }
   // Vertices stick out furthest; beyond a few thousand the samples lie as close.
-  if (shape.mesh.vertices.size() < 1500) {
+  if (shape.mesh.vertices.size() < 1500)
     targets.surface.insert(targets.surface.end(), shape.mesh.vertices.begin(), shape.mesh.vertices.end());
-  }
   const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, std::max(20000, 30 * count));
-  for (const VoxelPiece& piece : voxels.pieces) {
+  for (const VoxelPiece& piece : voxels.pieces)
     if (piece.height > voxels.size / 2) targets.volume.push_back(piece.centre);
-  }
   return targets;
 }
 
@@ -114,9 +111,8 @@ std::vector<Ball> fewestBalls(const BodyShape& shape, double gap, int most, cons
 std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count, const Progress& progress) {
   constexpr int kSteps = 16;
   const int bodies = static_cast<int>(shapes.size());
-  if (count < bodies) {
+  if (count < bodies)
     throw std::runtime_error(fmt::format("{} spheres for {} bodies; expected one each at least", count, bodies));
-  }
   std::vector<GreedyCount> greedy;
   double high = 0;  // m
   const auto report = [&](double done) {

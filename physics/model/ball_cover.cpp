@@ -23,11 +23,11 @@ struct Weights {
 
 // Least gap of every block: blocks x balls.
 GapTable leastOfBlocks(const GapTable& gaps) {
-  GapTable least((gaps.rows() + blockSize - 1) / blockSize, gaps.cols());
+  GapTable least((gaps.rows() + kBlockSize - 1) / kBlockSize, gaps.cols());
   for (Index b = 0; b < gaps.cols(); ++b) {
     for (Index k = 0; k < least.rows(); ++k) {
-      const Index first = k * blockSize;
-      least(k, b) = gaps.col(b).segment(first, std::min(blockSize, gaps.rows() - first)).minCoeff();
+      const Index first = k * kBlockSize;
+      least(k, b) = gaps.col(b).segment(first, std::min(kBlockSize, gaps.rows() - first)).minCoeff();
     }
   }
   return least;
@@ -51,20 +51,17 @@ struct OtherBalls {
     for (const Bits& inside : chosen.inside) count(inside, 1);
   }
   void count(const Bits& inside, int by) {
-    for (std::size_t w = 0; w < inside.size(); ++w) {
-      for (std::uint64_t rest = inside[w]; rest != 0; rest &= rest - 1) {
+    for (std::size_t w = 0; w < inside.size(); ++w)
+      for (std::uint64_t rest = inside[w]; rest != 0; rest &= rest - 1)
         ballsAround[64 * w + std::countr_zero(rest)] += by;
-      }
-    }
   }
   Gaps gapsWithout(Index k) const { return before.min(behind.col(k)); }
   // Call before ball k changes, and `placed` after it: in between `open` holds.
   void lifted(const Bits& inside) { count(inside, -1); }
   Bits open() const {
     Bits bits((ballsAround.size() + 63) / 64, 0);
-    for (std::size_t p = 0; p < ballsAround.size(); ++p) {
+    for (std::size_t p = 0; p < ballsAround.size(); ++p)
       bits[p / 64] |= static_cast<std::uint64_t>(ballsAround[p] == 0) << (p % 64);
-    }
     return bits;
   }
   void placed(const Gaps& gaps, const Bits& inside) {
@@ -94,9 +91,9 @@ struct GapCostByBlocks {
   float total = 0;
 
   GapCostByBlocks(const Gaps& otherGaps, float gapScale) : gaps(otherGaps), scale(gapScale) {
-    for (Index first = 0; first < gaps.size(); first += blockSize) {
-      const auto block = gaps.segment(first, std::min(blockSize, gaps.size() - first));
-      blocks.push_back({sum(block), block.maxCoeff(), first / blockSize});
+    for (Index first = 0; first < gaps.size(); first += kBlockSize) {
+      const auto block = gaps.segment(first, std::min(kBlockSize, gaps.size() - first));
+      blocks.push_back({sum(block), block.maxCoeff(), first / kBlockSize});
       total += blocks.back().cost;
     }
     std::stable_sort(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) { return a.cost > b.cost; });
@@ -119,7 +116,7 @@ struct GapCostByBlocks {
     for (const Block& block : blocks) {
       if (cost >= enough) break;
       if (leastGaps[block.number] >= block.widest) continue;
-      const Index first = block.number * blockSize, size = std::min(blockSize, gaps.size() - first);
+      const Index first = block.number * kBlockSize, size = std::min(kBlockSize, gaps.size() - first);
       cost += sum(gaps.segment(first, size).min(ballGaps.segment(first, size)));
     }
     return cost;
@@ -183,12 +180,10 @@ struct OpenPoints {
 
   OpenPoints(const ScaledTargets& targets, const Gaps& otherGaps, const Bits& open, bool useVolume) {
     std::vector<Index> points, inner;
-    for (Index s = 0; s < otherGaps.size(); ++s) {
+    for (Index s = 0; s < otherGaps.size(); ++s)
       if (otherGaps[s] > 0) points.push_back(s);
-    }
-    for (Index p = 0; useVolume && p < targets.volume.cols(); ++p) {
+    for (Index p = 0; useVolume && p < targets.volume.cols(); ++p)
       if (open[p / 64] >> (p % 64) & 1) inner.push_back(p);
-    }
     surface = targets.surface(Eigen::all, points);
     volume = targets.volume(Eigen::all, inner);
     gaps = otherGaps(points);

@@ -7,13 +7,13 @@ namespace medulla {
 
 // In the order of a tree of median splits, so that the points of a block lie together.
 static void orderByPlace(std::vector<Eigen::Vector3d>& points, std::size_t begin, std::size_t end) {
-  if (end - begin <= static_cast<std::size_t>(blockSize)) return;
+  if (end - begin <= static_cast<std::size_t>(kBlockSize)) return;
   Eigen::AlignedBox3d box;
   for (std::size_t p = begin; p < end; ++p) box.extend(points[p]);
   int axis = 0;
   box.sizes().maxCoeff(&axis);
   // Whole blocks on the left: only the last one of all stays short.
-  const std::size_t blocks = (end - begin + blockSize - 1) / blockSize, middle = begin + blocks / 2 * blockSize;
+  const std::size_t blocks = (end - begin + kBlockSize - 1) / kBlockSize, middle = begin + blocks / 2 * kBlockSize;
   std::sort(points.begin() + static_cast<std::ptrdiff_t>(begin), points.begin() + static_cast<std::ptrdiff_t>(end),
             [axis](const auto& a, const auto& b) {
               for (int k = 0; k < 3; ++k) {
@@ -28,9 +28,8 @@ static void orderByPlace(std::vector<Eigen::Vector3d>& points, std::size_t begin
 
 static Eigen::Matrix3Xf scaled(const std::vector<Eigen::Vector3d>& points, double diagonal) {
   Eigen::Matrix3Xf result(3, points.size());
-  for (std::size_t p = 0; p < points.size(); ++p) {
+  for (std::size_t p = 0; p < points.size(); ++p)
     result.col(static_cast<Eigen::Index>(p)) = (100 / diagonal * points[p]).cast<float>();
-  }
   return result;
 }
 

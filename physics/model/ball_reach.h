@@ -13,7 +13,7 @@ using Gaps = Eigen::ArrayXf;              // per surface point, in % of the diag
 using GapTable = Eigen::ArrayXXf;         // surface points x balls
 using Bits = std::vector<std::uint64_t>;  // one per point
 
-constexpr Eigen::Index blockSize = 64;  // surface points that lie together and are judged together
+constexpr Eigen::Index kBlockSize = 64;  // surface points that lie together and are judged together
 
 // The points in single precision, in % of the diagonal; those of the surface in blocks that lie together.
 struct ScaledTargets {

@@ -35,21 +35,16 @@ struct SpheresAndLinks {
 };
 
 void checkSettings(const BuildSettings& s) {
-  if (s.spheres < 1 || s.spheres > spheresMax) {
-    throw std::runtime_error(fmt::format("{} spheres asked for; expected 1 to {}", s.spheres, spheresMax));
-  }
-  if (!(s.gap >= 0 && s.gap < 100)) {
+  if (s.spheres < 1 || s.spheres > kSpheresMax)
+    throw std::runtime_error(fmt::format("{} spheres asked for; expected 1 to {}", s.spheres, kSpheresMax));
+  if (!(s.gap >= 0 && s.gap < 100))
     throw std::runtime_error(fmt::format("a gap of {} % asked for; expected more than 0 and less than 100", s.gap));
-  }
-  if (s.overshoot && !(*s.overshoot >= 0 && *s.overshoot <= 5)) {
+  if (s.overshoot && !(*s.overshoot >= 0 && *s.overshoot <= 5))
     throw std::runtime_error(fmt::format("an overshoot of {} % asked for; expected 0 to 5", *s.overshoot));
-  }
-  if (!(s.surfaceMassFraction >= 0 && s.surfaceMassFraction <= 0.4)) {
+  if (!(s.surfaceMassFraction >= 0 && s.surfaceMassFraction <= 0.4))
     throw std::runtime_error(fmt::format("surface mass fraction {}; expected 0 to 0.4", s.surfaceMassFraction));
-  }
-  if (s.renderLevels < 0 || s.renderLevels > 4) {
+  if (s.renderLevels < 0 || s.renderLevels > 4)
     throw std::runtime_error(fmt::format("{} render levels; expected 0 to 4", s.renderLevels));
-  }
 }
 
 // Spheres without material of their own are dropped; links to them pass to the nearest other sphere.
@@ -122,11 +117,10 @@ void hangNodesAndShareMass(const BodyShape& shape, const SpheresAndLinks& s, dou
   }
   placeLinkEnds(shape.mesh, shape.tree, s.cells.sites, model.links, model.spheres);
   for (int round = 0; round < choosingRounds + slidingRounds; ++round) {
-    if (round < choosingRounds) {
+    if (round < choosingRounds)
       model.attachments = attachNodes(shape.mesh, shape.tree, model.spheres, model.links);
-    } else {
+    else
       reprojectAttachments(shape.mesh, model.spheres, model.links, model.attachments);
-    }
     shareOutMass(shape.mesh, s.cells, massFraction, model.attachments, model.spheres);
     placeLinkEnds(shape.mesh, shape.tree, s.cells.sites, model.links, model.spheres);
   }
@@ -150,9 +144,8 @@ double overshootOf(const BuildSettings& s) {
 }
 
 std::string describeSettings(const BuildSettings& s) {
-  if (s.method == BuildMethod::skeleton) {
+  if (s.method == BuildMethod::skeleton)
     return fmt::format("--method skeleton --surface-mass {} --render-levels {}", s.surfaceMassFraction, s.renderLevels);
-  }
   const std::string resolution = s.gap > 0 ? fmt::format("--gap {}", s.gap) : fmt::format("--spheres {}", s.spheres);
   return fmt::format("--method cover {} --overshoot {} --surface-mass {} --render-levels {}", resolution,
                      overshootOf(s), s.surfaceMassFraction, s.renderLevels);
@@ -179,13 +172,12 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
 
   SpheresAndLinks s;
   const auto choosing = [&](double part) { done(std::lerp(0.05, 0.7, part)); };
-  if (settings.method == BuildMethod::skeleton) {
+  if (settings.method == BuildMethod::skeleton)
     s = spheresOfSkeleton(shape, model.skeleton);
-  } else if (settings.gap > 0) {
-    s = spheresByCover(shape, fewestBalls(shape, settings.gap, spheresMax, choosing));
-  } else {
+  else if (settings.gap > 0)
+    s = spheresByCover(shape, fewestBalls(shape, settings.gap, kSpheresMax, choosing));
+  else
     s = spheresByCover(shape, chooseBalls(shape, settings.spheres, CoverGoal::gapAndVolume, choosing));
-  }
   done(0.7);
   hangNodesAndShareMass(shape, s, settings.surfaceMassFraction, model);
   measureLinks(shape.mesh, s.cells.sites, model.spheres, model.links);

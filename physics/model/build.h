@@ -15,7 +15,7 @@ enum class BuildMethod {
   cover,     // medial balls, inscribed but for `overshoot`, chosen by set cover
 };
 
-constexpr int spheresMax = 2000;  // the choice of balls needs spheres^2 memory and time
+constexpr int kSpheresMax = 2000;  // the choice of balls needs spheres^2 memory and time
 
 struct BuildSettings {
   BuildMethod method = BuildMethod::cover;

@@ -18,9 +18,8 @@ double signedDistanceToCone(const Vector3d& p, const Ball& a, const Ball& b) {
   // slant.
   const Vector3d axis = b.centre - a.centre;
   const double length = axis.norm(), shrink = a.radius - b.radius;
-  if (length <= std::abs(shrink)) {  // one ball holds the other
+  if (length <= std::abs(shrink))  // one ball holds the other
     return std::min((p - a.centre).norm() - a.radius, (p - b.centre).norm() - b.radius);
-  }
   const double along = (p - a.centre).dot(axis) / length;
   const double across = std::sqrt(std::max(0., (p - a.centre).squaredNorm() - along * along));
   const double slant = shrink / std::sqrt(length * length - shrink * shrink);
@@ -44,9 +43,8 @@ double distanceToBalls(const Vector3d& p, const std::vector<Ball>& balls) {
 
 double distanceToCones(const Vector3d& p, const std::vector<Ball>& balls, const std::vector<ElasticLink>& links) {
   double least = std::numeric_limits<double>::infinity();
-  for (const ElasticLink& link : links) {
+  for (const ElasticLink& link : links)
     least = std::min(least, signedDistanceToCone(p, balls[link.sphere0], balls[link.sphere1]));
-  }
   return least;
 }
 
@@ -129,9 +127,8 @@ BuildReport measureModel(const SoftBodyModel& model) {
     report.centresOutside += isInside(tree, s.restBallCentre) && isInside(tree, s.restFrame) ? 0 : 1;
   }
   report.attachmentsCrossing = countCrossings(mesh, tree, model.attachments, model.spheres, model.links);
-  for (const Attachment& a : model.attachments) {
+  for (const Attachment& a : model.attachments)
     report.attachmentMax = std::max(report.attachmentMax, a.restOffset.norm() / diagonal * 100);
-  }
   return report;
 }
 

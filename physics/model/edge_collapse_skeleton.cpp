@@ -85,9 +85,8 @@ void mergeTriangles(Complex& c, int kept, int gone) {
 }
 
 void mergeSkeletalEdges(Complex& c, int kept, int gone) {
-  for (const int other : c.neighbours[gone]) {
+  for (const int other : c.neighbours[gone])
     if (c.skeletal.erase(edgeOf(gone, other)) > 0 && other != kept) c.skeletal.insert(edgeOf(kept, other));
-  }
 }
 
 void mergeNeighbours(Complex& c, int kept, int gone) {
@@ -102,25 +101,21 @@ void mergeNeighbours(Complex& c, int kept, int gone) {
 }
 
 void collapse(Complex& c, int kept, int gone) {
-  for (const int end : {kept, gone}) {
+  for (const int end : {kept, gone})
     for (const int other : c.neighbours[end]) c.queue.erase(queueKey(c, end, other));
-  }
-  if (!c.fixed[kept]) {
+  if (!c.fixed[kept])
     c.positions[kept] = c.fixed[gone] ? c.positions[gone] : ((c.positions[kept] + c.positions[gone]) / 2).eval();
-  }
   c.fixed[kept] = c.fixed[kept] | c.fixed[gone];
   c.alive[gone] = 0;
   mergeTriangles(c, kept, gone);
   mergeSkeletalEdges(c, kept, gone);
   mergeNeighbours(c, kept, gone);
   // Only edges at the merged node can have lost their last triangle.
-  for (const int other : c.neighbours[kept]) {
-    if (edgeHasTriangle(c, kept, other)) {
+  for (const int other : c.neighbours[kept])
+    if (edgeHasTriangle(c, kept, other))
       c.queue.insert(queueKey(c, kept, other));
-    } else if (c.skeletal.insert(edgeOf(kept, other)).second) {
+    else if (c.skeletal.insert(edgeOf(kept, other)).second)
       c.fixed[kept] = c.fixed[other] = 1;
-    }
-  }
 }
 
 Skeleton skeletonOf(const Complex& c) {

@@ -19,11 +19,9 @@ struct CoverBits {
 
   CoverBits(const GapTable& gaps, const Gaps& tolerance)
       : words((gaps.rows() + 63) / 64), bits(words * gaps.cols(), 0) {
-    for (Index c = 0; c < gaps.cols(); ++c) {
-      for (Index s = 0; s < gaps.rows(); ++s) {
+    for (Index c = 0; c < gaps.cols(); ++c)
+      for (Index s = 0; s < gaps.rows(); ++s)
         bits[c * words + s / 64] |= static_cast<std::uint64_t>(gaps(s, c) <= tolerance[s]) << (s % 64);
-      }
-    }
   }
   int uncovered(int candidate, const Bits& open) const {
     int count = 0;

@@ -15,9 +15,8 @@ struct Candidate {
 };
 
 bool staysInside(const SurfaceTree& tree, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  for (int k = 1; k < 8; ++k) {
+  for (int k = 1; k < 8; ++k)
     if (!isInside(tree, a + k / 8. * (b - a))) return false;
-  }
   return true;
 }
 
@@ -49,16 +48,13 @@ SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const st
     ++degree[pair[0]];
     ++degree[pair[1]];
   };
-  for (const Candidate& c : candidates) {
-    if (sets.join(c.spheres[0], c.spheres[1])) {
+  for (const Candidate& c : candidates)
+    if (sets.join(c.spheres[0], c.spheres[1]))
       add(c.spheres);
-    } else if (c.score > contactRatioMin) {
+    else if (c.score > contactRatioMin)
       further.push_back(c);
-    }
-  }
-  for (const Candidate& c : further) {
+  for (const Candidate& c : further)
     if (degree[c.spheres[0]] < degreeMax && degree[c.spheres[1]] < degreeMax) add(c.spheres);
-  }
   std::vector<Eigen::Vector3d> centres;
   centres.reserve(balls.size());
   for (const Ball& ball : balls) centres.push_back(ball.centre);

@@ -20,22 +20,19 @@ void addScaled(const Stencil& stencil, double scale, Stencil& sum) {
 Stencil gathered(Stencil terms) {
   std::stable_sort(terms.begin(), terms.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   Stencil row;
-  for (const auto& [vertex, weight] : terms) {
-    if (!row.empty() && row.back().first == vertex) {
+  for (const auto& [vertex, weight] : terms)
+    if (!row.empty() && row.back().first == vertex)
       row.back().second += weight;
-    } else {
+    else
       row.emplace_back(vertex, weight);
-    }
-  }
   return row;
 }
 
 // Neighbours of every vertex, counter-clockwise, beginning with the lowest.
 std::vector<std::vector<int>> orderedRings(std::size_t vertices, const std::vector<std::array<int, 3>>& triangles) {
   std::vector<std::map<int, int>> next(vertices);  // around a vertex: the neighbour after a neighbour
-  for (const std::array<int, 3>& t : triangles) {
+  for (const std::array<int, 3>& t : triangles)
     for (int k = 0; k < 3; ++k) next[t[k]][t[(k + 1) % 3]] = t[(k + 2) % 3];
-  }
   std::vector<std::vector<int>> rings(vertices);
   for (std::size_t v = 0; v < vertices; ++v) {
     if (next[v].empty()) continue;
@@ -85,11 +82,10 @@ SubdivisionLevel subdivideLoop(const SubdivisionLevel& level) {
       const int opposite = t[(k + 2) % 3];
       const auto [entry, fresh] =
           edges.try_emplace(ends, static_cast<int>(vertices + order.size()), std::array<int, 2>{opposite, opposite});
-      if (fresh) {
+      if (fresh)
         order.push_back(ends);
-      } else {
+      else
         entry->second.second[1] = opposite;
-      }
     }
   }
   for (const std::pair<int, int>& ends : order) {

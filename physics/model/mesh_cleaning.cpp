@@ -48,9 +48,8 @@ std::vector<int> lowestCoincident(const std::vector<Eigen::Vector3d>& points, do
             [&](int i, int j) { return along[i] != along[j] ? along[i] < along[j] : i < j; });
   DisjointSets sets(points.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
-    for (std::size_t j = i + 1; j < order.size() && along[order[j]] - along[order[i]] <= tolerance; ++j) {
+    for (std::size_t j = i + 1; j < order.size() && along[order[j]] - along[order[i]] <= tolerance; ++j)
       if ((points[order[i]] - points[order[j]]).norm() <= tolerance) sets.join(order[i], order[j]);
-    }
   }
   for (std::size_t i = 0; i < points.size(); ++i) lowest[i] = sets.of(static_cast<int>(i));
   return lowest;
@@ -60,9 +59,8 @@ std::vector<int> lowestCoincident(const std::vector<Eigen::Vector3d>& points, do
 template <typename Keep>
 std::size_t filterTriangles(TriangleMesh& mesh, const Keep& keep) {
   std::vector<std::array<int, 3>> kept;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     if (keep(t)) kept.push_back(mesh.triangles[t]);
-  }
   const std::size_t dropped = mesh.triangles.size() - kept.size();
   mesh.triangles.swap(kept);
   return dropped;
@@ -122,9 +120,8 @@ MeshUnderRepair weldVertices(const TriangleMesh& input) {
         {repair.vertexOfInput[t[0]], repair.vertexOfInput[t[1]], repair.vertexOfInput[t[2]]});
   }
   const std::size_t welded = input.vertices.size() - repair.mesh.vertices.size();
-  if (welded > 0) {
+  if (welded > 0)
     repair.notes.push_back(fmt::format("welded {}", counted(welded, "duplicate vertex", "duplicate vertices")));
-  }
   return repair;
 }
 
@@ -145,9 +142,8 @@ void dropRepeatedTriangles(MeshUnderRepair& repair) {
     repair.notes.push_back(
         fmt::format("dropped {}", counted(degenerate, "degenerate triangle", "degenerate triangles")));
   }
-  if (duplicate > 0) {
+  if (duplicate > 0)
     repair.notes.push_back(fmt::format("dropped {}", counted(duplicate, "duplicate triangle", "duplicate triangles")));
-  }
   if (mesh.triangles.empty()) throw std::runtime_error("all triangles are degenerate: the mesh encloses no volume");
 }
 
@@ -179,9 +175,8 @@ void dropFins(MeshUnderRepair& repair) {
 
 void dropUnusedVertices(MeshUnderRepair& repair) {
   std::vector<int> renumbered(repair.mesh.vertices.size(), -1);
-  for (const auto& t : repair.mesh.triangles) {
+  for (const auto& t : repair.mesh.triangles)
     for (const int v : t) renumbered[v] = 0;
-  }
   int used = 0;
   for (std::size_t v = 0; v < renumbered.size(); ++v) {
     if (renumbered[v] < 0) continue;
@@ -192,13 +187,11 @@ void dropUnusedVertices(MeshUnderRepair& repair) {
   const std::size_t unused = renumbered.size() - used;
   repair.mesh.vertices.resize(used);
   repair.inputOfVertex.resize(used);
-  for (auto& t : repair.mesh.triangles) {
+  for (auto& t : repair.mesh.triangles)
     for (int& v : t) v = renumbered[v];
-  }
   for (int& v : repair.vertexOfInput) v = renumbered[v];
-  if (unused > 0) {
+  if (unused > 0)
     repair.notes.push_back(fmt::format("dropped {}", counted(unused, "unused vertex", "unused vertices")));
-  }
 }
 
 // A vertex in which two sheets touch has a closed ring of triangles for each of them. Every ring but the first gets a
@@ -263,9 +256,8 @@ std::size_t flipOnce(TriangleMesh& mesh, std::set<std::array<int, 2>>& edges) {
     if (height > kNoHeight || changed[t] || changed[other]) continue;
     const int from = mesh.triangles[t][k], to = mesh.triangles[t][(k + 1) % 3], apex = mesh.triangles[t][(k + 2) % 3];
     int far = -1;
-    for (const int v : mesh.triangles[other]) {
+    for (const int v : mesh.triangles[other])
       if (v != from && v != to) far = v;
-    }
     const std::array<int, 2> edge{std::min(apex, far), std::max(apex, far)};
     if (far == apex || edges.contains(edge)) continue;
     const std::array<int, 3> first{apex, from, far}, second{apex, far, to};
@@ -305,9 +297,8 @@ void flipTrianglesWithoutArea(MeshUnderRepair& repair) {
         fmt::format("flipped {}", counted(flips, "edge of triangles without area", "edges of triangles without area")));
   }
   const std::size_t kept = countFlat();
-  if (kept > 0) {
+  if (kept > 0)
     repair.notes.push_back(fmt::format("kept {}", counted(kept, "triangle without area", "triangles without area")));
-  }
 }
 
 }  // namespace medulla

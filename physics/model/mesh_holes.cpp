@@ -33,9 +33,8 @@ struct Loop {
 
 double loopLength(const TriangleMesh& mesh, const std::vector<int>& loop) {
   double length = 0;
-  for (std::size_t i = 0; i < loop.size(); ++i) {
+  for (std::size_t i = 0; i < loop.size(); ++i)
     length += (mesh.vertices[loop[(i + 1) % loop.size()]] - mesh.vertices[loop[i]]).norm();
-  }
   return length;
 }
 
@@ -45,9 +44,8 @@ std::vector<Loop> openLoops(const TriangleMesh& mesh) {
   const auto onEdge = trianglesOnEdges(mesh);
   std::vector<std::vector<int>> next(mesh.vertices.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 3; ++k)
       if (onEdge[t][k] == 1) next[mesh.triangles[t][(k + 1) % 3]].push_back(mesh.triangles[t][k]);
-    }
   }
   std::vector<Loop> loops;
   std::vector<int> path, positionOnPath(mesh.vertices.size(), -1);

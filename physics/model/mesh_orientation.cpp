@@ -22,9 +22,8 @@ void turn(std::array<int, 3>& triangle) {
 
 // Whether `triangle` runs along the edge from a to b in this sense.
 bool runsAlong(const std::array<int, 3>& triangle, int a, int b) {
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < 3; ++k)
     if (triangle[k] == a && triangle[(k + 1) % 3] == b) return true;
-  }
   return false;
 }
 
@@ -38,9 +37,8 @@ struct Component {
 std::vector<Component> closedComponents(const TriangleMesh& mesh) {
   int count = 0;
   const std::vector<int> componentOf = componentOfTriangles(mesh, count);
-  if (count > kMostComponents) {
+  if (count > kMostComponents)
     throw std::runtime_error(fmt::format("the mesh has {} separate pieces, expected one closed surface", count));
-  }
   std::vector<Component> components(count);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     Component& component = components[componentOf[t]];
@@ -63,9 +61,8 @@ void findDepths(const TriangleMesh& mesh, std::vector<Component>& components) {
   for (Component& inner : components) {
     const auto& t = mesh.triangles[inner.triangles[0]];
     const Eigen::Vector3d point = (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3;
-    for (const Component& outer : components) {
+    for (const Component& outer : components)
       if (&outer != &inner && encloses(mesh, outer, point)) ++inner.depth;
-    }
   }
 }
 
@@ -89,9 +86,8 @@ void orientNeighboursAlike(MeshUnderRepair& repair) {
         if (other < 0) continue;
         const bool alike = !runsAlong(mesh.triangles[other], mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
         const bool turnOther = alike ? turned[t] : !turned[t];
-        if (seen[other] && turned[other] != turnOther) {
+        if (seen[other] && turned[other] != turnOther)
           throw std::runtime_error("the surface has only one side and cannot be oriented, expected a closed surface");
-        }
         if (seen[other]) continue;
         seen[other] = true;
         turned[other] = turnOther;
@@ -100,9 +96,8 @@ void orientNeighboursAlike(MeshUnderRepair& repair) {
       }
     }
     const bool turnMinority = 2 * count <= component.size();
-    for (const int t : component) {
+    for (const int t : component)
       if (turned[t] == turnMinority) turn(mesh.triangles[t]);
-    }
     total += turnMinority ? count : component.size() - count;
   }
   if (total > 0) {
@@ -120,19 +115,17 @@ void orientBodyAndCavities(MeshUnderRepair& repair) {
       std::count_if(components.begin(), components.end(), [](const Component& c) { return c.depth % 2 == 0; });
   if (bodies != 1) {
     std::string sizes;
-    for (const Component& c : components) {
+    for (const Component& c : components)
       if (c.depth % 2 == 0 && sizes.size() < 60)
         sizes += fmt::format("{}{}", sizes.empty() ? "" : ", ", c.triangles.size());
-    }
     throw std::runtime_error(
         fmt::format("the mesh holds {} separate bodies (triangles: {}), expected one: save each in a file of its own",
                     bodies, sizes));
   }
   for (const Component& c : components) {
     const bool cavity = c.depth % 2 == 1;
-    if (cavity) {
+    if (cavity)
       repair.notes.push_back(fmt::format("kept a cavity of {}", counted(c.triangles.size(), "triangle", "triangles")));
-    }
     if ((c.volume < 0) == cavity) continue;
     for (const int t : c.triangles) turn(repair.mesh.triangles[t]);
     if (cavity)

@@ -55,9 +55,8 @@ void requireUsableNumbers(const TriangleMesh& input) {
   if (input.triangles.empty()) throw std::runtime_error("the mesh has no triangles, expected a closed surface");
   const int count = static_cast<int>(input.vertices.size());
   for (int v = 0; v < count; ++v) {
-    if (!input.vertices[v].allFinite()) {
+    if (!input.vertices[v].allFinite())
       throw std::runtime_error(fmt::format("vertex {} is not finite, expected a place in metres", v));
-    }
     if (input.vertices[v].cwiseAbs().maxCoeff() > kLargestCoordinate) {
       throw std::runtime_error(fmt::format("vertex {} at {} lies beyond {:g} m: is the unit right?", v,
                                            place(input.vertices[v]), kLargestCoordinate));

@@ -60,9 +60,8 @@ IndexLists gather(int lists, const std::vector<std::array<int, 2>>& pairs) {
 std::vector<std::array<int, 2>> uniqueEdges(const TriangleMesh& mesh) {
   std::vector<std::array<int, 2>> edges;
   edges.reserve(3 * mesh.triangles.size());
-  for (const auto& t : mesh.triangles) {
+  for (const auto& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) edges.push_back({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
-  }
   std::sort(edges.begin(), edges.end());
   edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
   return edges;
@@ -71,9 +70,8 @@ std::vector<std::array<int, 2>> uniqueEdges(const TriangleMesh& mesh) {
 IndexLists trianglesOfVertices(const TriangleMesh& mesh) {
   std::vector<std::array<int, 2>> pairs;
   pairs.reserve(3 * mesh.triangles.size());
-  for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
+  for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t)
     for (const int v : mesh.triangles[t]) pairs.push_back({v, t});
-  }
   return gather(static_cast<int>(mesh.vertices.size()), pairs);
 }
 
@@ -123,9 +121,7 @@ std::vector<Eigen::Vector3d> vertexNormals(const TriangleMesh& mesh) {
 double enclosedVolume(const TriangleMesh& mesh) {
   // About the first vertex: far from the origin the terms would cancel badly.
   double volume = 0;
-  for (const auto& t : mesh.triangles) {
-    volume += areaVector(mesh, t).dot(mesh.vertices[t[0]] - mesh.vertices[0]) / 3;
-  }
+  for (const auto& t : mesh.triangles) volume += areaVector(mesh, t).dot(mesh.vertices[t[0]] - mesh.vertices[0]) / 3;
   return volume;
 }
 

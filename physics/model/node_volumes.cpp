@@ -202,9 +202,7 @@ std::vector<MassProperties> remainingSpheres(const std::vector<Vector3d>& nodes,
 MassProperties totalOf(const std::vector<MassProperties>& spheres, const std::vector<Vector3d>& nodes,
                        const std::vector<Attachment>& attachments) {
   std::vector<MassProperties> parts = spheres;
-  for (std::size_t n = 0; n < nodes.size(); ++n) {
-    parts.push_back({attachments[n].volume, nodes[n], Matrix3d::Zero()});
-  }
+  for (std::size_t n = 0; n < nodes.size(); ++n) parts.push_back({attachments[n].volume, nodes[n], Matrix3d::Zero()});
   return combined(parts);
 }
 

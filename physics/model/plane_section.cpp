@@ -12,7 +12,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr int scanLines = 48;  // second moments of a disc to 0.1 %
+constexpr int kScanLines = 48;  // second moments of a disc to 0.1 %
 
 struct Span {
   double low, high;
@@ -56,13 +56,12 @@ Span cellSpan(const PowerSites& sites, int site, const Vector3d& start, const Ve
     const double at =
         (start - a).squaredNorm() - sites.weights[site] - (start - sites.centres[k]).squaredNorm() + sites.weights[k];
     const double slope = 2 * towards.dot(along);
-    if (slope > 0) {
+    if (slope > 0)
       part.high = std::min(part.high, -at / slope);
-    } else if (slope < 0) {
+    else if (slope < 0)
       part.low = std::max(part.low, -at / slope);
-    } else if (at > 0) {
+    else if (at > 0)
       return {0, 0};
-    }
   }
   return part;
 }
@@ -113,7 +112,7 @@ SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const 
     low = std::min({low, e[0].y(), e[1].y()});
     high = std::max({high, e[0].y(), e[1].y()});
   }
-  const double step = (high - low) / scanLines;
+  const double step = (high - low) / kScanLines;
   // Of the scan line at `b`, what is inside: one span after the other.
   const auto visitSpans = [&](double b, const auto& visit) {
     std::array<Span, 2> parts = {{{-1e30, 1e30}, {0, 0}}};
@@ -122,12 +121,11 @@ SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const 
       parts = {cellSpan(*sites, pair.first, start, plane.u), cellSpan(*sites, pair.second, start, plane.u)};
     }
     const std::vector<double> crossings = crossingsOf(outline, b);
-    for (std::size_t k = 0; k + 1 < crossings.size(); k += 2) {
+    for (std::size_t k = 0; k + 1 < crossings.size(); k += 2)
       for (const Span& part : parts) visit(std::max(crossings[k], part.low), std::min(crossings[k + 1], part.high));
-    }
   };
   Integrals sum;
-  for (int line = 0; line < scanLines; ++line) {
+  for (int line = 0; line < kScanLines; ++line) {
     const double b = low + (line + 0.5) * step;
     visitSpans(b, [&](double from, double to) { sum.add(from, to, b, step); });
   }

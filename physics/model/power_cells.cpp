@@ -112,9 +112,8 @@ VoxelBody voxelise(const TriangleMesh& mesh, double volume, int target) {
   body.low = columns.origin - Vector3d(0.5, 0.5, 0) * body.size;
   body.count = {columns.countX, columns.countY, body.count[2] + 1};
   columns.crossings.resize(static_cast<std::size_t>(columns.countX) * columns.countY);
-  for (const std::array<int, 3>& t : mesh.triangles) {
+  for (const std::array<int, 3>& t : mesh.triangles)
     cutColumns({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]}, columns);
-  }
   body.pieceAt.assign(static_cast<std::size_t>(body.count[0]) * body.count[1] * body.count[2], -1);
   for (int i = 0; i < columns.countX; ++i) {
     for (int j = 0; j < columns.countY; ++j) {
@@ -191,9 +190,8 @@ static std::vector<MassProperties> integrate(const VoxelBody& body, const std::v
     cell.volume += face * piece.height;
     cell.centroid += face * piece.height * piece.centre;
   }
-  for (MassProperties& cell : cells) {
+  for (MassProperties& cell : cells)
     if (cell.volume > 0) cell.centroid /= cell.volume;
-  }
   for (std::size_t p = 0; p < body.pieces.size(); ++p) {
     const VoxelPiece& piece = body.pieces[p];
     MassProperties& cell = cells[cellOfPiece[p]];
@@ -251,9 +249,8 @@ PowerCells divideByPower(const VoxelBody& body, const std::vector<Ball>& balls, 
     result.cellOfPiece = leastPower(body, result.sites);
     result.cells = integrate(body, result.cellOfPiece, balls.size());
     if (std::all_of(result.cells.begin(), result.cells.end(),
-                    [&](const MassProperties& c) { return c.volume > smallest; })) {
+                    [&](const MassProperties& c) { return c.volume > smallest; }))
       break;
-    }
   }
   result.sites.reaches = reachesOf(body, result.sites, result.cellOfPiece);
   matchExact(exact, result.cells);

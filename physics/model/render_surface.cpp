@@ -39,9 +39,8 @@ void appendRow(const Stencil& row, double sum, const std::vector<int>& nodes, st
 // Physics nodes that any of a vertex's three stencils names.
 std::vector<int> nodesOf(const LimitStencils& limit, std::size_t vertex) {
   std::vector<int> nodes;
-  for (const Stencil* row : {&limit.position[vertex], &limit.tangent0[vertex], &limit.tangent1[vertex]}) {
+  for (const Stencil* row : {&limit.position[vertex], &limit.tangent0[vertex], &limit.tangent1[vertex]})
     for (const auto& [node, weight] : *row) nodes.push_back(node);
-  }
   std::sort(nodes.begin(), nodes.end());
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
   return nodes;
@@ -68,9 +67,8 @@ LimitPoint evaluate(const RenderSurface& surface, std::size_t vertex, const std:
 
 double meanEdge(const TriangleMesh& mesh) {
   double sum = 0;
-  for (const std::array<int, 3>& t : mesh.triangles) {
+  for (const std::array<int, 3>& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) sum += (mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm();
-  }
   return sum / (3. * static_cast<double>(mesh.triangles.size()));
 }
 

@@ -9,8 +9,8 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-static constexpr int leafSize = 4;
-static constexpr int stackSize = 64;  // median splits keep the depth below 32
+static constexpr int kLeafSize = 4;
+static constexpr int kStackSize = 64;  // median splits keep the depth below 32
 
 static Vector3d centroid(const TriangleMesh& mesh, int t) {
   const std::array<int, 3>& c = mesh.triangles[t];
@@ -31,7 +31,7 @@ static int addNode(SurfaceTree& tree, const TriangleMesh& mesh, std::vector<int>
   }
   const int index = static_cast<int>(tree.nodes.size());
   tree.nodes.push_back(node);
-  if (end - begin <= leafSize) return index;
+  if (end - begin <= kLeafSize) return index;
 
   int axis = 0;
   (node.high - node.low).maxCoeff(&axis);
@@ -89,7 +89,7 @@ static double squaredDistance(const SurfaceTree::Node& node, const Vector3d& p) 
 SurfacePoint closestPoint(const SurfaceTree& tree, const Vector3d& p, double within) {
   SurfacePoint best;
   double bestSquared = within * within;
-  std::array<int, stackSize> stack;
+  std::array<int, kStackSize> stack;
   int size = 0;
   stack[size++] = 0;
   while (size > 0) {
@@ -115,7 +115,7 @@ SurfacePoint closestPoint(const SurfaceTree& tree, const Vector3d& p, double wit
 
 void trianglesWithin(const SurfaceTree& tree, const Vector3d& p, double within, std::vector<TriangleDistance>& out) {
   const std::size_t first = out.size();
-  std::array<int, stackSize> stack;
+  std::array<int, kStackSize> stack;
   int size = 0;
   stack[size++] = 0;
   while (size > 0) {
@@ -153,7 +153,7 @@ template <typename Visit>
 static void forEachHit(const SurfaceTree& tree, const Vector3d& origin, const Vector3d& direction, double reach,
                        const Visit& visit) {
   const Vector3d inverse = direction.cwiseInverse();
-  std::array<int, stackSize> stack;
+  std::array<int, kStackSize> stack;
   int size = 0;
   stack[size++] = 0;
   while (size > 0) {

@@ -14,9 +14,8 @@ double RandomSequence::uniform() {
 
 Eigen::Vector3d RandomSequence::normal() {
   Eigen::Vector3d sum = Eigen::Vector3d::Constant(-6);
-  for (int k = 0; k < 12; ++k) {
+  for (int k = 0; k < 12; ++k)
     for (int a = 0; a < 3; ++a) sum[a] += uniform();
-  }
   return sum;
 }
 

@@ -29,7 +29,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const double time = (1 - k / 8.0) * first + k / 8.0 * last;
       const medulla::ToolSample sample = medulla::sampleTrajectory(t, time);
       if (!(sample.grip >= 0 && sample.grip <= 1)) std::abort();
-      if (!(sample.position.lpNorm<Eigen::Infinity>() <= medulla::toolReach * (1 + 1e-9))) std::abort();
+      if (!(sample.position.lpNorm<Eigen::Infinity>() <= medulla::kToolReach * (1 + 1e-9))) std::abort();
       if (!(std::abs(sample.worldFromTool.norm() - 1) < 1e-9)) std::abort();
       medulla::measuredForceAt(t, time);
     }

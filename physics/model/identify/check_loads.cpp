@@ -26,9 +26,8 @@ NodeSurface measureNodes(const TriangleMesh& mesh, const std::vector<FixedPatch>
     }
   }
   for (Vector3d& n : out.normals) n.normalize();
-  for (const FixedPatch& patch : patches) {
+  for (const FixedPatch& patch : patches)
     for (const int n : patch.nodes) out.held[n] = true;
-  }
   return out;
 }
 
@@ -101,10 +100,9 @@ RowMatrix consistentForces(const TriangleMesh& mesh, const RowMatrix& tractions)
   for (const std::array<int, 3>& t : mesh.triangles) {
     const Vector3d normal =
         (mesh.vertices[t[1]] - mesh.vertices[t[0]]).cross(mesh.vertices[t[2]] - mesh.vertices[t[0]]);
-    for (const int i : t) {
+    for (const int i : t)
       for (const int j : t)
         out.middleRows<3>(3 * i) += (i == j ? 2 : 1) * normal.norm() / 24 * tractions.middleRows<3>(3 * j);
-    }
   }
   return out;
 }

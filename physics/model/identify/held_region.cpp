@@ -39,9 +39,8 @@ using Edge = std::pair<int, int>;
 // Directed edges of the triangles that no other of them has the other way round.
 std::vector<Edge> rimOf(const std::vector<std::array<int, 3>>& triangles) {
   std::set<Edge> edges;
-  for (const std::array<int, 3>& t : triangles) {
+  for (const std::array<int, 3>& t : triangles)
     for (int k = 0; k < 3; ++k) edges.insert({t[k], t[(k + 1) % 3]});
-  }
   std::vector<Edge> rim;
   for (const Edge& e : edges)
     if (!edges.contains({e.second, e.first})) rim.push_back(e);

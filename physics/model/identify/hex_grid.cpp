@@ -46,9 +46,8 @@ void numberNodes(HexGrid& grid) {
     const int i = 2 * cell[0] + a / 9, j = 2 * cell[1] + a / 3 % 3, k = 2 * cell[2] + a % 3;
     return number[(static_cast<std::size_t>(i) * lines[1] + j) * lines[2] + k];
   };
-  for (const std::array<int, 3>& cell : grid.cells) {
+  for (const std::array<int, 3>& cell : grid.cells)
     for (int a = 0; a < kHexNodes; ++a) at(cell, a) = 0;
-  }
   for (std::size_t n = 0; n < number.size(); ++n) {
     if (number[n] < 0) continue;
     number[n] = static_cast<int>(grid.nodes.size());

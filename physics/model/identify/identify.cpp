@@ -36,10 +36,10 @@ void checkSettings(const IdentifySettings& s) {
 }
 
 void checkModel(const SoftBodyModel& model, bool held) {
-  if (model.spheres.size() > identifiedSpheresMax)
+  if (model.spheres.size() > kIdentifiedSpheresMax)
     throw std::runtime_error(
         fmt::format("{} spheres are too many to identify: the time grows with their cube; expected at most {}",
-                    model.spheres.size(), identifiedSpheresMax));
+                    model.spheres.size(), kIdentifiedSpheresMax));
   if (model.spheres.size() < 2 && !held)
     throw std::runtime_error(
         "a single sphere that nothing holds has nothing to identify; expected --fix or more spheres");
@@ -165,10 +165,9 @@ MatrixXd framesResponse(const IdentifiedNetwork& n, const MatrixXd& grounding, c
 
 VectorXd largestOf(const MatrixXd& displacements) {
   VectorXd out = VectorXd::Zero(displacements.cols());
-  for (Index load = 0; load < out.size(); ++load) {
+  for (Index load = 0; load < out.size(); ++load)
     for (Index n = 0; 3 * n < displacements.rows(); ++n)
       out[load] = std::max(out[load], displacements.block<3, 1>(3 * n, load).norm());
-  }
   return out;
 }
 
@@ -211,9 +210,8 @@ class Trials {
 
  private:
   MatrixXd deformation(MatrixXd displacements) const {
-    if (rigid_.size() > 0) {
+    if (rigid_.size() > 0)
       displacements -= rigid_ * solvePositive(rigid_.transpose() * weighted_, weighted_.transpose() * displacements);
-    }
     return displacements;
   }
 

@@ -26,9 +26,8 @@ std::array<SparseMatrix, 3> layerParts(const TriangleMesh& mesh, const NodeSurfa
   std::array<std::vector<Eigen::Triplet<double>>, 3> entries;
   const auto put = [&](int part, int a, int b, const Matrix3d& k) {
     if (surface.held[a] || surface.held[b]) return;  // a held node keeps still: its neighbours' springs to it stay
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) entries[part].emplace_back(3 * a + i, 3 * b + j, k(i, j));
-    }
   };
   for (int n = 0; n < static_cast<int>(mesh.vertices.size()); ++n) {
     const Matrix3d along = surface.normals[n] * surface.normals[n].transpose();

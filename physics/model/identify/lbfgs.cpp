@@ -53,13 +53,12 @@ double descend(const Objective& objective, const DescentSettings& settings, Vect
     for (int k = 0; k < 30; ++k) {
       trial = x + step * d;
       reached = objective(trial, trialGradient);
-      if (!(reached <= value + decrease * step * slope)) {
+      if (!(reached <= value + decrease * step * slope))
         high = step;
-      } else if (trialGradient.dot(d) < curvature * slope) {
+      else if (trialGradient.dot(d) < curvature * slope)
         low = step;
-      } else {
+      else
         break;
-      }
       step = std::isfinite(high) ? (low + high) / 2 : 2 * low;
     }
     if (!(reached < value)) break;

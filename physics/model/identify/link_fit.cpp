@@ -49,10 +49,9 @@ std::vector<double> heldAreas(const TriangleMesh& mesh, const CellFrames& cells,
     const Vector3d o = mesh.vertices[mesh.triangles[t][0]], u = mesh.vertices[mesh.triangles[t][1]] - o,
                    v = mesh.vertices[mesh.triangles[t][2]] - o;
     const double area = u.cross(v).norm() / 2 / points;
-    for (int i = 0; i < parts; ++i) {
+    for (int i = 0; i < parts; ++i)
       for (int j = 0; i + j < parts; ++j)
         areas[cellAt(cells.sites, o + (i + 1. / 3) / parts * u + (j + 1. / 3) / parts * v)] += area;
-    }
   }
   return areas;
 }
@@ -177,9 +176,8 @@ class LinkFit {
         expected_(compliance),
         links_(links),
         frames_(static_cast<int>(compliance.rows() / 6)) {
-    for (int b = 0; b < 6; ++b) {
+    for (int b = 0; b < 6; ++b)
       for (int a = b; a < (form == LinkForm::diagonal ? b + 1 : 6); ++a) places_.push_back({a, b});
-    }
     perLink_ = static_cast<Index>(places_.size()) + (form == LinkForm::full ? 12 : 0);
     for (const IdentifiedLink& link : links) {
       measures_.push_back(linkMeasures(link, lengthScale));
@@ -207,10 +205,9 @@ class LinkFit {
     VectorXd x = VectorXd::Zero(static_cast<Index>(links_.size()) * perLink_);
     for (std::size_t l = 0; l < links_.size(); ++l) {
       auto own = x.segment(static_cast<Index>(l) * perLink_, perLink_);
-      for (std::size_t k = 0; k < places_.size(); ++k) {
+      for (std::size_t k = 0; k < places_.size(); ++k)
         if (places_[k][0] == places_[k][1])
           own[static_cast<Index>(k)] = std::sqrt(static_cast<double>(frames_) / static_cast<double>(links_.size()));
-      }
       if (!hasStrains()) continue;
       // T = H^-1/2, so that T^-1 = H T.
       const Vector6d unscaled = measured(compliance_, links_[l], measures_[l], frames_) * scales_[l].col(0);

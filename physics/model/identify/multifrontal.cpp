@@ -61,9 +61,8 @@ class Dissector {
     for (int k = first; k < first + count; ++k) ++upTo[grid_.cells[plan_.cellOrder[k]][axis] - low[axis] + 1];
     std::partial_sum(upTo.begin(), upTo.end(), upTo.begin());
     int plane = 1;
-    for (int p = 1; p + 1 < static_cast<int>(upTo.size()); ++p) {
+    for (int p = 1; p + 1 < static_cast<int>(upTo.size()); ++p)
       if (std::abs(2 * upTo[p] - count) < std::abs(2 * upTo[plane] - count)) plane = p;
-    }
     const auto begin = plan_.cellOrder.begin() + first;
     std::stable_partition(begin, begin + count, [&](int cell) { return grid_.cells[cell][axis] < low[axis] + plane; });
     return first + upTo[plane];
@@ -122,11 +121,10 @@ void addInto(Block& to, const ConstBlock& from, std::span<const int> nodes, cons
     const Index j = place[nodes[b]];
     for (Index a = b; a < count; ++a) {
       const Index i = place[nodes[a]];
-      if (i >= j) {
+      if (i >= j)
         to.block<3, 3>(3 * i, 3 * j) += from.block<3, 3>(3 * a, 3 * b);
-      } else {
+      else
         to.block<3, 3>(3 * j, 3 * i) += from.block<3, 3>(3 * a, 3 * b).transpose();
-      }
     }
   }
 }

@@ -134,9 +134,8 @@ RowSparse skinMatrix(const std::vector<std::vector<SkinFrame>>& skin, int frames
   for (std::size_t n = 0; n < skin.size(); ++n) {
     for (const SkinFrame& f : skin[n]) {
       if (f.frame >= frames) continue;
-      for (int i = 0; i < 3; ++i) {
+      for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 6; ++j) entries.emplace_back(static_cast<int>(3 * n) + i, 6 * f.frame + j, f.map(i, j));
-      }
     }
   }
   RowSparse out(3 * static_cast<Index>(skin.size()), 6 * frames);

@@ -115,9 +115,8 @@ RowSparse springMatrix(const HexGrid& grid, const HeldCells& held) {
   for (const auto& [cell, springs] : held) {
     const std::array<int, kHexNodes>& nodes = grid.cellNodes[cell];
     for (int b = 0; b < kHexNodes; ++b) {
-      for (int a = 0; a < kHexNodes; ++a) {
+      for (int a = 0; a < kHexNodes; ++a)
         for (int k = 0; k < 3; ++k) entries.emplace_back(3 * nodes[a] + k, 3 * nodes[b] + k, springs(a, b));
-      }
     }
   }
   const auto size = 3 * static_cast<Index>(grid.nodes.size());
@@ -128,9 +127,8 @@ RowSparse springMatrix(const HexGrid& grid, const HeldCells& held) {
 
 void addHeld(const Eigen::Matrix<double, kHexNodes, kHexNodes>& springs, Eigen::Map<MatrixXd>& matrix) {
   for (int b = 0; b < kHexNodes; ++b) {
-    for (int a = 0; a < kHexNodes; ++a) {
+    for (int a = 0; a < kHexNodes; ++a)
       for (int k = 0; k < 3; ++k) matrix(3 * a + k, 3 * b + k) += springs(a, b);
-    }
   }
 }
 
@@ -153,9 +151,8 @@ RowSparse tractions(const TriangleMesh& mesh, const HexGrid& grid) {
     });
   }
   for (std::size_t n = 0; n < shares.size(); ++n) {
-    for (const auto& [node, share] : shares[n]) {
+    for (const auto& [node, share] : shares[n])
       for (int k = 0; k < 3; ++k) entries.emplace_back(3 * node + k, static_cast<int>(3 * n) + k, share);
-    }
   }
   RowSparse out(3 * static_cast<Index>(grid.nodes.size()), 3 * static_cast<Index>(mesh.vertices.size()));
   out.setFromTriplets(entries.begin(), entries.end());
@@ -215,19 +212,16 @@ std::map<int, std::vector<int>> pinnedFreedoms(const HexGrid& grid, const std::v
 RowSparse interpolation(const HexGrid& grid, const TriangleMesh& mesh, const std::vector<int>& heldTriangles) {
   const std::vector<Vector3d>& points = mesh.vertices;
   std::vector<bool> isHeld(points.size(), false);
-  for (const int t : heldTriangles) {
+  for (const int t : heldTriangles)
     for (const int n : mesh.triangles[t]) isHeld[n] = true;
-  }
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(points.size() * kHexFreedoms);
   for (std::size_t p = 0; p < points.size(); ++p) {
     if (isHeld[p]) continue;
     const HexPoint at = locate(grid, points[p]);
-    for (int a = 0; a < kHexNodes; ++a) {
-      for (int k = 0; k < 3; ++k) {
+    for (int a = 0; a < kHexNodes; ++a)
+      for (int k = 0; k < 3; ++k)
         entries.emplace_back(static_cast<int>(3 * p) + k, 3 * grid.cellNodes[at.cell][a] + k, at.shape[a]);
-      }
-    }
   }
   RowSparse out(3 * static_cast<Index>(points.size()), 3 * static_cast<Index>(grid.nodes.size()));
   out.setFromTriplets(entries.begin(), entries.end());
@@ -280,9 +274,8 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
     for (std::size_t c = 0; c < cells.size(); ++c) {
       Eigen::Map<MatrixXd> matrix(out.col(static_cast<Index>(c)).data(), kHexFreedoms, kHexFreedoms);
       if (const auto own = held.find(cells[c]); own != held.end()) addHeld(own->second, matrix);
-      if (const auto pins = pinned.find(cells[c]); pins != pinned.end()) {
+      if (const auto pins = pinned.find(cells[c]); pins != pinned.end())
         for (const int freedom : pins->second) matrix(freedom, freedom) += grid.size;
-      }
     }
     return out;
   };
