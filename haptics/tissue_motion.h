@@ -7,11 +7,11 @@
 #include "haptics/grab.h"
 #include "haptics/proxy.h"
 
-// Where touched or held tissue is by now, ahead of the blended surface, which is a frame late. What is known is how it
-// moved before, its steps; and how the device moves, which the tissue follows by a part that its give tells. So the
-// tissue's steps answer the device's way of those frames, and the way that lies beyond, where a device begins to touch
-// or changes its speed, moves the tissue by that part of it. Steps alone make a first touch on soft tissue twenty times
-// too hard for two frames.
+// Where touched or held tissue is by now, ahead of the blended surface, which is a frame late. Two things are known: how
+// far the tissue moved in each of the past frames (its steps), and how the device moves. Tissue follows the device by a
+// fraction that its compliance tells. Past steps already contain the response to the device's displacement of those
+// frames; only displacement beyond that (a first touch, a change of speed) is added, times that fraction. Steps alone
+// make a first touch on soft tissue twenty times too hard for two frames.
 namespace medulla {
 
 // Of one device while it touches or holds.
@@ -25,9 +25,9 @@ struct DeviceMotion {
   // earlier in these frames, evenly, of tissue that had moved by itself.
   double since = 0, sinceBefore = 0;
   Eigen::Vector3d early = Eigen::Vector3d::Zero(), earlyBefore = Eigen::Vector3d::Zero();
-  // Of a grip, the part of the device's way by which what it holds follows: at once, by its give; and as it was seen
-  // to, up to the surface's `to` and `from`. Below these, m2: sums over frames, the older the less, of what the step
-  // changed by along the change of the way that it answers, and of that change's square.
+  // Of a grip, the fraction of the device's displacement that the held tissue follows: at once, by its compliance; and
+  // as observed up to the surface's `to` and `from`. Below, m2, the sums of the least-squares estimate, in which older
+  // frames fade: step's change times the change of the displacement that it answers, and the latter's square.
   double followsAtOnce = 0;
   std::array<double, 2> follows{};
   double stepChange = 0, wayChange = 0;

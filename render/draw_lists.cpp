@@ -23,8 +23,8 @@ Variant variantOf(Shade shade, bool glinting) {
 }
 
 // The level with about one texel a pixel along the direction that crosses most. Texture coordinates are interpolated
-// along lines of the picture, so that a triangle has one slope, and what OpenGL would find out for each four pixels, at
-// a tenth of their time, is known before.
+// linearly in the picture, so their slope is constant over a triangle: computed once here; for each 2x2 pixels, as
+// OpenGL does, it would take a tenth of their time.
 int detailLevel(const VisibleTriangles& seen, const VertexLight& lit, const std::uint32_t* t, float texelsPerUnit,
                 float pixelsPerUnit) {
   const auto picture = [&](int corner) { return glm::vec2(seen.picture[seen.vertices[t[corner]]]) * pixelsPerUnit; };

@@ -7,7 +7,7 @@
 #include "physics/dynamics/link_mechanics.h"
 #include "physics/dynamics/world.h"
 
-// A body's masses, stiffnesses and dampings from its tissue and its model's geometry (physics/README.md). Model frame.
+// A body's masses, stiffnesses and dampings from its tissue and its model's geometry (physics/equations). Model frame.
 namespace medulla {
 
 // Throws std::runtime_error with this message, to which whoever knows the body adds its name.

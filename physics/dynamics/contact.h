@@ -5,7 +5,7 @@
 #include "physics/model/triangle_mesh.h"
 
 // Contact between bodies, and between bodies and shapes that do not move (paper 3): what a scene says about it and what
-// it reports. Equations: physics/README.md.
+// it reports. Equations: physics/equations/contact.md.
 namespace medulla {
 
 enum class ContactMode {

@@ -3,7 +3,7 @@
 #include "physics/dynamics/angles.h"
 #include "physics/dynamics/identified_data.h"
 
-// How four frames are turned against four others, and what follows from it (physics/README.md).
+// How four frames are turned against four others, and what follows from it (physics/equations).
 namespace medulla {
 
 struct FrameLanes {

@@ -5,7 +5,7 @@
 
 // The measures of four identified links (physics/model/identified_network.h), their rates and, transposed, what
 // generalised forces on them do to the frames. All in the frame half way between the two. Derivations:
-// physics/README.md.
+// physics/equations/links.md.
 namespace medulla {
 
 // (1 - sin h / h) / h^2 as a function of h^2, and its derivative: power series, good to 1e-15 up to the 116 degrees of

@@ -5,8 +5,8 @@
 #include "physics/dynamics/identified_stages.h"
 
 // A quaternion and its negative are one orientation. Links tell them apart, so that half a turn between two frames is
-// no seam; but one turned by more than kFoldAngle allows would come to rest a whole turn away from where the body does,
-// at the end of a way on which nothing lies half way between its frames. It lets go of that turn.
+// no seam. But a link turned beyond kFoldAngle would come to rest one full turn from the body's rest pose: flipping a
+// quaternion's sign removes that turn.
 namespace medulla {
 
 namespace {

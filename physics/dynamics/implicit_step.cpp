@@ -248,8 +248,8 @@ ImplicitData& dataOf(WorldData& d, const Part& part) {
   return *d.implicit[k];
 }
 
-// The second stage of order 2 sets out from the first one's start, led on for the time of the first stage's complement
-// by the velocity and the force found there.
+// The second stage of SDIRK2 starts from the step's initial state plus (1 - gamma) h times the velocity and the force
+// of the first stage.
 void beginSecondStage(WorldData& d, ImplicitData& s, double late) {
   const double gain = (1 - kGamma) / kGamma;  // p1 - p0 is the force times the first stage's duration
   visitAngularMomenta(d, s, [&](int i, Lanes end) {

@@ -5,7 +5,7 @@
 
 #include "physics/dynamics/world.h"
 
-// A body's links, springs or beams, from its tissue and its model's sections (physics/README.md). Model frame.
+// A body's links, springs or beams, from its tissue and its model's sections (physics/equations). Model frame.
 namespace medulla {
 
 // Where a link ends, and which part of the model's link lies between: not all of it where the surface around one end is

@@ -7,10 +7,9 @@
 // What one stage of a substep leaves for the next ones of the same batch.
 namespace medulla {
 
-// Indexed like the world's other arrays, by group, link or node. While a batch is in turn that needs none of it
-// afterwards, the places that belong to the batch lie in one piece of memory that all batches share in turn: it stays
-// in a core's own cache, where arrays of a whole world would be fetched and written back in every substep, more than
-// half of all that a large world moves.
+// Indexed like the world's other arrays, by group, link or node. While a batch runs whose intermediate results nobody
+// reads later, its entries lie in one buffer that all batches reuse: it stays in a core's own cache, where arrays of a
+// whole world would be fetched and written back in every substep, more than half of all that a large world moves.
 template <class T>
 class StageArray {
  public:

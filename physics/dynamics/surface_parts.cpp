@@ -223,9 +223,9 @@ void addMotion(WorldData& d, int body, const Vector3d& velocity, const Vector3d&
     setVector(d.nodes.velocity, i, vectorAt(d.nodes.velocity, i) + at(vectorAt(d.nodes.position, i)));
 }
 
-// A node and its share of a sphere do not move alike where the sphere turns, and what edges have pulled at a node since
-// it joined goes when it leaves. Free bodies get back what they lose so, as a rigid motion of the whole: at the hosts
-// alone it would be a jolt.
+// Changing which parts move loses momentum: a node does not move exactly like its share of a turning sphere, and the
+// momentum that edges gave a node vanishes when it is carried again. A free body gets the difference back as one rigid
+// motion of the whole; at the hosts alone it would be a jolt.
 void changeParts(WorldData& d) {
   const std::vector<WholeMotion> before = wholeMotions(d);
   partsChanged(d);

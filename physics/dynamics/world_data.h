@@ -235,8 +235,8 @@ struct SurfacePart {            // of one host; part k is that of Nodes::onLinks
   bool moves = true;            // state: of the groups of nodes that have the choice
   int quietFrames = 0;          // in a row, in which nothing asked for it; state
   bool isShifted = false;       // by edges, while it does not move: SurfaceParts::shift is not 0
-  int firstChoice = 0;          // groups of nodes before it have none: another surface mode, or fixed nodes in them
-  bool always = true;           // no group has
+  int firstChoice = 0;          // groups of nodes before it always move: another surface mode, or fixed nodes in them
+  bool always = true;           // all groups do
   std::vector<int> neighbours;  // parts that edges join to this one, itself included
   double unrest = 0;            // m: it moves where its neighbours' edges would shift a node of it by more
   double heldBulk = 0;          // N/m5: HostRange::bulk where the groups that have the choice hang still and give way

@@ -33,9 +33,9 @@ GapTable leastOfBlocks(const GapTable& gaps) {
   return least;
 }
 
-// What all balls but one reach, for one ball after the other while they change: least gaps of those behind it are kept
-// from the start of the pass, of those before it are gathered on the way, and volume points count the balls they are
-// in.
+// What all balls except the current one cover, in a pass that moves each ball in turn. Least gaps of later balls are
+// suffix minima from the start of the pass, those of earlier balls accumulate as it goes on; each volume point counts
+// the balls that contain it.
 struct OtherBalls {
   GapTable behind;
   Gaps before;
