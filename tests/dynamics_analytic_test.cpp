@@ -276,6 +276,52 @@ TEST(Analytic, AFixedPointSwingsLikeAPendulum) {
   EXPECT_NEAR(measuredFrequency(world, 1, 0, 6), expected, 0.01 * expected);
 }
 
+// Damping is of what deforms: stiff tissue swings on its pin as on a frictionless one, from lying to hanging and on.
+TEST(Analytic, DampingLeavesAPendulumItsSwing) {
+  constexpr int links = 4;
+  BodyDescription body = bar(links, 0.1, LinkModel::beam);
+  body.tissue.young = 1e6;
+  double falls = 0;  // J, from lying to hanging
+  for (const FillingSphere& s : body.model->spheres) falls += kDensity * s.volume * 9.81 * s.restFrame.x();
+  const auto swings = [&](double expected) {
+    World world(under({0, -9.81, 0}), {body});
+    double most = 0;
+    for (int frame = 0; frame < 100; ++frame) {
+      world.advance({});
+      most = std::max(most, world.energies().kinetic);
+    }
+    EXPECT_NEAR(most, expected, 0.04 * expected);
+  };
+  body.fixed = {{0, FixedFreedom::translation}};
+  swings(falls);
+  body.fixed = {};
+  body.surface = SurfaceMode::full;
+  body.fixedNodes = {0};  // the pole
+  swings(falls);
+}
+
+// What is held fast and what is driven to stay damp alike.
+TEST(Analytic, ADrivenEndThatStaysDampsLikeAHeldOne) {
+  const auto tipsOf = [](bool driven) {
+    BodyDescription body = bar(4, 0.2, LinkModel::beam);
+    body.tissue.young = 2e5;
+    if (driven) {
+      body.fixed = {};
+      body.driven = {{.sphere = 0, .freedom = FixedFreedom::all}};
+    }
+    World world(under({0, -9.81, 0}), {body});
+    std::vector<double> out;
+    for (int frame = 0; frame < 50; ++frame) {
+      world.advance({});
+      out.push_back(tip(world).y());
+    }
+    return out;
+  };
+  const std::vector<double> held = tipsOf(false), driven = tipsOf(true);
+  EXPECT_LT(*std::min_element(held.begin(), held.end()), 1.1 * held.back());  // it swings
+  for (std::size_t k = 0; k < held.size(); ++k) EXPECT_NEAR(driven[k], held[k], 1e-3 * std::abs(held.back())) << k;
+}
+
 TEST(Analytic, TheStepConvergesAtFirstOrder) {
   const auto tipAfter = [](int substeps) {
     BodyDescription body = bar(4, 0.1, LinkModel::springs);

@@ -65,6 +65,25 @@ TEST(DrivenSphere, TurnsAsFarAsItsFreedomSays) {
   }
 }
 
+// What falls through a medium comes to g / drag, however long the step.
+TEST(DrivenSphere, DragLeavesTheTerminalSpeed) {
+  constexpr double drag = 100, gravity = 9.81;
+  for (const auto& [integrator, order] : {std::pair{Integrator::explicitEuler, 1}, std::pair{Integrator::implicit, 1},
+                                          std::pair{Integrator::implicit, 2}}) {
+    WorldSettings settings;
+    settings.integrator = integrator;
+    settings.order = order;
+    settings.ambientDrag = drag;
+    settings.gravity = {0, -gravity, 0};
+    World world(settings, {tube(SurfaceMode::full)});
+    for (int frame = 0; frame < 25; ++frame) world.advance({});
+    const double before = world.data().spheres.position[2].v[1], since = world.time();
+    for (int frame = 0; frame < 25; ++frame) world.advance({});
+    const double speed = (before - world.data().spheres.position[2].v[1]) / (world.time() - since);
+    EXPECT_NEAR(speed, gravity / drag, 1e-4 * gravity / drag);
+  }
+}
+
 TEST(DrivenSphere, StaysWhereItIsWhileBodiesSettle) {
   BodyDescription b = tube(SurfaceMode::full);
   DrivenSphere drive;

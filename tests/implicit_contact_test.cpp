@@ -142,6 +142,25 @@ TEST(ImplicitContact, NothingBouncesHigh) {
   }
 }
 
+// Rolling on a slope: g sin / (1 + 2/5), whatever backward Euler's tangents would take off its spin.
+TEST(ImplicitContact, ABallRollsDownAsFastAsItShould) {
+  const double slope = 0.2;
+  World world(contactSettings(1, kGravity * Vector3d(std::sin(slope), -std::cos(slope), 0)),
+              {synthetic::ball("ball", 0.02, {0, 0.02, 0}, 0.5)}, {floorOf(0.5)});
+  runUntil(world, 1);
+  EXPECT_NEAR(placeOf(world, 0).x(), 0.5 * kGravity * std::sin(slope) / 1.4, 0.02);
+}
+
+// A contact is stiffer than the tissue behind it, however light the sphere and long the step: 0.4 kg on 3 g each.
+TEST(ImplicitContact, LightBodiesBearAHeavyOne) {
+  std::vector<BodyDescription> bodies{raft("light", {0, kRadius, 0}, 0.5), raft("heavy", {0, 3 * kRadius, 0}, 0.5)};
+  bodies[1].tissue.density = 25e3;
+  World world(contactSettings(1), bodies, {floorOf(0.5)});
+  runUntil(world, 2);
+  EXPECT_LT(world.penetration().bodies, 2);
+  EXPECT_LT(world.penetration().statics, 2);
+}
+
 // A ball whose mass lies beside its centre rolls to and fro: contact's lever turns with it.
 TEST(ImplicitContact, RollingGainsNoEnergy) {
   auto model = ballModel({{{0, 0, 0}, 0.03}});

@@ -3,8 +3,9 @@
 #include "physics/dynamics/stages.h"
 
 // The mass-proportional part of Rayleigh's damping: it slows low modes, which the links' part reaches only at the price
-// of the step. Textbooks let it act against the world; here it acts against the body's own rigid motion, so that both
-// momenta stay and neither free fall nor free rotation is slowed. Of what a sphere weighs its own mass alone counts:
+// of the step. Textbooks let it act against the world; here it acts against the body's own rigid motion, as far as what
+// is held or driven leaves it one: both momenta of a free body stay, a pendulum swings on, and what is carried along is
+// not dragged. Of what a sphere weighs its own mass alone counts:
 // alpha allows for what hangs on it (rest_modes.cpp), and must not do so twice where nodes are carried.
 namespace medulla {
 
@@ -13,42 +14,90 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Velocities are v = linear + angular x (x - centre): the rigid motion with the spheres' linear and orbital angular
-// momentum. Vectors as (x, y, z, 0).
+// Velocities are v = linear + angular x (x - centre). Vectors as (x, y, z, 0).
 struct RigidMotion {
   Lanes centre, linear, angular;
 };
 
-// One pass: sums about the body's first sphere, moved to the centre of mass by Steiner's theorem.
-RigidMotion rigidMotionOf(const Spheres& s, const std::vector<double>& ownShare, const BodyRange& r) {
-  const Lanes reference = load(s.position[r.firstSphere]), zero = splat(0);
-  Lanes first = zero, momentum = zero, angularMomentum = zero, squares = zero, products = zero;
+// Of spheres' centres about a point.
+struct Moments {
   double mass = 0;
+  Lanes first = splat(0), momentum = splat(0), angularMomentum = splat(0);
+  Lanes squares = splat(0), products = splat(0);  // m x x and so on; m x y, m y z, m z x
+};
+
+Moments momentsAbout(const Lanes& reference, const Spheres& s, const std::vector<double>& ownShare,
+                     const BodyRange& r) {
+  Moments out;
   for (const int i : spheresOf(r)) {
     const double m = ownShare[i] * s.groups[i / 4].mass[i % 4];
     const Lanes x = load(s.position[i]) - reference, mx = splat(m) * x, v = load(s.velocity[i]);
-    mass += m;
-    first = first + mx;
-    momentum = fma(splat(m), v, momentum);
-    angularMomentum = angularMomentum + crossProduct(mx, v);
-    squares = fma(mx, x, squares);
-    products = fma(mx, turnedLanes(x), products);  // xy, yz, zx
+    out.mass += m;
+    out.first = out.first + mx;
+    out.momentum = fma(splat(m), v, out.momentum);
+    out.angularMomentum = out.angularMomentum + crossProduct(mx, v);
+    out.squares = fma(mx, x, out.squares);
+    out.products = fma(mx, turnedLanes(x), out.products);
   }
-  RigidMotion motion;
-  const Lanes centre = first / splat(mass);
-  motion.centre = reference + centre;
-  motion.linear = momentum / splat(mass);
-  const Lanes moved = fnma(first, centre, squares);
-  const Lanes q = fnma(first, turnedLanes(centre), products);
-  const double trace = sumOfLanes(moved);
+  return out;
+}
+
+Matrix3d inertiaOf(const Lanes& squares, const Lanes& q) {
+  const double trace = sumOfLanes(squares);
   // Spheres in a line do not say how they turn about it, and need not: that turning moves none of their centres.
   constexpr double kRegular = 1e-14;
   const double regular = kRegular * trace + std::numeric_limits<double>::min();
   Matrix3d inertia;
-  inertia << trace - moved[0], -q[0], -q[2], -q[0], trace - moved[1], -q[1], -q[2], -q[1], trace - moved[2];
+  inertia << trace - squares[0], -q[0], -q[2], -q[0], trace - squares[1], -q[1], -q[2], -q[1], trace - squares[2];
   inertia.diagonal().array() += regular;
-  const Lanes about = angularMomentum - crossProduct(centre, momentum);
-  motion.angular = load(quadOf(inertia.ldlt().solve(Vector3d(about[0], about[1], about[2]))));
+  return inertia;
+}
+
+Lanes lanesOf(const Vector3d& v) {
+  return load(quadOf(v));
+}
+
+Vector3d vectorOf(const Lanes& v) {
+  return {v[0], v[1], v[2]};
+}
+
+// The rigid motion with the spheres' linear and orbital angular momentum: sums about the body's first sphere, moved to
+// the centre of mass by Steiner's theorem.
+RigidMotion freeMotion(const Spheres& s, const std::vector<double>& ownShare, const BodyRange& r) {
+  const Lanes reference = load(s.position[r.firstSphere]);
+  const Moments m = momentsAbout(reference, s, ownShare, r);
+  RigidMotion motion;
+  const Lanes centre = m.first / splat(m.mass);
+  motion.centre = reference + centre;
+  motion.linear = m.momentum / splat(m.mass);
+  const Matrix3d inertia = inertiaOf(fnma(m.first, centre, m.squares), fnma(m.first, turnedLanes(centre), m.products));
+  const Lanes about = m.angularMomentum - crossProduct(centre, m.momentum);
+  motion.angular = lanesOf(inertia.ldlt().solve(vectorOf(about)));
+  return motion;
+}
+
+// The rotation about a point, or about a line through two, with the spheres' angular momentum there, seen from the
+// point's own motion.
+RigidMotion supportedMotion(const WorldData& d, const BodyRange& r) {
+  const Spheres& s = d.spheres;
+  const auto placeOf = [&](const SupportPoint& p) {
+    return p.sphere >= 0 ? load(s.position[r.firstSphere + p.sphere])
+                         : lanesOf(vectorAt(d.nodes.position, r.node[p.node]));
+  };
+  const SupportPoint& point = r.support.point;
+  const Lanes zero = splat(0);
+  RigidMotion motion{placeOf(point), zero, zero};
+  if (point.sphere >= 0) motion.linear = load(s.velocity[r.firstSphere + point.sphere]);
+  if (r.support.freedom == RigidFreedom::none) return motion;
+  const Moments m = momentsAbout(motion.centre, s, d.surface.ownShare, r);
+  const Matrix3d inertia = inertiaOf(m.squares, m.products);
+  const Vector3d momentum = vectorOf(m.angularMomentum - crossProduct(m.first, motion.linear));
+  if (r.support.freedom == RigidFreedom::aboutPoint) {
+    motion.angular = lanesOf(inertia.ldlt().solve(momentum));
+  } else {
+    const Vector3d line = vectorOf(placeOf(r.support.second) - motion.centre);
+    motion.angular = lanesOf(line.dot(momentum) / line.dot(inertia * line) * line);
+  }
   return motion;
 }
 
@@ -62,18 +111,12 @@ void dampBodies(WorldData& d, const Batch& batch) {
     const BodyRange& r = d.ranges[b];
     if (r.massDamping == 0) continue;
     const double lost = 1 - 1 / (1 + d.substep * r.massDamping);
-    const auto slow = [&](const auto& rigidAt) {
-      for (const int i : spheresOf(r)) {
-        const Lanes v = load(s.velocity[i]);
-        store(s.velocity[i], fma(splat(-lost * ownShare[i]), v - rigidAt(i), v));
-      }
-    };
-    if (r.held) {
-      slow([](int) { return splat(0); });
-      continue;
+    const bool isFree = r.support.freedom == RigidFreedom::all;
+    const RigidMotion m = isFree ? freeMotion(s, ownShare, r) : supportedMotion(d, r);
+    for (const int i : spheresOf(r)) {
+      const Lanes v = load(s.velocity[i]), rigid = m.linear + crossProduct(m.angular, load(s.position[i]) - m.centre);
+      store(s.velocity[i], fma(splat(-lost * ownShare[i]), v - rigid, v));
     }
-    const RigidMotion m = rigidMotionOf(s, ownShare, r);
-    slow([&](int i) { return m.linear + crossProduct(m.angular, load(s.position[i]) - m.centre); });
   }
 }
 

@@ -95,6 +95,7 @@ struct ContactData {
   std::vector<Quad> restBall;           // m, per sphere: the ball's centre in its sphere's frame, and its radius
   std::vector<int> bodyOf;              // per sphere; -1: a pad
   std::vector<double> inverseCellMass;  // 1/kg, per sphere: with what its share of the surface weighs; 0: fixed
+  std::vector<double> inverseYoung;     // 1/Pa, per sphere: of its tissue
   std::vector<Collider> colliders;
   std::vector<std::vector<std::uint32_t>> excluded;  // per collider: later ones of its body that it never meets
   std::vector<char> collides;                        // bodies x bodies

@@ -23,6 +23,7 @@ void addBalls(WorldData& d) {
   ContactData& c = d.contact;
   c.restBall.resize(d.spheres.position.size());
   c.inverseCellMass.resize(d.spheres.position.size(), 0);
+  c.inverseYoung.resize(d.spheres.position.size(), 0);
   c.bodyOf.resize(d.spheres.position.size(), -1);
   double sum = 0;
   int count = 0;
@@ -34,6 +35,7 @@ void addBalls(WorldData& d) {
       c.restBall[k] = quadOf(s.restBallCentre - s.restFrame);
       c.restBall[k].v[3] = s.radius;
       c.bodyOf[k] = static_cast<int>(b);
+      c.inverseYoung[k] = 1 / body.tissue.young;
       if (d.spheres.groups[k / 4].inverseMass[k % 4] > 0) c.inverseCellMass[k] = 1 / (body.tissue.density * s.volume);
       sum += s.radius;
       ++count;

@@ -7,6 +7,7 @@
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/point_spring.h"
 #include "physics/dynamics/stages.h"
+#include "physics/dynamics/whole_motion.h"
 
 // Backward Euler in a stage of duration T from the state (x0, q0, p0, L0): the motion u at its end obeys
 //   M u - p0 = T f(x0 + T u, u),   I(q) w - L0 = T tau,   q = exp(T w) q0,
@@ -110,22 +111,22 @@ void place(WorldData& d, const ImplicitData& s, double time) {
   d.links.unwoundTwist = s.start.unwoundTwist;
 }
 
-// M u - p0 - T f at the placed state, without loads at points.
+// M u - p0 - T (f - c M u) at the placed state, c the ambient drag, without loads at points.
 void balanceForces(WorldData& d, const ImplicitData& s, Motion& out) {
   runStage(d, evaluateForces);
-  const Lanes t = splat(s.duration);
+  const Lanes t = splat(s.duration), dragged = splat(1 + s.duration * d.settings.ambientDrag);
   for (int i = 0; i < d.spheres.count; ++i) {
     const Lanes mass = splat(d.spheres.groups[i / 4].mass[i % 4]);
-    const Lanes v = load(s.motion[2 * i]) - load(s.start.motion[2 * i]);
+    const Lanes v = dragged * load(s.motion[2 * i]) - load(s.start.motion[2 * i]);
     store(out[2 * i], mass * v - t * load(d.spheres.force[i]));
   }
   visitAngularMomenta(d, s, [&](int i, Lanes momentum) {
-    store(out[2 * i + 1], momentum - load(s.start.angularMomentum[i]) - t * load(d.spheres.torque[i]));
+    store(out[2 * i + 1], dragged * momentum - load(s.start.angularMomentum[i]) - t * load(d.spheres.torque[i]));
   });
   const Lanes3 fallen = t * splat(d.gravity);
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
     const std::size_t k = 2 * static_cast<std::size_t>(d.spheres.count) + 4 * g;
-    const Lanes3 gained = gatherFour(s.motion, k) - gatherFour(s.start.motion, k) - fallen;
+    const Lanes3 gained = dragged * gatherFour(s.motion, k) - gatherFour(s.start.motion, k) - fallen;
     storeFour(loadFour(d.nodes.mass, 4 * g) * gained - t * d.nodes.force[g], out, k);
   }
 }
@@ -321,6 +322,33 @@ void addToolImpulses(const WorldData& d, double time, std::vector<Vector3d>& imp
 // or with a contact that pushes in a step of two stages. The state is of no account but where it is done.
 enum class Ending { done, failed, touched };
 
+// Gives free bodies back the momenta that a stage of backward Euler loses. The sum of a body's residuals is what
+// Newton's iteration left open of its momentum. Its angular momentum shrinks besides, because the step follows
+// tangents: forces balance about the places at the step's end, x1, and the momenta p0 that they change were about x0:
+// T sum u x p0 in all, for a rigid body turning at w a rate of T w^2.
+void keepMomenta(WorldData& d, const ImplicitData& s) {
+  const std::vector<WholeMotion> now = wholeMotions(d);
+  for (std::size_t b = 0; b < now.size(); ++b) {
+    const BodyRange& r = d.ranges[b];
+    if (r.support.freedom != RigidFreedom::all) continue;
+    Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero();
+    const auto addLost = [&](double mass, const Vector3d& at, std::size_t quad) {
+      const Vector3d residual = vectorOf(s.residual[quad]);
+      linear -= residual;
+      angular -=
+          at.cross(residual) + s.duration * mass * vectorOf(s.motion[quad]).cross(vectorOf(s.start.motion[quad]));
+    };
+    for (const int i : spheresOf(r)) {
+      addLost(d.spheres.groups[i / 4].mass[i % 4], vectorOf(d.spheres.position[i]), 2 * i);
+      angular -= vectorOf(s.residual[2 * i + 1]);
+    }
+    for (const int i : r.node)
+      if (i < d.nodes.dynamicEnd)
+        addLost(d.nodes.mass[i], vectorAt(d.nodes.position, i), 2 * static_cast<std::size_t>(d.spheres.count) + i);
+    addMomenta(d, static_cast<int>(b), now[b], linear, angular);
+  }
+}
+
 struct StepEnergy {
   double kinetic, elastic;  // J
 };
@@ -367,6 +395,7 @@ Ending attempt(WorldData& d, ImplicitData& s, std::size_t halvings, const Loads&
   const Ending last = solve(time, s.duration);
   if (last != Ending::done) return last;
   visitAngularMomenta(d, s, [&](int i, Lanes momentum) { store(d.spheres.angularMomentum[i], momentum); });
+  if (late == 0) keepMomenta(d, s);
   return checkEnergy(d, s, late > 0, before);
 }
 

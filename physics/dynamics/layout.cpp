@@ -325,8 +325,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.node.resize(m.restNodes.size());
     r.restVolume = enclosedVolume({m.restNodes, m.triangles});
     r.massDamping = mechanics[b].massDamping;
-    const bool knowsNodes = d.bodies[b].surface != SurfaceMode::skin || d.bodies[b].links == LinkModel::identified;
-    r.held = !d.bodies[b].fixed.empty() || (knowsNodes && !d.bodies[b].fixedNodes.empty());
+    r.support = rigidSupport(d.bodies[b]);
     d.ranges.push_back(r);
     addSpheres(d, d.bodies[b], mechanics[b]);
     if (r.linkCount > 0) addLinks(d, d.bodies[b], mechanics[b], r.firstSphere);

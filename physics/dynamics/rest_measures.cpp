@@ -146,6 +146,20 @@ std::vector<HostRate> anchorRates(const BodyDescription& body, const BodyMechani
   return out;
 }
 
+RestRates heldAttachmentRates(const BodyDescription& body, const BodyMechanics& mechanics) {
+  Entries out;
+  std::size_t rows = 0;
+  for (const int n : body.fixedNodes) {
+    const double root = std::sqrt(mechanics.attachmentStiffness[n]);
+    for (const HostRate& rate : anchorRates(body, mechanics, n)) {
+      out.addBlock(rows, 6 * rate.sphere, root * rate.linear);
+      out.addBlock(rows, 6 * rate.sphere + 3, root * rate.angular);
+    }
+    rows += 3;
+  }
+  return out.matrix(rows, 6 * body.model->spheres.size());
+}
+
 RestRates layerStiffness(const SoftBodyModel& model, const BodyMechanics& mechanics) {
   Entries out;
   const std::size_t size = 3 * mechanics.attachments.size();

@@ -22,6 +22,9 @@ struct HostRate {
 };
 std::vector<HostRate> anchorRates(const BodyDescription& body, const BodyMechanics& mechanics, int node);
 
+// R likewise, of held nodes' attachments: three rows each.
+RestRates heldAttachmentRates(const BodyDescription& body, const BodyMechanics& mechanics);
+
 // 3 nodes square, N/m: of the nodes' springs to their anchors and of their edges, over displacements from the anchors.
 RestRates layerStiffness(const SoftBodyModel& model, const BodyMechanics& mechanics);
 

@@ -9,6 +9,8 @@
 
 #include "physics/dynamics/identified_mechanics.h"
 #include "physics/dynamics/rest_model.h"
+#include "physics/dynamics/rigid_support.h"
+#include "physics/model/cross_matrix.h"
 #include "physics/model/mass_properties.h"
 #include "physics/model/symmetric_eigen.h"
 
@@ -37,8 +39,9 @@ CellMasses cellMasses(const BodyDescription& body) {
   return out;
 }
 
-// The rigid motions that the fixed freedoms allow, one per column, over the free freedoms.
-MatrixXd freeRigidMotions(const SoftBodyModel& m, const std::vector<int>& freedom, int freeCount) {
+// The rigid motions that the fixed freedoms and held nodes allow, one per column, over the free freedoms.
+MatrixXd freeRigidMotions(const SoftBodyModel& m, const std::vector<Vector3d>& heldNodes,
+                          const std::vector<int>& freedom, int freeCount) {
   MatrixXd all = MatrixXd::Zero(6 * static_cast<int>(m.spheres.size()), 6);
   const Vector3d centre = m.spheres[0].restFrame;
   for (std::size_t i = 0; i < m.spheres.size(); ++i) {
@@ -48,10 +51,15 @@ MatrixXd freeRigidMotions(const SoftBodyModel& m, const std::vector<int>& freedo
       all(6 * i + 3 + k, 3 + k) = 1;
     }
   }
-  MatrixXd fixed(all.rows() - freeCount, 6), free(freeCount, 6);
-  for (int i = 0, f = 0; i < all.rows(); ++i) {
+  MatrixXd fixed(all.rows() - freeCount + 3 * static_cast<Eigen::Index>(heldNodes.size()), 6), free(freeCount, 6);
+  Eigen::Index f = 0;
+  for (int i = 0; i < all.rows(); ++i) {
     if (freedom[i] >= 0) free.row(freedom[i]) = all.row(i);
     if (freedom[i] < 0) fixed.row(f++) = all.row(i);
+  }
+  for (const Vector3d& node : heldNodes) {
+    fixed.middleRows<3>(f) << Matrix3d::Identity(), -crossMatrix(node - centre);
+    f += 3;
   }
   if (fixed.rows() == 0) return free;
   const double size = std::max(1e-12, all.leftCols(6).cwiseAbs().maxCoeff());
@@ -117,13 +125,18 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
       for (int l = 0; l < 3; ++l) put(6 * i + 3 + k, 6 * i + 3 + l, cells.inertia[i](k, l));
     }
   }
-  const RestRates rates = links * freeOnly(freedom, count);
-  const Eigen::SparseMatrix<double> k = rates.transpose() * rates;
+  const RestRates free = freeOnly(freedom, count), rates = links * free;
+  Eigen::SparseMatrix<double> k = rates.transpose() * rates;
   Eigen::SparseMatrix<double> mm(count, count);
   mm.setFromTriplets(mass.begin(), mass.end());
 
   // Inverse iteration, rigid motions projected out; a shift far below any mode keeps the factorisation regular.
-  MatrixXd rigid = holdsByLinks(body, mechanics) ? MatrixXd(count, 0) : freeRigidMotions(m, freedom, count);
+  MatrixXd rigid = holdsByLinks(body, mechanics) ? MatrixXd(count, 0) : freeRigidMotions(m, {}, freedom, count);
+  if (rigid.cols() > 0 && holdsByNodes(body)) {  // what the spheres leave free, held nodes hold by their attachments
+    const RestRates attachments = heldAttachmentRates(body, mechanics) * free;
+    k += Eigen::SparseMatrix<double>(attachments.transpose() * attachments);
+    rigid = freeRigidMotions(m, heldNodes(body), freedom, count);
+  }
   for (int i = 0; i < rigid.cols(); ++i) {
     for (int j = 0; j < i; ++j) rigid.col(i) -= rigid.col(j).dot(mm * rigid.col(i)) * rigid.col(j);
     rigid.col(i) /= std::sqrt(rigid.col(i).dot(mm * rigid.col(i)));

@@ -6,6 +6,7 @@
 #include "physics/dynamics/node_motion.h"
 #include "physics/dynamics/stages.h"
 #include "physics/dynamics/still_nodes.h"
+#include "physics/dynamics/whole_motion.h"
 
 // SurfaceMode::contact: a host's nodes move by themselves only where something acts on them or what acts has spread to
 // them. The others are carried: they hang still from their anchors, and their mass is their spheres'. Parts join and
@@ -95,10 +96,6 @@ void layOutPart(const WorldData& d, const BodyMechanics& mechanics, std::size_t 
   part.heldBulk = bulkThatGives(d, range, part.firstChoice);
 }
 
-Matrix3d inertiaAt(const Vector3d& r) {  // m2, about the origin
-  return r.squaredNorm() * Matrix3d::Identity() - r * r.transpose();
-}
-
 // What hangs on a link moves with both ends: its mass goes to the two spheres by where it lies along their line, with
 // the inertia that it has about that point. So a body's centre stays but for what lies unevenly about the line, and no
 // sphere turns more easily than it does alone, which the step was chosen for. Whole at the sphere whose cell it lies
@@ -170,59 +167,6 @@ void partsChanged(WorldData& d) {
   listAwake(d);
 }
 
-// Of a body, about the origin; zero where nothing of it is awake.
-struct WholeMotion {
-  double mass = 0;
-  Vector3d moment = Vector3d::Zero(), linear = Vector3d::Zero(), angular = Vector3d::Zero();  // kg m, N s, N m s
-  Matrix3d inertia = Matrix3d::Zero();
-};
-
-void addMass(double mass, const Vector3d& at, const Vector3d& velocity, WholeMotion& to) {
-  to.mass += mass;
-  to.moment += mass * at;
-  to.linear += mass * velocity;
-  to.angular += mass * at.cross(velocity);
-  to.inertia += mass * inertiaAt(at);
-}
-
-Matrix3d inertiaOf(const WorldData& d, int sphere) {
-  const Matrix3d r = quaternionOf(d.spheres.orientation[sphere]).toRotationMatrix();
-  return r * inverseInertiaOf(d.spheres.groups[sphere / 4], sphere % 4).inverse() * r.transpose();
-}
-
-// Of spheres and of the nodes that move by WorldData::awake.
-std::vector<WholeMotion> wholeMotions(const WorldData& d) {
-  std::vector<WholeMotion> out(d.bodies.size());
-  for (const Batch& batch : d.awake.batches) {
-    for (const int b : batch.bodies) {
-      for (const int i : spheresOf(d.ranges[b])) {
-        addMass(d.spheres.groups[i / 4].mass[i % 4], vectorOf(d.spheres.position[i]), vectorOf(d.spheres.velocity[i]),
-                out[b]);
-        out[b].angular += vectorOf(d.spheres.angularMomentum[i]);
-        out[b].inertia += inertiaOf(d, i);
-      }
-    }
-    for (const std::vector<HostRange>* ranges : {&batch.onLinks, &batch.onSpheres})
-      for (const HostRange& range : *ranges)
-        for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i)
-          addMass(d.nodes.mass[i], vectorAt(d.nodes.position, i), vectorAt(d.nodes.velocity, i), out[range.body]);
-  }
-  return out;
-}
-
-// A rigid motion more of spheres and nodes; those that are carried are placed anew after it.
-void addMotion(WorldData& d, int body, const Vector3d& velocity, const Vector3d& spin, const Vector3d& centre) {
-  const BodyRange& r = d.ranges[body];
-  const auto at = [&](const Vector3d& x) { return Vector3d(velocity + spin.cross(x - centre)); };
-  for (const int i : spheresOf(r)) {
-    store(d.spheres.velocity[i], load(d.spheres.velocity[i]) + load(quadOf(at(vectorOf(d.spheres.position[i])))));
-    d.spheres.angularVelocity[i] = quadOf(vectorOf(d.spheres.angularVelocity[i]) + spin);
-    d.spheres.angularMomentum[i] = quadOf(vectorOf(d.spheres.angularMomentum[i]) + inertiaOf(d, i) * spin);
-  }
-  for (const int i : r.node)
-    setVector(d.nodes.velocity, i, vectorAt(d.nodes.velocity, i) + at(vectorAt(d.nodes.position, i)));
-}
-
 // Changing which parts move loses momentum: a node does not move exactly like its share of a turning sphere, and the
 // momentum that edges gave a node vanishes when it is carried again. A free body gets the difference back as one rigid
 // motion of the whole; at the hosts alone it would be a jolt.
@@ -231,13 +175,9 @@ void changeParts(WorldData& d) {
   partsChanged(d);
   const std::vector<WholeMotion> now = wholeMotions(d);
   for (std::size_t b = 0; b < now.size(); ++b) {
-    const BodyDescription& body = d.bodies[b];
-    const bool isFree = body.fixed.empty() && body.fixedNodes.empty() && body.driven.empty();
-    if (body.surface != SurfaceMode::contact || !isFree || now[b].mass == 0) continue;
-    const Vector3d centre = now[b].moment / now[b].mass, lost = before[b].linear - now[b].linear;
-    const Matrix3d inertia = now[b].inertia - now[b].mass * inertiaAt(centre);
-    const Vector3d spin = inertia.inverse() * (before[b].angular - now[b].angular - centre.cross(lost));
-    addMotion(d, static_cast<int>(b), lost / now[b].mass, spin, centre);
+    const bool isFree = d.ranges[b].support.freedom == RigidFreedom::all;
+    if (d.bodies[b].surface != SurfaceMode::contact || !isFree || now[b].mass == 0) continue;
+    addMomenta(d, static_cast<int>(b), now[b], before[b].linear - now[b].linear, before[b].angular - now[b].angular);
   }
 }
 

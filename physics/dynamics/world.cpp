@@ -55,8 +55,8 @@ void applyForces(WorldData& d, const Batch& batch) {
   shareStageArrays(d, batch);
   evaluateForces(d, batch);
   dampBodies(d, batch);
-  dragVelocities(d, batch);
   stepVelocities(d, batch);
+  dragVelocities(d, batch);
   useWholeStageArrays(d, batch);
 }
 
@@ -88,10 +88,8 @@ void stepFrameExplicitly(WorldData& d, const Loads& loads, FrameReport& report) 
 }
 
 void stepFrameImplicitly(WorldData& d, const Loads& loads, FrameReport& report) {
-  for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k) {
-    runStage(d, dragVelocities);
+  for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k)
     stepImplicitly(d, loads, timeOfSubstep(d, k), report.toolImpulse);
-  }
 }
 
 // Beyond 1e4 (m, m/s) counts as infinite: a step that diverges passes there within one frame, and nothing downstream

@@ -8,6 +8,7 @@
 #include "physics/dynamics/contact_data.h"
 #include "physics/dynamics/identified_data.h"
 #include "physics/dynamics/point_spring.h"
+#include "physics/dynamics/rigid_support.h"
 #include "physics/dynamics/simd.h"
 #include "physics/dynamics/stage_array.h"
 #include "physics/dynamics/world.h"
@@ -209,7 +210,7 @@ struct BodyRange {
   double restVolume = 0;   // m3, enclosed by the rest nodes
   double massDamping = 0;  // 1/s, Rayleigh's alpha
   int firstNodeGroup = 0;  // of its nodes, which lie together
-  bool held = false;       // some sphere is fixed: deformation is motion against it rather than against a rigid motion
+  RigidSupport support;    // damped is motion against the rigid motions that it leaves
   int batch = 0;           // bodies of different batches share no group of spheres or links
 };
 // Its spheres' numbers, to loop over; std::views::iota is beyond clang++ 14.

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "physics/dynamics/world_data.h"
+
+// The momenta of whole bodies, and rigid motions that give them back what a step or a change of parts loses.
+namespace medulla {
+
+// m2: of a unit mass at r, about the origin.
+inline Eigen::Matrix3d inertiaAt(const Eigen::Vector3d& r) {
+  return r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose();
+}
+
+// Of a body, about the origin; zero where nothing of it is awake.
+struct WholeMotion {
+  double mass = 0;  // kg
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero(), linear = Eigen::Vector3d::Zero(),
+                  angular = Eigen::Vector3d::Zero();  // kg m, N s, N m s
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // kg m2
+};
+
+// Of spheres and of the nodes that move by WorldData::awake.
+std::vector<WholeMotion> wholeMotions(const WorldData& d);
+
+// Adds the rigid motion of these momenta (N s; N m s about the origin) to all of a body. Nodes that are carried are
+// placed anew after it.
+void addMomenta(WorldData& d, int body, const WholeMotion& now, const Eigen::Vector3d& linear,
+                const Eigen::Vector3d& angular);
+
+}  // namespace medulla
