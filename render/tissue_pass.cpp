@@ -153,10 +153,25 @@ void TissuePass::upload(const VertexLight& lit, const DrawLists& lists, const Sh
 
 void TissuePass::draw(const SceneMesh& mesh, const DrawLists& lists, const std::vector<char>& wanted,
                       const Viewpoint& view, const LightView& lightView, float opacity) {
-  if (opacity < 1) {
-    glEnable(GL_BLEND);
-    glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
+  if (opacity >= 1) {
+    drawRuns(mesh, lists, wanted, view, lightView, opacity);
+    return;
   }
+  // Depth first: only the nearest layer blends. In one pass as many would as the triangles' order lets through, and the
+  // runs' outlines would show.
+  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  drawRuns(mesh, lists, wanted, view, lightView, opacity);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  glDepthFunc(GL_LEQUAL);
+  glEnable(GL_BLEND);
+  glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
+  drawRuns(mesh, lists, wanted, view, lightView, opacity);
+  glDisable(GL_BLEND);
+  glDepthFunc(GL_LESS);
+}
+
+void TissuePass::drawRuns(const SceneMesh& mesh, const DrawLists& lists, const std::vector<char>& wanted,
+                          const Viewpoint& view, const LightView& lightView, float opacity) {
   glBindVertexArray(vertexArray_);
   const DrawRun* last = nullptr;  // its program and uniforms serve the other levels, too
   for (const DrawRun& run : lists.runs) {
@@ -180,7 +195,6 @@ void TissuePass::draw(const SceneMesh& mesh, const DrawLists& lists, const std::
     glDrawElements(GL_TRIANGLES, int(run.indexCount), GL_UNSIGNED_INT,
                    bufferOffset(run.firstIndex * sizeof(std::uint32_t)));
   }
-  glDisable(GL_BLEND);
 }
 
 }  // namespace medulla

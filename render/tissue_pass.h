@@ -20,7 +20,8 @@ class TissuePass {
   void addLook(const Look& look);  // makes its texture, once
   void drawMask(const Viewpoint& viewpoint);
   void upload(const VertexLight& lit, const DrawLists& lists, const ShadowMap* shadow);
-  // Draws the runs of the parts for which `wanted` is set; opacity < 1 blends over what is there.
+  // Draws the runs of the parts for which `wanted` is set; opacity < 1 blends the nearest of them over what
+  // is there.
   void draw(const SceneMesh& mesh, const DrawLists& lists, const std::vector<char>& wanted, const Viewpoint& viewpoint,
             const LightView& lightView, float opacity);
 
@@ -30,6 +31,8 @@ class TissuePass {
     int clipFromWorld, shadowFromWorld, surface, lobes, tint, opacity;
   };
   static Program makeProgram(Variant variant);
+  void drawRuns(const SceneMesh& mesh, const DrawLists& lists, const std::vector<char>& wanted,
+                const Viewpoint& viewpoint, const LightView& lightView, float opacity);
 
   std::array<Program, kVariants> programs_;
   std::map<std::string, std::vector<unsigned>> textures_;  // by look; one for each level
