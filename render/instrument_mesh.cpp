@@ -66,15 +66,17 @@ struct Ring {
   float z, radius;
 };
 
-// Surface of revolution about z; the normals follow the profile smoothly, so that a crease needs two close rings.
-void lathe(Builder& b, const std::vector<Ring>& profile, vec3 albedo) {
+// Surface of revolution about z; the normals follow the profile smoothly, so that a crease needs two close rings. Its
+// sides are laid out from `facing` on, rad from +x, where the eye is: turning with the tool, their vertices would pass
+// the lamp's streak one by one, and it would pulse.
+void lathe(Builder& b, const std::vector<Ring>& profile, vec3 albedo, float facing) {
   std::uint32_t previous = 0;
   for (std::size_t k = 0; k < profile.size(); ++k) {
     const Ring &before = profile[k ? k - 1 : 0], &after = profile[k + 1 < profile.size() ? k + 1 : k];
     const float dz = after.z - before.z, dr = after.radius - before.radius;
     std::uint32_t first = 0;
     for (int s = 0; s <= kAround; ++s) {
-      const float a = kTau * float(s) / kAround, x = std::cos(a), y = std::sin(a);
+      const float a = facing + kTau * float(s) / kAround, x = std::cos(a), y = std::sin(a);
       const std::uint32_t i =
           b.vertex({profile[k].radius * x, profile[k].radius * y, profile[k].z}, {dz * x, dz * y, -dr}, albedo);
       if (s == 0) first = i;
@@ -85,7 +87,7 @@ void lathe(Builder& b, const std::vector<Ring>& profile, vec3 albedo) {
   }
 }
 
-void addShaft(Builder& b) {
+void addShaft(Builder& b, float facing) {
   const float r = kShaftRadius;
   // Clevis that holds the hinge, and the collar.
   lathe(b,
@@ -97,13 +99,13 @@ void addShaft(Builder& b) {
          {kHinge + 0.0048f, 0.0024f},
          {kShaftStart, 0.0025f},
          {kShaftStart + 0.0004f, 0.0025f}},
-        kSteel);
+        kSteel, facing);
   // Light is computed per vertex and interpolated without perspective: rings stay close.
   std::vector<Ring> sheath = {{kShaftStart, 0.0023f}, {kShaftStart + 0.0001f, r - 0.0001f}, {kShaftStart + 0.0004f, r}};
   constexpr float kSpacing = 0.006f;
   for (int k = 1; k <= int((kShaftEnd - kShaftStart) / kSpacing); ++k)
     sheath.push_back({kShaftStart + kSpacing * float(k), r});
-  lathe(b, sheath, kSheath);
+  lathe(b, sheath, kSheath, facing);
 }
 
 // Half width and height of a jaw along its length, t = 0 at the hinge, 1 at the tip.
@@ -175,7 +177,7 @@ void addJaw(Builder& b, float side, float angle) {
 
 }  // namespace
 
-void appendInstrument(const Instrument& instrument, SceneMesh& mesh) {
+void appendInstrument(const Instrument& instrument, vec3 eye, SceneMesh& mesh) {
   MeshPart part;
   part.look = &findLook("steel");
   part.instrument = true;
@@ -184,7 +186,8 @@ void appendInstrument(const Instrument& instrument, SceneMesh& mesh) {
   Builder builder(instrument, mesh);
   addJaw(builder, 1, instrument.jawAngle);
   addJaw(builder, -1, instrument.jawAngle);
-  addShaft(builder);
+  const vec3 toEye = glm::inverse(instrument.worldFromTool) * (eye - instrument.tip);
+  addShaft(builder, std::atan2(toEye.y, toEye.x));
   part.vertexCount = std::uint32_t(mesh.position.size()) - part.firstVertex;
   part.indexCount = std::uint32_t(mesh.index.size()) - part.firstIndex;
   mesh.parts.push_back(part);

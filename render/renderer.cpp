@@ -191,7 +191,7 @@ void Renderer::Data::placeInstruments(const Picture& picture) {
   for (const Instrument& i : picture.instruments)
     if (i.touching) applyTouch(i, mesh);
   for (const Instrument& i : picture.instruments) shadeAround(i, mesh);
-  for (const Instrument& i : picture.instruments) appendInstrument(i, mesh);
+  for (const Instrument& i : picture.instruments) appendInstrument(i, picture.camera.position, mesh);
 }
 
 void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view) {
