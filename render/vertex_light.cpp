@@ -88,9 +88,6 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
   const vec3 diffuse = glm::max((cosine + look.wrap) / (reach * reach), 0.f);
   const float crease = look.ambient > 0 ? 0.55f + 0.45f * v.openness : 1.f;
   out.direct = v.albedo * diffuse * s.lamp * (v.falloff * visible * crease);
-  // Behind the horizon the shaders know shadow alone: light that wraps fades towards it, or triangles that lie across
-  // would show as teeth. Of a lamp beside the lens the horizon is the outline, and nothing behind it is seen.
-  if (s.light.position) out.direct *= smoothStep(kHorizon, 0.25f, cosine);
   // In the cavity it comes from where the lamp shines, from around the lens: what lies in shadow keeps its form.
   const float fromLens = s.light.position ? 1.f : 0.55f + 0.75f * std::max(glm::dot(v.normal, v.toEye), 0.f);
   const vec3 sky = glm::mix(s.below, s.above, v.normal.y * 0.5f + 0.5f) * (v.openness * fromLens);
@@ -99,8 +96,15 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
     const float grazing = 1 - std::max(glm::dot(v.normal, v.toEye), 0.f);
     out.direct += look.glow * s.lamp * (v.thinness * (0.35f + 0.65f * grazing) * v.falloff * visible);
   }
+  // Behind the horizon the shaders know shadow alone: what wraps and glows fades towards it, or triangles that lie
+  // across would show as teeth. Of a lamp beside the lens the horizon is the outline, a black line where all is lost:
+  // half comes through the tissue, shadow or not. What a lamp in the world leaves dark is wide, and would glow in
+  // bands.
+  const float through = s.light.position ? 0.f : 0.5f;
+  const vec3 lost = out.direct * (1 - smoothStep(kHorizon, s.light.position ? 0.25f : 0.12f, cosine));
+  out.direct -= lost;
   const vec3 rim = s.rim * (fresnelEdge(v) * v.openness * 0.8f * std::min(v.falloff, 1.5f));
-  out.ambient = (v.albedo * sky * 1.2f + rim) * (visible * look.ambient);
+  out.ambient = (v.albedo * sky * 1.2f + rim) * (visible * look.ambient) + through * lost;
 }
 
 // Polished metal and the sheath's lacquer mirror the cavity: dim red below, pale tissue above, black where the port and
