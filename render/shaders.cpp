@@ -39,7 +39,7 @@ unsigned compile(unsigned kind, const std::string& source) {
 
 unsigned buildProgram(const std::string& defines, const char* vertex, const char* fragment) {
   const std::string head =
-      "#version 330 core\n#extension GL_ARB_texture_gather : require\n#define BLEED .045\n" + defines;
+      "#version 330 core\n#extension GL_ARB_texture_gather : require\n#define BLEED .018\n" + defines;
   const unsigned program = glCreateProgram();
   const unsigned shaders[] = {compile(GL_VERTEX_SHADER, head + vertex),
                               compile(GL_FRAGMENT_SHADER, head + kToPixels + fragment)};

@@ -12,7 +12,7 @@ using glm::vec3;
 
 // Light scattered by the cavity itself, where no haze is given; linear RGB: from below and from above, at grazing
 // surfaces, and the veil of moist air.
-constexpr vec3 kAmbientBelow(0.122f, 0.046f, 0.037f), kAmbientAbove(0.197f, 0.112f, 0.095f);
+constexpr vec3 kAmbientBelow(0.110f, 0.060f, 0.050f), kAmbientAbove(0.190f, 0.125f, 0.110f);
 constexpr vec3 kRimLight(0.10f, 0.045f, 0.035f), kVeil(0.085f, 0.022f, 0.016f);
 
 // Reflectance at normal incidence of a film of water, a little raised (Schlick 1994).
