@@ -68,8 +68,8 @@ Look stomach() {
   l.wrap = {0.45f, 0.20f, 0.14f};
   l.glow = {0.42f, 0.11f, 0.065f};
   l.glowDepth = 0.005f;
-  l.blood = 0.8f;
-  l.bloodless = {0.82f, 0.54f, 0.43f};
+  l.blood = 0.55f;
+  l.bloodless = {0.86f, 0.48f, 0.39f};
   l.roughness = 0.42f;
   l.wetRoughness = 0.14f;
   l.mottle = 0.55f;

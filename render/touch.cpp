@@ -27,7 +27,7 @@ struct Bump {
   float blanched, pale;
 };
 void displace(const MeshPart& part, const Bump& bump, SceneMesh& mesh) {
-  constexpr float kShade = 0.9f;  // share of the cavity's light lost, per slope
+  constexpr float kShade = 0.5f, kDarkest = 0.6f;  // share of the cavity's light lost, per slope; left at most
   for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
     const glm::vec3 d = mesh.position[i] - bump.centre, scaled = bump.narrow * d;
     const float q = glm::dot(scaled, scaled);
@@ -42,7 +42,7 @@ void displace(const MeshPart& part, const Bump& bump, SceneMesh& mesh) {
     const float lengthened = std::max(1 + glm::dot(bump.offset, gradient), 0.2f);
     mesh.normal[i] = glm::normalize(mesh.normal[i] - gradient * (along / lengthened));
     mesh.position[i] += bump.offset * w;
-    if (along < 0) mesh.openness[i] *= std::max(1 + kShade * along * glm::length(gradient), 0.3f);
+    if (along < 0) mesh.openness[i] *= std::max(1 + kShade * along * glm::length(gradient), kDarkest);
   }
 }
 
