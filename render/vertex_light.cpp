@@ -109,23 +109,25 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
 
 // Polished metal and the sheath's lacquer mirror the cavity: dim red below, pale tissue above, black where the port and
 // the gaps between organs are, and the lamp's wide reflector, seen beside the lens. What is mirrored lies in the lamp's
-// cone even where the shaft itself leaves it.
-void lightMetal(const Shading& v, vec3 tangent, LitVertex& out) {
+// cone even where the shaft itself leaves it. In haze it mirrors that, and half as much of dark things in it.
+void lightMetal(const Shading& v, vec3 tangent, const Surroundings& s, LitVertex& out) {
   const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
   const vec3 mirrored = 2.f * v.normal * facing - v.toEye;
   const float above = mirrored.y * 0.5f + 0.5f, toLamp = glm::dot(mirrored, v.toLight);
   const float lamp = 0.9f * smoothStep(0.75f, 0.99f, toLamp) + 0.22f * smoothStep(-0.2f, 0.5f, toLamp);
   const float gap = 1 - 0.75f * smoothStep(0.35f, 0.05f, std::abs(mirrored.y + 0.25f));
-  const vec3 cavity = (vec3(0.045f, 0.014f, 0.011f) + vec3(0.17f, 0.085f, 0.07f) * (above * above)) * gap +
-                      vec3(0.60f, 0.58f, 0.55f) * lamp;
+  const vec3 cavity = (vec3(0.045f, 0.014f, 0.011f) + vec3(0.17f, 0.085f, 0.07f) * (above * above)) * gap;
+  const float lit = std::min(v.distanceFalloff, 1.4f);
+  const vec3 around = s.haze ? s.haze->toward(mirrored) * (0.5f * gap / kExposure) : cavity * lit;
   // Brushed or drawn along its length, it shows the lamp as a streak (Kajiya and Kay 1989).
   const vec3 along = glm::cross(v.normal, tangent), halfway = glm::normalize(v.toLight + v.toEye);
   const vec3 across = halfway - along * glm::dot(halfway, along);
   const float streak = smoothStep(0.90f, 1.0f, glm::dot(v.normal, across) / std::max(glm::length(across), 1e-3f));
   const float edge = facing < 0 ? 0.f : fresnelEdge(v);
   out.direct = v.albedo * (std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 0.10f * visible);
-  out.ambient = ((v.albedo * 1.15f + 0.022f + 0.10f * edge) * cavity + (0.45f * v.albedo + 0.09f) * streak) *
-                (v.openness * visible * std::min(v.distanceFalloff, 1.4f));
+  const vec3 mirror = v.albedo * 1.15f + 0.022f + 0.10f * edge;
+  const vec3 shine = mirror * vec3(0.60f, 0.58f, 0.55f) * lamp + (0.45f * v.albedo + 0.09f) * streak;
+  out.ambient = (mirror * around + s.lamp * shine * lit) * (v.openness * visible);
 }
 
 // Can the highlight be seen anywhere within the slopes of the relief? (Most pixels of tissue cannot: they go to a
@@ -234,7 +236,7 @@ Shading lightVertex(const SceneMesh& mesh, const Look& look, std::size_t i, vec3
   o.detail = mesh.detail[i] * (1 - look.blood * mesh.blanch[i] * std::max(mesh.blanch[i], 0.f));
   const Shading v = shadingOf(mesh, look, i, picture, s);
   if (look.metal)
-    lightMetal(v, mesh.tangent[i], o);
+    lightMetal(v, mesh.tangent[i], s, o);
   else
     lightTissue(v, look, s, o);
   o.ambient += v.veilColour * (v.veil * v.veilLight * look.ambient);
