@@ -96,9 +96,11 @@ static void riseBetweenJaws(const Instrument& instrument, float blanched, SceneM
 // The simulation moves nodes a centimetre apart; this is what happens between them.
 void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
   constexpr float kWidth = 0.0055f, kBlanchWidth = 0.0040f, kBloodless = 0.0025f;  // the last: deep enough for it
-  const float width = instrument.scale * kWidth, blanched = instrument.scale * kBlanchWidth;
-  const float pressed = 1 - instrument.hold,
-              pale = pressed * std::min(glm::length(instrument.press) / (instrument.scale * kBloodless), 1.f);
+  // A deep dent is a wide one: walls as steep as a narrow one's catch the lamp in a ring of scribbles.
+  constexpr float kGentle = 2.4f;
+  const float deep = glm::length(instrument.press), blanched = instrument.scale * kBlanchWidth;
+  const float width = std::max(instrument.scale * kWidth, kGentle * deep);
+  const float pressed = 1 - instrument.hold, pale = pressed * std::min(deep / (instrument.scale * kBloodless), 1.f);
   const Bump dent{instrument.tip - instrument.press, pressed * instrument.press, glm::mat3(1 / width), blanched, pale};
   if (pressed > 0)
     for (const MeshPart& part : mesh.parts)
