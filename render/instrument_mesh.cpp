@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "render/noise.h"
+
 namespace medulla {
 namespace {
 
@@ -120,13 +122,18 @@ JawSection jawSection(float t) {
           kJawHeight * root * (1 - 0.45f * t) * (0.25f + 0.75f * end)};
 }
 
-// side = +1: the jaw above the xz plane; the other is its mirror image, so that its faces turn the other way.
+// side = +1: the jaw above the xz plane; the other is its mirror image, so that its faces turn the other way. p.y
+// points away from the bite; turned about the hinge.
+vec3 placeOnJaw(vec3 p, float side, float angle) {
+  const float c = std::cos(angle), s = std::sin(angle) * side;
+  const float dz = p.z - kHinge, dy = p.y * side;
+  return {p.x, c * dy - s * dz, kHinge + s * dy + c * dz};
+}
+
+// The outer side.
 void addJaw(Builder& b, float side, float angle) {
   const float c = std::cos(angle), s = std::sin(angle) * side;
-  const auto place = [&](float x, float y, float z) {  // y away from the bite; turned about the hinge
-    const float dz = z - kHinge, dy = y * side;
-    return vec3(x, c * dy - s * dz, kHinge + s * dy + c * dz);
-  };
+  const auto place = [&](float x, float y, float z) { return placeOnJaw({x, y, z}, side, angle); };
   const auto turned = [&](vec3 n) { return vec3(n.x, c * n.y * side - s * n.z, s * n.y * side + c * n.z); };
   constexpr int kSlices = 2 * kTeeth, kArc = 10;
   std::uint32_t previous = 0;
@@ -149,15 +156,23 @@ void addJaw(Builder& b, float side, float angle) {
         b.quad(previous + a, previous + a + 1, first + a + 1, first + a);
     previous = first;
   }
-  // Bite: transverse ridges, flat faces; smooth near the hinge and at the very tip.
+}
+
+// The inner side: transverse ridges, flat faces; smooth near the hinge and at the very tip. teeth: 0..1, how far they
+// stand out.
+void addBite(Builder& b, float side, float angle, float teeth) {
+  const float valleys = glm::mix(kRidge, kValley, teeth);
+  const auto place = [&](float x, float y, float z) { return placeOnJaw({x, y, z}, side, angle); };
   for (int k = 0; k < 2 * kTeeth; ++k) {
     const float t0 = float(k) / (2 * kTeeth), t1 = float(k + 1) / (2 * kTeeth);
-    const auto depth = [](float t, bool valley) { return valley && t > 0.2f && t < 0.97f ? kValley : kRidge; };
+    const auto depth = [valleys](float t, bool valley) { return valley && t > 0.2f && t < 0.97f ? valleys : kRidge; };
     const JawSection j0 = jawSection(t0), j1 = jawSection(t1);
     const float y0 = depth(t0, k % 2 == 0), y1 = depth(t1, k % 2 == 1);
     const vec3 p0 = place(-j0.halfWidth, y0, j0.z), p1 = place(j0.halfWidth, y0, j0.z),
                q0 = place(-j1.halfWidth, y1, j1.z), q1 = place(j1.halfWidth, y1, j1.z);
-    const auto openness = [](float t, float y) { return (y < kValley ? 0.9f : 0.3f) * (0.4f + 0.6f * t); };
+    const auto openness = [valleys, teeth](float t, float y) {
+      return (y < valleys ? 0.9f : glm::mix(0.9f, 0.3f, teeth)) * (0.4f + 0.6f * t);
+    };
     const std::array<float, 2> open{openness(t0, y0), openness(t1, y1)};
     if (side > 0)
       b.face({p0, q0, q1, p1}, 0.5f * kSteel, {open[0], open[1], open[1], open[0]});
@@ -177,7 +192,7 @@ void addJaw(Builder& b, float side, float angle) {
 
 }  // namespace
 
-void appendInstrument(const Instrument& instrument, vec3 eye, SceneMesh& mesh) {
+void appendInstrument(const Instrument& instrument, const Viewpoint& view, int pictureHeight, SceneMesh& mesh) {
   MeshPart part;
   part.look = &findLook("steel");
   part.instrument = true;
@@ -186,8 +201,12 @@ void appendInstrument(const Instrument& instrument, vec3 eye, SceneMesh& mesh) {
   Builder builder(instrument, mesh);
   addJaw(builder, 1, instrument.jawAngle);
   addJaw(builder, -1, instrument.jawAngle);
-  const vec3 toEye = glm::inverse(instrument.worldFromTool) * (eye - instrument.tip);
+  const vec3 toEye = glm::inverse(instrument.worldFromTool) * (view.position - instrument.tip);
   addShaft(builder, std::atan2(toEye.y, toEye.x));
+  // Teeth of a few pixels would be specks that flicker.
+  const float metresPerPixel = 2 * std::max(glm::length(toEye), 1e-3f) * view.tangent / float(pictureHeight);
+  const float teeth = smoothStep(4, 9, instrument.scale * kHinge / kTeeth / metresPerPixel);
+  for (const float side : {1.f, -1.f}) addBite(builder, side, instrument.jawAngle, teeth);
   part.vertexCount = std::uint32_t(mesh.position.size()) - part.firstVertex;
   part.indexCount = std::uint32_t(mesh.index.size()) - part.firstIndex;
   mesh.parts.push_back(part);

@@ -141,7 +141,7 @@ struct Renderer::Data {
 
   void bake();
   void placeSurfaces(const Picture& picture);
-  void placeInstruments(const Picture& picture);
+  void placeInstruments(const Picture& picture, const Viewpoint& view);
   void lightAndSort(const Picture& picture, const Viewpoint& view);
   void draw(const Picture& picture, const Viewpoint& view);
   void readBack(Image& out) const;
@@ -187,11 +187,11 @@ void Renderer::Data::placeSurfaces(const Picture& picture) {
   }
 }
 
-void Renderer::Data::placeInstruments(const Picture& picture) {
+void Renderer::Data::placeInstruments(const Picture& picture, const Viewpoint& view) {
   for (const Instrument& i : picture.instruments)
     if (i.touching) applyTouch(i, mesh);
   for (const Instrument& i : picture.instruments) shadeAround(i, mesh);
-  for (const Instrument& i : picture.instruments) appendInstrument(i, picture.camera.position, mesh);
+  for (const Instrument& i : picture.instruments) appendInstrument(i, view, fineHeight, mesh);
 }
 
 void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view) {
@@ -301,7 +301,7 @@ void Renderer::begin(const Picture& picture, StageTimes* times) {
   d.bake();
   start(times, "place");
   d.placeSurfaces(picture);
-  d.placeInstruments(picture);
+  d.placeInstruments(picture, view);
   start(times, "light");
   d.lightAndSort(picture, view);
   start(times, "read back");
