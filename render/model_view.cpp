@@ -192,7 +192,9 @@ static DepthFade fadeOf(const Viewpoint& v, const Drawing& drawing) {
 }
 
 void ModelView::sortBalls(const Viewpoint& view, const std::vector<DrawnBall>& balls, const DepthFade& fade) {
+  constexpr float kDense = 0.3f;
   for (auto& level : opaque_) level.clear();
+  for (auto& level : dense_) level.clear();
   seenThrough_.clear();
   for (const DrawnBall& ball : balls) {
     const float depth = pictureFromWorld(view, ball.centre).z, radius = atLeast(view, depth, ball.radius);
@@ -205,21 +207,29 @@ void ModelView::sortBalls(const Viewpoint& view, const std::vector<DrawnBall>& b
       opaque_[level].push_back(i);
     else
       seenThrough_.push_back({depth, level, i});
+    if (ball.colour.a < 1 && ball.colour.a > kDense) dense_[level].push_back(i);
   }
   // Farthest first, each over what is behind it.
   std::stable_sort(seenThrough_.begin(), seenThrough_.end(),
                    [](const SeenThrough& a, const SeenThrough& b) { return a.depth > b.depth; });
 }
 
-void ModelView::placeRods(const Viewpoint& view, const Drawing& drawing, const DepthFade& fade) {
+void ModelView::placeRods(const Viewpoint& view, const Drawing& drawing, const DepthFade& fade, bool allOpaque) {
+  // Light on dark or dark on light, thin lines look fainter than they are; the thinnest are to be seen.
+  constexpr float kStrength = 1.6f, kFaintest = 0.25f;
   rods_.clear();
   shafts_.clear();
   heads_.clear();
   const auto depthOf = [&view](glm::vec3 a, glm::vec3 b) { return pictureFromWorld(view, 0.5f * (a + b)).z; };
   for (const Segment& s : drawing.segments) {
     if (s.a == s.b) continue;
-    const float depth = depthOf(s.a, s.b);
-    rods_.push_back(rodInstance(s.a, s.b, atLeast(view, depth, s.radius), fade(s.colour, depth)));
+    const float depth = depthOf(s.a, s.b), radius = atLeast(view, depth, s.radius);
+    // What is widened to a pixel covers a share of it: opaque, a small mesh would be a mush that hides everything.
+    const float cover = allOpaque ? 1.f : std::max(kStrength * s.radius / radius, kFaintest);
+    glm::vec4 colour = fade(s.colour, depth);
+    const bool faint = cover < 1;
+    if (faint) colour.a *= cover;
+    (faint ? faintRods_ : rods_).push_back(rodInstance(s.a, s.b, radius, colour));
   }
   for (const Arrow& arrow : drawing.arrows) {
     const glm::vec3 along = arrow.to - arrow.from;
@@ -235,11 +245,12 @@ void ModelView::placeRods(const Viewpoint& view, const Drawing& drawing, const D
   }
 }
 
-void ModelView::draw(const Viewpoint& view, const Drawing& drawing, bool fade) {
+void ModelView::draw(const Viewpoint& view, const Drawing& drawing, ModelPlace place) {
+  faintRods_.clear();
   if (drawing.empty()) return;
-  const DepthFade depthFade = fade ? fadeOf(view, drawing) : DepthFade{};
+  const DepthFade depthFade = place == ModelPlace::backdrop ? fadeOf(view, drawing) : DepthFade{};
   sortBalls(view, drawing.balls, depthFade);
-  placeRods(view, drawing, depthFade);
+  placeRods(view, drawing, depthFade, place == ModelPlace::overlay);
   setCamera(view);
   glEnable(GL_CULL_FACE);
   glFrontFace(GL_CW);  // the picture is drawn upside down: see Viewpoint::clipFromWorld
@@ -247,12 +258,38 @@ void ModelView::draw(const Viewpoint& view, const Drawing& drawing, bool fade) {
   drawInstances(cylinder_, rods_);
   drawInstances(shaft_, shafts_);
   drawInstances(cone_, heads_);
+  drawBallsSeenThrough(place == ModelPlace::backdrop && !faintRods_.empty());
+  glDisable(GL_CULL_FACE);
+}
+
+static void startBlending() {
   glEnable(GL_BLEND);
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE);
   glDepthMask(GL_FALSE);  // of two, one within the other, both are seen
-  for (const SeenThrough& s : seenThrough_) drawInstances(spheres_[s.level], {s.instance});
+}
+static void stopBlending() {
   glDepthMask(GL_TRUE);
   glDisable(GL_BLEND);
+}
+
+// hide: what is drawn later lies behind the denser ones.
+void ModelView::drawBallsSeenThrough(bool hide) const {
+  startBlending();
+  for (const SeenThrough& s : seenThrough_) drawInstances(spheres_[s.level], {s.instance});
+  stopBlending();
+  if (!hide) return;
+  glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+  for (std::size_t k = 0; k < dense_.size(); ++k) drawInstances(spheres_[k], dense_[k]);
+  glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+}
+
+void ModelView::drawFaint(const Viewpoint& view) const {
+  if (faintRods_.empty()) return;
+  setCamera(view);
+  glEnable(GL_CULL_FACE);
+  startBlending();
+  drawInstances(cylinder_, faintRods_);
+  stopBlending();
   glDisable(GL_CULL_FACE);
 }
 

@@ -228,10 +228,11 @@ void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
   }
   tissue.draw(mesh, lists, opaque, view, lightView, 1);
   if (haze) background.draw(view, *haze);
-  model.draw(view, picture.model, picture.view == ViewKind::model);
+  model.draw(view, picture.model, picture.view == ViewKind::model ? ModelPlace::backdrop : ModelPlace::scene);
   if (picture.view == ViewKind::both) tissue.draw(mesh, lists, seenThrough, view, lightView, kSeenThroughOpacity);
+  model.drawFaint(view);
   if (!picture.overlay.empty()) glClear(GL_DEPTH_BUFFER_BIT);
-  model.draw(view, picture.overlay, false);
+  model.draw(view, picture.overlay, ModelPlace::overlay);
 }
 
 void Renderer::Data::readBack(Image& out) const {

@@ -86,7 +86,8 @@ struct Arrow {
   glm::vec4 colour{1};    // linear RGB
 };
 
-// Shapes in colours of their own, lit as in a studio. None is drawn thinner than a pixel and a fifth.
+// Shapes in colours of their own, lit as in a studio. None is drawn thinner than a pixel and a fifth; segments of the
+// model that are much thinner are fainter instead.
 struct Drawing {
   std::vector<DrawnBall> balls;
   std::vector<Segment> segments;
