@@ -2,25 +2,57 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
+#include <vector>
 
 #include "render/stroke_text.h"
 
 namespace medulla {
+namespace {
+
+constexpr float kReadable = 7, kLegible = 5;   // px
+constexpr float kPad = 0.9f, kLeading = 1.6f;  // of the letters' height: on all sides; from line to line
+
+float widestOf(const std::vector<std::string>& lines, float height) {
+  float widest = 0;
+  for (const std::string& line : lines) widest = std::max(widest, textWidth(line, height));
+  return widest;
+}
+
+std::vector<std::string> wrapped(const std::string& text, float height, float width) {
+  std::vector<std::string> lines;
+  std::istringstream words(text);
+  for (std::string word; words >> word;)
+    if (lines.empty() || textWidth(lines.back() + " " + word, height) > width)
+      lines.push_back(word);
+    else
+      lines.back() += " " + word;
+  return lines;
+}
+
+}  // namespace
 
 void drawCaption(const std::string& text, int width, Image& image) {
-  constexpr float kReadable = 7, kLegible = 5;  // px
+  constexpr float kHighest = 0.3f;  // of the picture
   constexpr glm::vec3 kPaper{0.004f, 0.005f, 0.007f}, kLetters{0.85f, 0.86f, 0.88f};
   const float margin = std::round(0.03f * float(image.height));
-  const float pad = 0.9f;  // of the letters' height, on all sides
   const float whole = std::max(kReadable, 0.032f * float(image.height));
   const float widest = float(width) - 2 * margin;
-  const float height = std::min(whole, whole * widest / (textWidth(text, whole) + 2 * pad * whole));
-  if (text.empty() || height < kLegible) return;
-  const glm::vec2 low(margin), corner = low + pad * height;
+  std::vector<std::string> lines{text};
+  float height = std::min(whole, whole * widest / (textWidth(text, whole) + 2 * kPad * whole));
+  if (height < kLegible) {
+    height = kReadable;
+    lines = wrapped(text, height, widest - 2 * kPad * height);
+  }
+  const glm::vec2 size(widestOf(lines, height), height * (1 + kLeading * float(lines.size() - 1)));
+  const glm::vec2 low(margin), high = low + size + 2 * kPad * height;
+  if (text.empty() || high.x > float(width) || high.y > std::max(kHighest * float(image.height), low.y + 3 * height))
+    return;
   Ink ink(image);
-  ink.fill(low, low + glm::vec2(textWidth(text, height), height) + 2 * pad * height);
+  ink.fill(low, high);
   ink.apply(kPaper, 0.72f);
-  writeText(text, corner, height, ink);
+  for (std::size_t k = 0; k < lines.size(); ++k)
+    writeText(lines[k], low + kPad * height + glm::vec2(0, kLeading * height * float(k)), height, ink);
   ink.apply(kLetters, 1);
 }
 

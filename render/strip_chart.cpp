@@ -17,6 +17,7 @@ struct Layout {
   vec2 low, high;          // of the paper
   vec2 plotLow, plotHigh;  // of the curves
   float text = 0;          // height of letters; 0: too small to be read
+  float small = 0;         // of those beside them
   float thin = 0;          // radius of lines
 
   explicit Layout(const Image& image) {
@@ -24,8 +25,10 @@ struct Layout {
     const float width = std::round(std::min(0.52f * h, 0.45f * float(image.width)));
     low = {margin, bottom - margin - std::round(0.2f * h)};
     high = {margin + width, bottom - margin};
-    text = image.height < 120 ? 0 : 0.026f * h;
-    plotLow = low + vec2(0.016f * h, text > 0 ? 0.060f * h : 0.016f * h);
+    constexpr float kReadable = 6.5f, kLegible = 5;  // px
+    text = image.height < 120 ? 0 : std::max(0.026f * h, kReadable);
+    small = std::max(0.62f * text, kLegible);
+    plotLow = low + vec2(0.016f * h, text > 0 ? 0.008f * h + 2 * text : 0.016f * h);
     plotHigh = high - 0.016f * h;
     thin = 0.0007f * h;
   }
@@ -40,11 +43,20 @@ vec2 onPixel(vec2 p) {
   return glm::floor(p) + 0.5f;
 }
 
+// Of the range's label, below the upper line.
+vec2 rangeCorner(const Layout& layout) {
+  return layout.at(0, 1) + vec2(0.5f, 0.6f) * layout.small;
+}
+
 void drawGrid(const StripChart& chart, const Layout& layout, Ink& ink) {
+  // No line goes through the label.
+  const vec2 label = rangeCorner(layout) + vec2(textWidth(chart.rangeLabel, layout.small) + 1, 1.6f * layout.small);
   for (const float v : {0.f, 0.5f, 1.f}) ink.stroke(onPixel(layout.at(0, v)), onPixel(layout.at(1, v)), layout.thin);
   for (int t = int(chart.now); float(t) > chart.now - chart.seconds; --t) {
     const float u = 1 - (chart.now - float(t)) / chart.seconds;
-    ink.stroke(onPixel(layout.at(u, 0)), onPixel(layout.at(u, 1)), layout.thin);
+    vec2 top = layout.at(u, 1);
+    if (layout.text > 0 && top.x < label.x) top.y = std::max(top.y, label.y);
+    ink.stroke(onPixel(layout.at(u, 0)), onPixel(top), layout.thin);
   }
   ink.apply(kGrid, 1);
 }
@@ -60,7 +72,7 @@ void drawCurve(const StripChart& chart, const StripCurve& curve, const Layout& l
 }
 
 void writeLabels(const StripChart& chart, const Layout& layout, Ink& ink) {
-  const float header = layout.low.y + 0.75f * layout.text, small = 0.62f * layout.text;
+  const float header = layout.low.y + 0.75f * layout.text, small = layout.small;
   vec2 corner(layout.plotLow.x, header);
   for (const StripCurve& curve : chart.curves) {
     writeText(curve.label, corner, layout.text, ink);
@@ -69,11 +81,7 @@ void writeLabels(const StripChart& chart, const Layout& layout, Ink& ink) {
   }
   writeText(chart.windowLabel, {layout.plotHigh.x - textWidth(chart.windowLabel, small), header + layout.text - small},
             small, ink);
-  ink.apply(kGrey, 1);
-  const vec2 range = layout.at(0, 1) + vec2(0.5f * small, 0.6f * small);
-  ink.fill(range - 0.3f * small, range + vec2(textWidth(chart.rangeLabel, small), 1.3f * small));  // no line through it
-  ink.apply(kPaper, 1);
-  writeText(chart.rangeLabel, range, small, ink);
+  writeText(chart.rangeLabel, rangeCorner(layout), small, ink);
   ink.apply(kGrey, 1);
 }
 
