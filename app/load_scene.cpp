@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -202,6 +203,14 @@ static void requireNearby(const Scene& scene, const SceneStatic& item, const Tri
                                item.meshPath, most, kAnyPlace.most));
 }
 
+// m: the diagonal of the box around all bodies at rest.
+static double sizeOfBodies(const Scene& scene) {
+  Eigen::AlignedBox3d box;
+  for (const SceneBody& body : scene.bodies)
+    for (const Eigen::Vector3d& x : body.model->restNodes) box.extend(body.worldFromModel * x);
+  return box.isEmpty() ? 0 : box.diagonal().norm();
+}
+
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories) {
   LoadedScene loaded;
   for (SceneTool& tool : scene.tools) {
@@ -217,10 +226,11 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
     resolveLoads(scene, body);
     loaded.references.push_back(loadReference(scene, body));
   }
+  const double size = sizeOfBodies(scene);
   for (const SceneStatic& item : scene.statics) {
     if (!item.look.empty()) requireLook(scene, item.line, item.look);
     if (!item.meshPath.empty()) requireFile(scene, item.line, "mesh", "mesh", item.meshPath);
-    loaded.statics.push_back(item.meshPath.empty() ? shapeMesh(item.shape)
+    loaded.statics.push_back(item.meshPath.empty() ? shapeMesh(item.shape, size)
                                                    : readMesh(item.meshPath, metresPerUnit(item.unit)));
     if (!item.meshPath.empty()) requireNearby(scene, item, loaded.statics.back());
   }

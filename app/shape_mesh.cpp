@@ -9,11 +9,13 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-// A parallelogram of n x n cells, facing along u x v.
-static void addPatch(TriangleMesh& mesh, const Vector3d& corner, const Vector3d& u, const Vector3d& v, int n) {
+// A parallelogram of n x n cells, facing along u x v. `place` takes 0..1 along a side to 0..1.
+template <class Place>
+static void addPatch(TriangleMesh& mesh, const Vector3d& corner, const Vector3d& u, const Vector3d& v, int n,
+                     const Place& place) {
   const int first = static_cast<int>(mesh.vertices.size());
   for (int i = 0; i <= n; ++i)
-    for (int j = 0; j <= n; ++j) mesh.vertices.push_back(corner + u * i / n + v * j / n);
+    for (int j = 0; j <= n; ++j) mesh.vertices.push_back(corner + u * place(double(i) / n) + v * place(double(j) / n));
   const auto id = [&](int i, int j) { return first + i * (n + 1) + j; };
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
@@ -37,9 +39,19 @@ static TriangleMesh boxMesh(const Vector3d& size) {
       if (side < 0) std::swap(u, v);
       const int cells =
           std::clamp(static_cast<int>(kCellsPerMetre * std::max(u.norm(), v.norm())), kFewestCells, kMostCells);
-      addPatch(mesh, 0.5 * (side * size[axis] * Vector3d::Unit(axis) - u - v), u, v, cells);
+      addPatch(mesh, 0.5 * (side * size[axis] * Vector3d::Unit(axis) - u - v), u, v, cells, [](double s) { return s; });
     }
   }
+  return mesh;
+}
+
+// Cells are a third as wide in the middle, where bodies are, as uniform ones would be, and wider outwards.
+static TriangleMesh planeMesh(double side) {
+  constexpr double kGrading = 3;
+  const auto place = [](double s) { return 0.5 + 0.5 * std::sinh(kGrading * (2 * s - 1)) / std::sinh(kGrading); };
+  TriangleMesh mesh;
+  addPatch(mesh, Vector3d(-0.5 * side, 0, -0.5 * side), side * Vector3d::UnitZ(), side * Vector3d::UnitX(), kMostCells,
+           place);
   return mesh;
 }
 
@@ -69,13 +81,10 @@ static TriangleMesh sphereMesh(double radius) {
   return mesh;
 }
 
-TriangleMesh shapeMesh(const StaticShape& shape) {
+TriangleMesh shapeMesh(const StaticShape& shape, double sceneSize) {
   switch (shape.kind) {
-    case StaticShape::Kind::plane: {
-      TriangleMesh mesh;
-      addPatch(mesh, Vector3d(-0.5, 0, -0.5), Vector3d::UnitZ(), Vector3d::UnitX(), static_cast<int>(kCellsPerMetre));
-      return mesh;
-    }
+    case StaticShape::Kind::plane:
+      return planeMesh(std::max(1.0, 4 * sceneSize));
     case StaticShape::Kind::box:
       return boxMesh(shape.size);
     case StaticShape::Kind::sphere:

@@ -150,7 +150,7 @@ Look wall() {
   l.albedoLow = {0.36f, 0.085f, 0.065f};
   l.albedoHigh = {0.60f, 0.22f, 0.16f};
   l.mottleFrequency = 22;
-  l.patches[0] = {{0.88f, 0.58f, 0.20f}, 11, 2, 1, {}, 0.50f, 0.66f, 0.8f};
+  l.patches[0] = {{0.88f, 0.58f, 0.20f}, 11, 2, 1, {}, 0.50f, 0.66f, 0.8f, 0.9f};
   l.wrap = {0.40f, 0.16f, 0.10f};
   l.roughness = 0.42f;
   l.wetRoughness = 0.19f;

@@ -19,6 +19,7 @@ struct Patch {
   glm::vec3 gradient{0};
   float from = 0, to = 1;
   float amount = 0;  // 0..1 at full coverage; 0 ends the list
+  float warp = 0;    // cells by which the noise's places are shifted about: on a plane along its lattice it makes boxes
 };
 
 // Vessels and fine structure of the tileable detail texture.

@@ -208,6 +208,11 @@ void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
   if (occludes(part)) bakeDetail(mesh, part);
 }
 
+static vec3 shifted(vec3 p, float cells) {
+  const vec3 q = 1.3f * p;
+  return p + cells * (vec3(valueNoise(q + 17.f), valueNoise(q + 43.f), valueNoise(q + 71.f)) - 0.5f);
+}
+
 void bakeAlbedo(SceneMesh& mesh, const MeshPart& part) {
   const Look& look = *part.look;
   const Bounds bounds = boundsOf(mesh, part);
@@ -219,8 +224,9 @@ void bakeAlbedo(SceneMesh& mesh, const MeshPart& part) {
     vec3 albedo = mixClamped(look.albedoLow, look.albedoHigh, 0.7f * coarse + 0.55f * (middle - 0.25f));
     for (const Patch& patch : look.patches) {
       if (patch.amount == 0) break;
-      const float at =
-          patch.noiseWeight * fractalNoise(p * patch.frequency + patch.seed) + glm::dot(patch.gradient, inBox);
+      vec3 cell = p * patch.frequency + patch.seed;
+      if (patch.warp > 0) cell = shifted(cell, patch.warp);
+      const float at = patch.noiseWeight * fractalNoise(cell) + glm::dot(patch.gradient, inBox);
       albedo = glm::mix(albedo, patch.colour, patch.amount * smoothStep(patch.from, patch.to, at));
     }
     mesh.albedo[i] = albedo;
