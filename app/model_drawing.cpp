@@ -5,6 +5,7 @@
 
 #include "app/scene_view.h"
 #include "physics/dynamics/identified_mechanics.h"
+#include "render/looks.h"
 
 namespace medulla {
 
@@ -119,15 +120,20 @@ void drawMesh(const SoftBodyModel& model, const BodyFrame& frame, float height, 
     out.segments.push_back({toGlm(frame.nodes[a]), toGlm(frame.nodes[b]), 0.5f * kThin * height, kMeshColour});
 }
 
-void drawSpheres(const BodyDescription& body, const BodyFrame& frame, Drawing& out) {
+void drawSpheres(const SceneBody& body, const BodyFrame& frame, Drawing& out) {
   const SoftBodyModel& model = *body.model;
+  // Bodies that lie together are told apart by a share of what they look like.
+  constexpr float kOwn = 0.5f;
+  const Look& look = findLook(body.look);
+  const glm::vec4 own(0.5f * (look.albedoLow + look.albedoHigh), kSphereColour.a);
+  const glm::vec4 colour = glm::mix(kSphereColour, own, kOwn);
   for (std::size_t i = 0; i < model.spheres.size(); ++i) {
     const FillingSphere& sphere = model.spheres[i];
     const SpherePose& pose = frame.spheres[i];
     const Vector3d centre = pose.position + pose.worldFromSphere * (sphere.restBallCentre - sphere.restFrame);
     const bool fixed = std::any_of(body.fixed.begin(), body.fixed.end(),
                                    [&](const FixedSphere& f) { return f.sphere == static_cast<int>(i); });
-    out.balls.push_back({toGlm(centre), float(sphere.radius), fixed ? kFixedSphereColour : kSphereColour});
+    out.balls.push_back({toGlm(centre), float(sphere.radius), fixed ? kFixedSphereColour : colour});
   }
 }
 
@@ -170,8 +176,7 @@ void drawFrames(const CarriedLink& link, float length, Drawing& out) {
 
 }  // namespace
 
-void drawBodyModel(const BodyDescription& body, const BodyFrame& frame, const Shown& shown, float height,
-                   Drawing& out) {
+void drawBodyModel(const SceneBody& body, const BodyFrame& frame, const Shown& shown, float height, Drawing& out) {
   const SoftBodyModel& model = *body.model;
   if (shown.mesh) drawMesh(model, frame, height, out);
   if (shown.skeleton) drawSkeleton(model, frame, height, out);

@@ -9,7 +9,7 @@ namespace medulla {
 
 // Adds the chosen parts of a body in its present shape. `height`: of the picture at what it looks at, m; thin things
 // are as wide in it whatever the body's size.
-void drawBodyModel(const BodyDescription& body, const BodyFrame& frame, const Shown& shown, float height, Drawing& out);
+void drawBodyModel(const SceneBody& body, const BodyFrame& frame, const Shown& shown, float height, Drawing& out);
 
 // Adds the proxy, the device, and the virtual spring between them as a coil.
 void drawProxy(const ToolSettings& tool, const ToolState& state, Drawing& out);
