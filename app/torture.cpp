@@ -11,6 +11,7 @@
 #include "app/interrupt.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/dynamics/stages.h"
+#include "physics/model/surface_samples.h"
 
 namespace medulla {
 
@@ -18,26 +19,6 @@ namespace {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-// A small generator of its own: the same numbers everywhere (splitmix64; Steele, Lea and Flood 2014).
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-  double unit() {  // 0 to 1
-    state_ += 0x9e3779b97f4a7c15ULL;
-    std::uint64_t z = state_;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-    return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
-  }
-  Vector3d inBox(const Eigen::AlignedBox3d& box) {
-    const Vector3d u(unit(), unit(), unit());
-    return box.min() + u.cwiseProduct(box.sizes());
-  }
-
- private:
-  std::uint64_t state_;
-};
 
 Eigen::AlignedBox3d boxOf(const SoftBodyModel& m) {
   Eigen::AlignedBox3d box;
@@ -116,12 +97,16 @@ void twist(WorldData& d, const Eigen::AlignedBox3d& box, double turns) {
 }
 
 void scatter(WorldData& d, const Eigen::AlignedBox3d& box) {
-  Random random(1);
+  RandomSequence random{1};
   disturb(
-      d, [&](const Vector3d&) { return random.inBox(box); },
+      d,
+      [&](const Vector3d&) -> Vector3d {
+        const Vector3d u(random.uniform(), random.uniform(), random.uniform());
+        return box.min() + u.cwiseProduct(box.sizes());
+      },
       [&](const Vector3d&) {
-        const double a = 2 * std::numbers::pi * random.unit(), b = 2 * std::numbers::pi * random.unit(),
-                     u = random.unit();
+        const double a = 2 * std::numbers::pi * random.uniform(), b = 2 * std::numbers::pi * random.uniform(),
+                     u = random.uniform();
         return Quaterniond(std::sqrt(1 - u) * std::sin(a), std::sqrt(1 - u) * std::cos(a), std::sqrt(u) * std::sin(b),
                            std::sqrt(u) * std::cos(b));
       });
@@ -222,9 +207,9 @@ std::shared_ptr<const SoftBodyModel> unevenModel(const SoftBodyModel& m) {
 std::shared_ptr<const SoftBodyModel> shuffledModel(const SoftBodyModel& m, BodyDescription& body) {
   std::vector<int> order(m.restNodes.size()), place(order.size());
   std::iota(order.begin(), order.end(), 0);
-  Random random(2);
+  RandomSequence random{2};
   for (std::size_t i = order.size(); i > 1; --i)
-    std::swap(order[i - 1], order[static_cast<std::size_t>(random.unit() * static_cast<double>(i))]);
+    std::swap(order[i - 1], order[static_cast<std::size_t>(random.uniform() * static_cast<double>(i))]);
   auto out = std::make_shared<SoftBodyModel>(m);
   for (std::size_t i = 0; i < order.size(); ++i) {
     place[order[i]] = static_cast<int>(i);

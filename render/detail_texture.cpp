@@ -25,6 +25,22 @@ float cubeRoot(float x) {  // of 0.3 to 1, by Newton's method
   return y;
 }
 
+// A small generator of its own (xorshift, Marsaglia 2003): the standard library's distributions differ between
+// versions.
+class RandomFloats {
+ public:
+  explicit RandomFloats(std::uint32_t seed) : state_(seed * 2654435761u + 1) {}
+  float next() {  // 0..1
+    state_ ^= state_ << 13;
+    state_ ^= state_ >> 17;
+    state_ ^= state_ << 5;
+    return float(state_ >> 8) * (1.f / 16777216.f);
+  }
+
+ private:
+  std::uint32_t state_;
+};
+
 // Vessel trees grown on the torus of texels, the widest tip first, so that trunks have their room before twigs fill
 // what is left. A vessel keeps its heading, winds about it, thins at each fork after Murray (1926), r0^3 = r1^3 + r2^3,
 // and turns away from, or ends before, any other: vessels of one layer do not cross.
@@ -160,7 +176,7 @@ class VesselPainter {
   int side_;
   float unit_;  // texels per texel of a 512 tile
   float bend_;
-  RandomSequence random_;
+  RandomFloats random_;
   std::vector<float> opacity_;
   std::vector<std::uint16_t> owner_;  // 0: free
   std::vector<Tip> tips_;             // heap

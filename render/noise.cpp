@@ -58,11 +58,4 @@ float tiledCells(float x, float y, int period, int seed) {
   return second - nearest;
 }
 
-float RandomSequence::next() {
-  state_ ^= state_ << 13;
-  state_ ^= state_ >> 17;
-  state_ ^= state_ << 5;
-  return float(state_ >> 8) * (1.f / 16777216.f);
-}
-
 }  // namespace medulla

@@ -14,17 +14,6 @@ float fractalNoise(glm::vec3 p);                                    // 0..1, fou
 float tiledNoise(float x, float y, int period, int seed);  // 0..1
 float tiledCells(float x, float y, int period, int seed);  // Worley F2 - F1: 0 on cell borders
 
-// A small generator of its own (xorshift, Marsaglia 2003): the standard library's distributions differ between
-// versions.
-class RandomSequence {
- public:
-  explicit RandomSequence(std::uint32_t seed) : state_(seed * 2654435761u + 1) {}
-  float next();  // 0..1
-
- private:
-  std::uint32_t state_;
-};
-
 inline float smoothStep(float from, float to, float x) {
   const float t = glm::clamp((x - from) / (to - from), 0.f, 1.f);
   return t * t * (3 - 2 * t);
