@@ -94,18 +94,18 @@ void Simulation::advanceDynamics() {
   totals_.substeps += world_.substepsPerFrame();
   totals_.simulated += frameDuration_;
   const double start = wallSeconds();
-  const FrameReport report = world_.advance(record_.loads);
+  const std::vector<Eigen::Vector3d> given = world_.advance(record_.loads);
   const double stepped = wallSeconds();
   std::swap(previous_, current_);
   world_.readFrame(current_);
   // Without tools nobody feels the surface; a servo that runs elsewhere waits for it all the same.
   if (isAwaited_ || !loaded_->trajectories.empty())
-    servo_->commit(previous_, current_, record_.tools[ticksPerFrame_], &report.toolImpulse, isAwaited_ ? 1 : 0);
+    servo_->commit(previous_, current_, record_.tools[ticksPerFrame_], &given, isAwaited_ ? 1 : 0);
   times_.dynamics = stepped - start;
   times_.surface = wallSeconds() - stepped;
   ++frame_;
   accountTicks();
-  accountImpulses(report);
+  accountImpulses(given);
   accountVolumes();
 }
 
@@ -121,13 +121,13 @@ void Simulation::accountTicks() {
     }
 }
 
-// The force on the hand is minus what the tool gives to the bodies.
-void Simulation::accountImpulses(const FrameReport& report) {
+// `given` by each tool to the bodies, N s; the force on the hand is minus that.
+void Simulation::accountImpulses(const std::vector<Eigen::Vector3d>& given) {
   double impulse = 0, difference = 0;
   for (std::size_t k = 0; k < loaded_->trajectories.size(); ++k) {
     Eigen::Vector3d servo = Eigen::Vector3d::Zero();
     for (int tick = 1; tick <= ticksPerFrame_; ++tick) servo -= tickDuration_ * record_.tools[tick][k].force;
-    const Eigen::Vector3d dynamics = k < report.toolImpulse.size() ? report.toolImpulse[k] : Eigen::Vector3d::Zero();
+    const Eigen::Vector3d dynamics = k < given.size() ? given[k] : Eigen::Vector3d::Zero();
     impulse += servo.norm();
     difference += (servo - dynamics).norm();
   }

@@ -105,7 +105,7 @@ class Simulation {
   void runTicks();
   void advanceDynamics();
   void accountTicks();
-  void accountImpulses(const FrameReport& report);
+  void accountImpulses(const std::vector<Eigen::Vector3d>& given);
   void accountVolumes();
 
   const LoadedScene* loaded_;

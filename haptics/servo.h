@@ -46,8 +46,8 @@ class Servo {
 
   // Dynamics' side, after each dynamics frame: the two frames to blend next, `from` being the `to` of the last commit.
   // `tools` is about where the tools are: Embree's bounds are renewed near them. `toolImpulse` is what they gave in
-  // this frame (FrameReport, N s); null: not known, and no force is kept to it. It answers what tools did `framesLate`
-  // frames earlier than in logical time. Contents are copied.
+  // this frame (World::advance(), N s); null: not known, and no force is kept to it. It answers what tools did
+  // `framesLate` frames earlier than in logical time. Contents are copied.
   void commit(const DynamicsFrame& from, const DynamicsFrame& to, const std::vector<ToolState>& tools,
               const std::vector<Eigen::Vector3d>* toolImpulse = nullptr, int framesLate = 0);
 

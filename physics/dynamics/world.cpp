@@ -67,14 +67,15 @@ StepTime timeOfSubstep(const WorldData& d, int k) {
 }
 
 // What joins bodies to tools and to each other.
-void applyLoadsAndContacts(WorldData& d, const Loads& loads, const StepTime& time, FrameReport& report) {
+void applyLoadsAndContacts(WorldData& d, const Loads& loads, const StepTime& time,
+                           std::vector<Eigen::Vector3d>& toolImpulse) {
   applyDeadLoads(d, time.end);
   driveSpheres(d, time.end, d.substep);
-  applyLoads(d, loads, time.remaining, report.toolImpulse);
+  applyLoads(d, loads, time.remaining, toolImpulse);
   resolveContacts(d);
 }
 
-void stepFrameExplicitly(WorldData& d, const Loads& loads, FrameReport& report) {
+void stepFrameExplicitly(WorldData& d, const Loads& loads, std::vector<Eigen::Vector3d>& toolImpulse) {
   for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k) {
     // Positions at the substep's end together with the next one's forces, while what a batch reads is in the cache.
     runStage(
@@ -82,14 +83,14 @@ void stepFrameExplicitly(WorldData& d, const Loads& loads, FrameReport& report) 
           stepPositions(world, batch);
           applyForces(world, batch);
         });
-    applyLoadsAndContacts(d, loads, timeOfSubstep(d, k), report);
+    applyLoadsAndContacts(d, loads, timeOfSubstep(d, k), toolImpulse);
   }
   runStage(d, stepPositions);
 }
 
-void stepFrameImplicitly(WorldData& d, const Loads& loads, FrameReport& report) {
+void stepFrameImplicitly(WorldData& d, const Loads& loads, std::vector<Eigen::Vector3d>& toolImpulse) {
   for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k)
-    stepImplicitly(d, loads, timeOfSubstep(d, k), report.toolImpulse);
+    stepImplicitly(d, loads, timeOfSubstep(d, k), toolImpulse);
 }
 
 // Beyond 1e4 (m, m/s) counts as infinite: a step that diverges passes there within one frame, and nothing downstream
@@ -214,21 +215,20 @@ double World::time() const {
   return static_cast<double>(data_->frame) * data_->settings.frameDuration;
 }
 
-FrameReport World::advance(const Loads& loads) {
+std::vector<Eigen::Vector3d> World::advance(const Loads& loads) {
   WorldData& d = *data_;
   checkLoads(d, loads);
-  FrameReport report;
   int tools = 0;
   for (const ToolSpring& t : loads.toolSprings) tools = std::max(tools, t.tool + 1);
   for (const HeldNode& held : loads.heldNodes) tools = std::max(tools, held.tool + 1);
-  report.toolImpulse.assign(tools, Eigen::Vector3d::Zero());
+  std::vector<Eigen::Vector3d> toolImpulse(tools, Eigen::Vector3d::Zero());
   d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Eigen::Vector3d::Zero());
   letGoOfWholeTurns(d);
   wakeLoaded(d, loads);
   moveLoadedParts(d, loads);
   frameLoadedSkins(d, loads);
   const bool implicit = d.settings.integrator == Integrator::implicit;
-  (implicit ? stepFrameImplicitly : stepFrameExplicitly)(d, loads, report);
+  (implicit ? stepFrameImplicitly : stepFrameExplicitly)(d, loads, toolImpulse);
   ++d.frame;
   chooseSurfaceParts(d, loads);
   fallAsleep(d, loads);
@@ -237,7 +237,7 @@ FrameReport World::advance(const Loads& loads) {
   feelGravity(d);
   placeCarriedNodes(d);
   requireFinite(d, time());
-  return report;
+  return toolImpulse;
 }
 
 void World::readFrame(DynamicsFrame& out) const {

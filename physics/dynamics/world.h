@@ -100,11 +100,6 @@ struct WorldSettings {
   double sleepAfter = 0;
 };
 
-// Sums over one dynamics frame, for logs and tests.
-struct FrameReport {
-  std::vector<Eigen::Vector3d> toolImpulse;  // N s that each tool gave to the bodies (index: tool)
-};
-
 struct Energies {
   double kinetic = 0, elastic = 0, gravity = 0;  // J
 };
@@ -126,9 +121,9 @@ class World {
   double substep() const;        // s
   double stableSubstep() const;  // s, the estimate of the largest stable step
   double time() const;           // s; below 0 until the settling frames are through
-  // One dynamics frame: substeps under gravity and `loads`. Throws std::runtime_error naming body, time and cause when
-  // the state stops being finite.
-  FrameReport advance(const Loads& loads);
+  // One dynamics frame: substeps under gravity and `loads`. Returns the N s that each tool gave to the bodies (index:
+  // tool). Throws std::runtime_error naming body, time and cause when the state stops being finite.
+  std::vector<Eigen::Vector3d> advance(const Loads& loads);
 
   void readFrame(DynamicsFrame& out) const;  // resized once and reused
   Energies energies() const;
