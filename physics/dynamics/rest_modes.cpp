@@ -39,6 +39,15 @@ CellMasses cellMasses(const BodyDescription& body) {
   return out;
 }
 
+// Of the spheres' 6 each, those that are not fixed; ascending.
+std::vector<int> freeFreedoms(const BodyMechanics& mechanics) {
+  std::vector<int> out;
+  for (int i = 0; i < static_cast<int>(mechanics.moves.size()); ++i)
+    for (int k = 0; k < 6; ++k)
+      if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) out.push_back(6 * i + k);
+  return out;
+}
+
 // The rigid motions that the fixed freedoms and held nodes allow, one per column, over the free freedoms.
 MatrixXd freeRigidMotions(const SoftBodyModel& m, const std::vector<Vector3d>& heldNodes,
                           const std::vector<int>& freedom, int freeCount) {
@@ -106,11 +115,10 @@ bool holdsByLinks(const BodyDescription& body, const BodyMechanics& mechanics) {
 double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics) {
   const SoftBodyModel& m = *body.model;
   const int spheres = static_cast<int>(m.spheres.size());
+  const std::vector<int> free = freeFreedoms(mechanics);
+  const int count = static_cast<int>(free.size());
   std::vector<int> freedom(6 * spheres, -1);
-  int count = 0;
-  for (int i = 0; i < spheres; ++i)
-    for (int k = 0; k < 6; ++k)
-      if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) freedom[6 * i + k] = count++;
+  for (int f = 0; f < count; ++f) freedom[free[f]] = f;
   const RestRates links = linkRates(m, mechanics);
   if (count == 0 || links.rows() == 0) return 0;
 
@@ -158,10 +166,7 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
 std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMechanics& mechanics, int count) {
   constexpr double kRigid = 1e-9;  // of the largest eigenvalue: motion that deforms nothing
   const RestModel rest(body, mechanics);
-  std::vector<int> free;
-  for (int i = 0; i < static_cast<int>(mechanics.sphereMass.size()); ++i)
-    for (int k = 0; k < 6; ++k)
-      if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) free.push_back(6 * i + k);
+  const std::vector<int> free = freeFreedoms(mechanics);
   if (free.empty()) return {};
   const MatrixXd stiffness = rest.linkStiffness()(free, free), mass = rest.carriedMass(mechanics)(free, free);
   const VectorXd modes = eigenvaluesOf(stiffness, mass);
@@ -245,24 +250,14 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
 
 MatrixXd skeletonResponse(const BodyDescription& body, const BodyMechanics& mechanics, const MatrixXd& forces) {
   const RestModel model(body, mechanics);
-  std::vector<int> free;
+  const std::vector<int> free = freeFreedoms(mechanics);
   bool held = false;
-  for (std::size_t i = 0; i < mechanics.moves.size(); ++i) {
-    held = held || !(mechanics.moves[i] || mechanics.turns[i]);
-    for (int k = 0; k < 6; ++k)
-      if (k < 3 ? mechanics.moves[i] : mechanics.turns[i]) free.push_back(6 * static_cast<int>(i) + k);
-  }
+  for (std::size_t i = 0; i < mechanics.moves.size(); ++i) held = held || !(mechanics.moves[i] || mechanics.turns[i]);
   if (!held) throw std::runtime_error("no sphere is fixed: forces have no answer at rest");
-  const MatrixXd all = model.linkStiffness(), loads = model.onSpheres(forces);
-  const auto count = static_cast<Eigen::Index>(free.size());
-  MatrixXd stiffness(count, count), some(count, loads.cols());
-  for (Eigen::Index i = 0; i < count; ++i) {
-    some.row(i) = loads.row(free[i]);
-    for (Eigen::Index j = 0; j < count; ++j) stiffness(i, j) = all(free[i], free[j]);
-  }
-  const MatrixXd solved = stiffness.llt().solve(some);
+  const MatrixXd stiffness = model.linkStiffness()(free, free), loads = model.onSpheres(forces);
+  const MatrixXd solved = stiffness.llt().solve(loads(free, Eigen::all));
   MatrixXd motions = MatrixXd::Zero(loads.rows(), loads.cols());
-  for (Eigen::Index i = 0; i < count; ++i) motions.row(free[i]) = solved.row(i);
+  motions(free, Eigen::all) = solved;
   MatrixXd out = model.carried(motions);
   for (const int n : body.fixedNodes) out.middleRows<3>(3 * static_cast<Eigen::Index>(n)).setZero();
   return out;
