@@ -10,6 +10,7 @@
 #include <string>
 
 #include "haptics/force_shading.h"
+#include "physics/model/mesh_topology.h"
 
 namespace medulla {
 
@@ -328,15 +329,6 @@ void followSurface(const Buckets& buckets, double alphaBefore, double alpha, dou
 
 // ---- The start -------------------------------------------------------------------------------------------
 
-// Solid angle of a triangle seen from p, over 4 pi (Van Oosterom and Strackee 1983). Summed over a closed surface: 1
-// inside, 0 outside.
-static double windingShare(const Triangle& triangle, const Vector3d& p) {
-  const Vector3d a = triangle.a - p, b = triangle.b - p, c = triangle.c - p;
-  const double la = a.norm(), lb = b.norm(), lc = c.norm();
-  return std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb) /
-         (2 * std::numbers::pi);
-}
-
 const ProxyContact& Proxy::mainContact() const {
   assert(contactCount > 0);
   return *std::max_element(contacts.begin(), contacts.begin() + contactCount,
@@ -353,7 +345,7 @@ Proxy placeProxy(const Buckets& buckets, const Vector3d& device, double toolRadi
     TrianglePoint closest;
     for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
       const Triangle triangle = surface.triangle(int(t), 1);
-      winding += windingShare(triangle, proxy.centre);
+      winding += solidAngle(triangle.a, triangle.b, triangle.c, proxy.centre) / (4 * std::numbers::pi);
       const TrianglePoint q = closestPoint(triangle, proxy.centre);
       if ((q.point - proxy.centre).norm() >= nearest) continue;
       nearest = (q.point - proxy.centre).norm();

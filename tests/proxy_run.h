@@ -8,6 +8,7 @@
 #include "haptics/buckets.h"
 #include "haptics/servo.h"
 #include "haptics/swept_triangle.h"
+#include "physics/model/mesh_topology.h"
 #include "tests/tool_run.h"
 #include "tests/touch_shapes.h"
 
@@ -74,10 +75,7 @@ inline bool isInside(const BlendedSurface& surface, double alpha, const Eigen::V
   double winding = 0;
   for (int t = 0; t < int(surface.triangles.size()); ++t) {
     const Triangle triangle = surface.triangle(t, alpha);
-    const Eigen::Vector3d a = triangle.a - p, b = triangle.b - p, c = triangle.c - p;
-    winding += std::atan2(a.dot(b.cross(c)), a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() +
-                                                 b.dot(c) * a.norm() + c.dot(a) * b.norm()) /
-               (2 * M_PI);
+    winding += solidAngle(triangle.a, triangle.b, triangle.c, p) / (4 * M_PI);
   }
   return winding > 0.5;
 }

@@ -150,11 +150,12 @@ std::vector<int> componentOfTriangles(const TriangleMesh& mesh, int& components)
   return component;
 }
 
-double solidAngle(const TriangleMesh& mesh, const std::array<int, 3>& triangle, const Eigen::Vector3d& point) {
-  const Eigen::Vector3d a = mesh.vertices[triangle[0]] - point, b = mesh.vertices[triangle[1]] - point,
-                        c = mesh.vertices[triangle[2]] - point;
-  const double la = a.norm(), lb = b.norm(), lc = c.norm();
-  return 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+double solidAngle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                  const Eigen::Vector3d& point) {
+  const Eigen::Vector3d toA = a - point, toB = b - point, toC = c - point;
+  const double la = toA.norm(), lb = toB.norm(), lc = toC.norm();
+  return 2 *
+         std::atan2(toA.dot(toB.cross(toC)), la * lb * lc + toA.dot(toB) * lc + toB.dot(toC) * la + toC.dot(toA) * lb);
 }
 
 }  // namespace medulla

@@ -67,8 +67,12 @@ double boundsDiagonal(const TriangleMesh& mesh);
 // Component of every triangle, connected through shared edges, numbered by its first triangle; count in `components`.
 std::vector<int> componentOfTriangles(const TriangleMesh& mesh, int& components);
 
-// Solid angle under which a point sees one triangle (Van Oosterom and Strackee 1983), signed by the winding: positive
-// from behind. In steradian.
-double solidAngle(const TriangleMesh& mesh, const std::array<int, 3>& triangle, const Eigen::Vector3d& point);
+// Solid angle under which a point sees the triangle a, b, c (Van Oosterom and Strackee 1983), signed by the winding:
+// positive from behind. In steradian; over a closed surface wound outward they sum to 4 pi inside and to 0 outside.
+double solidAngle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                  const Eigen::Vector3d& point);
+inline double solidAngle(const TriangleMesh& mesh, const std::array<int, 3>& triangle, const Eigen::Vector3d& point) {
+  return solidAngle(mesh.vertices[triangle[0]], mesh.vertices[triangle[1]], mesh.vertices[triangle[2]], point);
+}
 
 }  // namespace medulla
