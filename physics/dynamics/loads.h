@@ -58,4 +58,12 @@ struct Loads {
   std::vector<HeldNode> heldNodes;
 };
 
+// Calls visit(spring or held node, node) for each node that a tool acts on, springs first.
+template <class Visit>
+void visitLoadedNodes(const Loads& loads, const Visit& visit) {
+  for (const ToolSpring& spring : loads.toolSprings)
+    for (const int node : spring.nodes) visit(spring, node);
+  for (const HeldNode& held : loads.heldNodes) visit(held, held.node);
+}
+
 }  // namespace medulla

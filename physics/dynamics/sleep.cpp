@@ -48,8 +48,7 @@ void countStillFrames(WorldData& d, const std::vector<char>& busy) {
 std::vector<char> loadedBodies(const WorldData& d, const Loads& loads) {
   std::vector<char> loaded(d.bodies.size(), 0);
   for (std::size_t b = 0; b < loaded.size(); ++b) loaded[b] = !d.bodies[b].deadLoads.empty();
-  for (const ToolSpring& t : loads.toolSprings) loaded[t.body] = 1;
-  for (const HeldNode& held : loads.heldNodes) loaded[held.body] = 1;
+  visitLoadedNodes(loads, [&loaded](const auto& load, int) { loaded[load.body] = 1; });
   return loaded;
 }
 
@@ -251,8 +250,7 @@ static void wake(WorldData& d, int body) {
 }
 
 void wakeLoaded(WorldData& d, const Loads& loads) {
-  for (const ToolSpring& t : loads.toolSprings) wake(d, t.body);
-  for (const HeldNode& held : loads.heldNodes) wake(d, held.body);
+  visitLoadedNodes(loads, [&d](const auto& load, int) { wake(d, load.body); });
 }
 
 void wakeTouched(WorldData& d) {

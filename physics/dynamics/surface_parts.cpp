@@ -191,9 +191,7 @@ void wantLoadedParts(WorldData& d, const Loads& loads) {
     part.isWanted = true;
     for (const int beside : part.neighbours) d.surface.parts[beside].isWanted = true;
   };
-  for (const ToolSpring& t : loads.toolSprings)
-    for (const int node : t.nodes) add(t.body, node);
-  for (const HeldNode& held : loads.heldNodes) add(held.body, held.node);
+  visitLoadedNodes(loads, [&add](const auto& load, int node) { add(load.body, node); });
   for (std::size_t b = 0; b < d.bodies.size(); ++b)
     for (const DeadLoad& load : d.bodies[b].deadLoads) add(static_cast<int>(b), load.node);
 }

@@ -40,14 +40,11 @@ void checkSettings(const WorldSettings& s) {
 }
 
 void checkLoads(const WorldData& d, const Loads& loads) {
-  const auto checkNode = [&](int body, int node) {
-    assert(body >= 0 && body < static_cast<int>(d.ranges.size()));
-    assert(node >= 0 && node < static_cast<int>(d.ranges[body].node.size()));
-    (void)body, (void)node, (void)d;
-  };
-  for (const ToolSpring& t : loads.toolSprings)
-    for (int node : t.nodes) checkNode(t.body, node);
-  for (const HeldNode& held : loads.heldNodes) checkNode(held.body, held.node);
+  visitLoadedNodes(loads, [&](const auto& load, int node) {
+    assert(load.body >= 0 && load.body < static_cast<int>(d.ranges.size()));
+    assert(node >= 0 && node < static_cast<int>(d.ranges[load.body].node.size()));
+    (void)load, (void)node, (void)d;
+  });
 }
 
 // What a body does by itself.
@@ -219,8 +216,7 @@ std::vector<Eigen::Vector3d> World::advance(const Loads& loads) {
   WorldData& d = *data_;
   checkLoads(d, loads);
   int tools = 0;
-  for (const ToolSpring& t : loads.toolSprings) tools = std::max(tools, t.tool + 1);
-  for (const HeldNode& held : loads.heldNodes) tools = std::max(tools, held.tool + 1);
+  visitLoadedNodes(loads, [&tools](const auto& load, int) { tools = std::max(tools, load.tool + 1); });
   std::vector<Eigen::Vector3d> toolImpulse(tools, Eigen::Vector3d::Zero());
   d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Eigen::Vector3d::Zero());
   letGoOfWholeTurns(d);
