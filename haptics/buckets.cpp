@@ -192,7 +192,7 @@ static Quad boundingSphere(const Bucket& bucket) {
   Lanes lower = splat(std::numeric_limits<double>::infinity()), upper = splat(0) - lower;
   for (const int n : bucket.nodes) {
     const Lanes from = loadNode(surface.from[n]), to = loadNode(surface.to[n]);
-    lower = _mm256_min_pd(lower, _mm256_min_pd(from, to));
+    lower = smaller(lower, smaller(from, to));
     upper = larger(upper, larger(from, to));
   }
   const Lanes centre = splat(0.5) * (lower + upper);

@@ -121,7 +121,7 @@ MEDULLA_INLINE Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
 
 inline AnchorLoads noLoads() {
   const Lanes zero = splat(0);
-  const Lanes3 none{zero, zero, zero};
+  const Lanes3 none = zeroVectors();
   return {none, none, none, none, zero, zero, zero, zero, zero, zero};
 }
 

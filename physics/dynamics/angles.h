@@ -14,9 +14,9 @@ inline Lanes arcSineRemainder(Lanes x) {
 }
 
 struct AngleOverSine {
-  Lanes value;                         // f = theta / sin(theta)
-  Lanes slope;                         // h = -df/dcos(theta) = (1 - f cos(theta)) / sin(theta)^2
-  Lanes folded = _mm256_setzero_pd();  // all bits where theta is beyond kFoldAngle
+  Lanes value;              // f = theta / sin(theta)
+  Lanes slope;              // h = -df/dcos(theta) = (1 - f cos(theta)) / sin(theta)^2
+  Lanes folded = splat(0);  // all bits where theta is beyond kFoldAngle
 };
 
 // Beyond this angle, 116 degrees, where f sin(theta) has slope 1 and f slope 0 on either side, tan(theta) = -theta, f

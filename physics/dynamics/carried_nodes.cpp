@@ -48,24 +48,21 @@ void weighOnLink(WorldData& d, const HostRange& range, const LinkHost& host) {
 }
 
 void weighOnSphere(WorldData& d, const HostRange& range) {
-  const Lanes zero = splat(0);
   const Lanes3 felt = splat(d.surface.felt[range.body]);
-  Lanes3 sum{zero, zero, zero}, moment = sum;
+  Lanes3 sum = zeroVectors(), moment = sum;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const Lanes3 weight = weightOf(d, felt, g);
     sum = sum + weight;
     moment = moment + cross(d.nodes.offset[g], weight);
   }
-  Quad &force = d.surface.weight[2 * range.host], &torque = d.surface.weight[2 * range.host + 1];
-  store(force, load(force) + sumOfLanes(sum, zero));
-  store(torque, load(torque) + sumOfLanes(moment, zero));
+  addTo(d.surface.weight[2 * range.host], sumOfLanes(sum));
+  addTo(d.surface.weight[2 * range.host + 1], sumOfLanes(moment));
 }
 
 void weighOnFrames(WorldData& d, const HostRange& range) {
-  const Lanes zero = splat(0);
   const Lanes3 felt = splat(d.surface.felt[range.body]);
   FrameReturn back(d, range);
-  for (int g = range.firstGroup; g < range.endGroup; ++g) back.add(g, weightOf(d, felt, g), {zero, zero, zero});
+  for (int g = range.firstGroup; g < range.endGroup; ++g) back.add(g, weightOf(d, felt, g), zeroVectors());
   back.finish();
 }
 

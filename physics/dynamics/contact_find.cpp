@@ -36,7 +36,7 @@ void addContact(WorldData& d, std::uint32_t i, std::uint32_t j, double s, double
   ContactData& c = d.contact;
   const Collider &a = c.colliders[i], &b = c.colliders[j];
   const BallAt p = ballAt(c, a, s), q = ballAt(c, b, t);
-  const Lanes way = _mm256_blend_pd(q.centre - p.centre, splat(0), 8);
+  const Lanes way = withoutFourth(q.centre - p.centre);
   const double distance = std::sqrt(dotProduct(way, way));
   Contact& contact = c.contacts.emplace_back();
   contact.key = std::uint64_t{i} << 32 | j;
@@ -61,7 +61,7 @@ void findPairContacts(WorldData& d, double moved) {
     const Lanes perhaps = isLess(g.gapAtList, farAtList);
     if (!any(perhaps)) continue;
     const ConeContact closest = closestOfPairs(c, g);
-    const int hits = _mm256_movemask_pd(_mm256_and_pd(perhaps, isLess(closest.gap, near)));
+    const int hits = _mm256_movemask_pd(masked(perhaps, isLess(closest.gap, near)));
     for (int k = 0; k < 4; ++k)
       if (hits >> k & 1) addContact(d, g.collider0[k], g.collider1[k], closest.s[k], closest.t[k]);
   }

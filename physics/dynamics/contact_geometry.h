@@ -42,7 +42,7 @@ MEDULLA_INLINE ConeContact closestOnCones(const BallLanes& p0, const BallLanes& 
   constexpr int kIterations = 8;
   constexpr double kConverged = 1e-7;  // of D; the gap's error is second order in it
   const Lanes zero = splat(0), one = splat(1), half = splat(0.5), tiny = splat(1e-30);
-  const auto clamped = [&](Lanes x) { return _mm256_min_pd(larger(x, zero), one); };
+  const auto clamped = [&](Lanes x) { return smaller(larger(x, zero), one); };
   const Lanes3 d = p1.centre - p0.centre, e = q1.centre - q0.centre, w0 = p0.centre - q0.centre;
   const Lanes slopeP = p1.radius - p0.radius, slopeQ = q1.radius - q0.radius;
   const Lanes dd = dot(d, d), ee = dot(e, e), de = dot(d, e);
@@ -64,7 +64,7 @@ MEDULLA_INLINE ConeContact closestOnCones(const BallLanes& p0, const BallLanes& 
     out.t = select(open, t, out.t);
     const Lanes change = magnitude(next - distance);
     distance = select(open, next, distance);
-    open = _mm256_and_pd(open, isLess(splat(kConverged) * distance, change));
+    open = masked(open, isLess(splat(kConverged) * distance, change));
   }
   out.gap = distance - (fma(out.s, slopeP, p0.radius) + fma(out.t, slopeQ, q0.radius));
   return out;

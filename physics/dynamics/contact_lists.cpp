@@ -40,7 +40,7 @@ double farthestMove(const ContactData& c, const std::vector<Quad>& from) {
 constexpr double kMostMoves = 8, kFewestMoves = 1, kGrowth = 3;
 
 static double moveOf(const ContactData& c, const std::vector<Quad>& from, std::size_t i) {
-  const Lanes way = _mm256_blend_pd(load(c.ball[i]) - load(from[i]), splat(0), 8);
+  const Lanes way = withoutFourth(load(c.ball[i]) - load(from[i]));
   return std::sqrt(dotProduct(way, way));
 }
 

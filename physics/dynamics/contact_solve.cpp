@@ -83,7 +83,7 @@ MEDULLA_INLINE void apply(WorldData& d, const Contact& c, Lanes impulse) {
     ContactSphere& s = d.contact.spheres[c.sphere[e]];
     const Lanes share = splat(c.weight[e]) * impulse, twist = crossProduct(leverOf(s.arm, c, e), share);
     store(s.velocity, fma(splat(s.velocity.v[3]), share, load(s.velocity)));
-    store(s.angularVelocity, load(s.angularVelocity) + timesInverseInertia(s, twist));
+    addTo(s.angularVelocity, timesInverseInertia(s, twist));
   }
 }
 

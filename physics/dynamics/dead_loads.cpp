@@ -33,7 +33,7 @@ void gatherSkinLoads(WorldData& d) {
     if (isSkin(d, load.node)) place[load.node / 4] = 0;
   for (auto& [group, number] : place) {
     number = static_cast<int>(s.groups.size());
-    s.groups.push_back({group, splat(Quad{})});
+    s.groups.push_back({group, zeroVectors()});
     LoadedHost host = hostOf(d, group);
     const bool isNew = s.hosts.empty() || s.hosts.back().kind != host.kind || s.hosts.back().host != host.host;
     if (isNew) {
@@ -44,10 +44,6 @@ void gatherSkinLoads(WorldData& d) {
   }
   for (const NodeForce& load : d.deadLoads)
     s.groupOfLoad.push_back(isSkin(d, load.node) ? place.at(load.node / 4) : -1);
-}
-
-void addTo(Quad& q, Lanes a) {
-  store(q, load(q) + a);
 }
 
 // N, N m, as quads.
@@ -69,8 +65,7 @@ void pushFrames(WorldData& d, const LoadedHost& loaded) {
   SkinTermState* states = s.termStates.data() + host.firstTerms;
   seeFrames(s, host, home, states);
   std::fill_n(s.termLoads.begin(), 4 * (host.endTerms - host.firstTerms), SkinTermLoad{});
-  const Lanes zero = splat(0);
-  Lanes3 sum{zero, zero, zero}, moment = sum;
+  Lanes3 sum = zeroVectors(), moment = sum;
   for (int k = loaded.first; k < loaded.end; ++k) {
     const SkinGroup& g = s.skin[s.ofNodeGroup[d.skinLoads.groups[k].group]];
     const SkinPlace place = placeSkin<false>(s, g, states);
@@ -90,7 +85,6 @@ void pushFrames(WorldData& d, const LoadedHost& loaded) {
 }
 
 void pushLink(WorldData& d, const LoadedHost& loaded) {
-  const Lanes zero = splat(0);
   const OneLink link = oneLink(d, loaded.host);
   AnchorLoads sum = noLoads();
   for (int k = loaded.first; k < loaded.end; ++k) {
@@ -99,20 +93,19 @@ void pushLink(WorldData& d, const LoadedHost& loaded) {
     addLoads(link.host, d.nodes.groups[group], offset, force, cross(offset, force), sum);
   }
   const EndLoads e = sphereLoads(link.group, link.frame, sum);
-  push(d, link.sphere0, sumOfLanes(e.force0, zero), sumOfLanes(e.torque0, zero));
-  push(d, link.sphere1, sumOfLanes(e.force1, zero), sumOfLanes(e.torque1, zero));
+  push(d, link.sphere0, sumOfLanes(e.force0), sumOfLanes(e.torque0));
+  push(d, link.sphere1, sumOfLanes(e.force1), sumOfLanes(e.torque1));
 }
 
 void pushSphere(WorldData& d, const LoadedHost& loaded) {
-  const Lanes zero = splat(0);
   const SphereHost host = sphereHost(d, loaded.host);
-  Lanes3 sum{zero, zero, zero}, moment = sum;
+  Lanes3 sum = zeroVectors(), moment = sum;
   for (int k = loaded.first; k < loaded.end; ++k) {
     const auto& [group, force] = d.skinLoads.groups[k];
     sum = sum + force;
     moment = moment + cross(anchorOnSphere(host, d.nodes.groups[group]).offset, force);
   }
-  push(d, loaded.host, sumOfLanes(sum, zero), sumOfLanes(moment, zero));
+  push(d, loaded.host, sumOfLanes(sum), sumOfLanes(moment));
 }
 
 void pushSkins(WorldData& d) {
@@ -166,8 +159,7 @@ double shareAt(const WorldData& d, const NodeForce& load, double time) {
 
 // A constant force bounds no step: explicit, and by the same way to the hosts of a skin as the tools' forces.
 void applyDeadLoads(WorldData& d, double time) {
-  const Lanes zero = splat(0);
-  for (LoadedGroup& g : d.skinLoads.groups) put({zero, zero, zero}, g.force);
+  for (LoadedGroup& g : d.skinLoads.groups) put(zeroVectors(), g.force);
   bool skinIsLoaded = false;
   for (std::size_t k = 0; k < d.deadLoads.size(); ++k) {
     const NodeForce& load = d.deadLoads[k];

@@ -40,7 +40,7 @@ MEDULLA_INLINE void addFour(const Lanes3& v, FrameLoad* loads, const std::uint32
   Lanes a = v.x, b = v.y, c = v.z, d = splat(0);
   transpose(a, b, c, d);
   const Lanes rows[4] = {a, b, c, d};
-  for (int l = 0; l < 4; ++l) store(loads[i[l]].*q, load(loads[i[l]].*q) + rows[l]);
+  for (int l = 0; l < 4; ++l) addTo(loads[i[l]].*q, rows[l]);
 }
 
 }  // namespace medulla

@@ -32,7 +32,7 @@ Column columnOf(const IdentifiedLinkGroup& link, const LinkTurn& m, const Lanes3
 void setColumns(const IdentifiedLinkGroup& link, const LinkTurn& m, const Lanes3& arm0, const Lanes3& arm1,
                 Column (&g)[9]) {
   const Lanes half = splat(0.5), minus = splat(-1), zero = splat(0), one = splat(1);
-  const Lanes3 none{zero, zero, zero};
+  const Lanes3 none = zeroVectors();
   for (int k = 0; k < 3; ++k) {
     const Lanes3 e{k == 0 ? one : zero, k == 1 ? one : zero, k == 2 ? one : zero};
     g[k] = columnOf(link, m, e, none, none);
@@ -234,9 +234,8 @@ void carryOnFrames(WorldData& d, const HostRange& range, std::vector<Quad>& carr
 }
 
 void returnImpulsesToFrames(WorldData& d, const HostRange& range, const std::vector<Quad>& impulses) {
-  const Lanes zero = splat(0);
   FrameReturn back(d, range);
-  for (int g = range.firstGroup; g < range.endGroup; ++g) back.add(g, gatherFour(impulses, 4 * g), {zero, zero, zero});
+  for (int g = range.firstGroup; g < range.endGroup; ++g) back.add(g, gatherFour(impulses, 4 * g), zeroVectors());
   back.finish();
 }
 
@@ -256,7 +255,7 @@ void returnFrameImpulses(const WorldData& d, Motion& motion) {
     const Lanes force = load(s.loads[i].force), torque = load(s.loads[i].torque);
     if (c.sphere < 0) continue;
     Quad &linear = motion[2 * c.sphere], &angular = motion[2 * c.sphere + 1];
-    store(linear, load(linear) + force);
+    addTo(linear, force);
     store(angular, load(angular) + torque + crossProduct(load(c.worldArm), force));
   }
 }

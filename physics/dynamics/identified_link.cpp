@@ -16,7 +16,7 @@ void placeFrames(WorldData& d, const IdentifiedBody& body) {
     FrameState& f = d.identified.frames[i];
     const Quad &q = s.orientation[c.sphere], &omega = s.angularVelocity[c.sphere];
     // arm + 2 q x (q x arm + w arm)
-    const Lanes axis = _mm256_blend_pd(load(q), splat(0), 8), rest = load(c.restArm);
+    const Lanes axis = withoutFourth(load(q)), rest = load(c.restArm);
     const Lanes arm = fma(splat(2), crossProduct(axis, fma(splat(q.v[3]), rest, crossProduct(axis, rest))), rest);
     store(c.worldArm, arm);
     store(f.position, load(s.position[c.sphere]) + arm);
@@ -126,7 +126,7 @@ void returnFrameForces(WorldData& d, const Batch& batch) {
       if (c.sphere < 0) continue;
       const Lanes force = load(s.loads[i].force);
       Quad &onSphere = d.spheres.force[c.sphere], &turning = d.spheres.torque[c.sphere];
-      store(onSphere, load(onSphere) + force);
+      addTo(onSphere, force);
       store(turning, load(turning) + load(s.loads[i].torque) + crossProduct(load(c.worldArm), force));
     }
   }

@@ -95,8 +95,7 @@ FrameReturn::FrameReturn(WorldData& d, const HostRange& range)
   const Identified& s = d.identified;
   const FrameState& home = s.frames[host_->home];
   rotation_ = rotationOf(splat(home.orientation), splat(home.orientation.v[3]));
-  const Lanes zero = splat(0);
-  force_ = moment_ = {zero, zero, zero};
+  force_ = moment_ = zeroVectors();
   std::fill_n(d.identified.termLoads.begin(), 4 * (host_->endTerms - host_->firstTerms), SkinTermLoad{});
 }
 
@@ -117,8 +116,8 @@ void FrameReturn::finish() {
                                       addFour(torque, s.loads.data(), frames, &FrameLoad::torque);
                                     });
   FrameLoad& home = s.loads[host_->home];
-  store(home.force, load(home.force) + own.force);
-  store(home.torque, load(home.torque) + own.moment);
+  addTo(home.force, own.force);
+  addTo(home.torque, own.moment);
 }
 
 double normalEnergy(const WorldData& d, int node) {

@@ -71,7 +71,7 @@ void visitAngularMomenta(const WorldData& d, const ImplicitData& s, const Visit&
 }
 
 // out = a + f b, three numbers each
-void addTo(const Quad& a, double f, const Quad& b, Quad& out) {
+void setSum(const Quad& a, double f, const Quad& b, Quad& out) {
   store(out, fma(splat(f), load(b), load(a)));
 }
 
@@ -95,7 +95,7 @@ void place(WorldData& d, const ImplicitData& s, double time) {
   Spheres& to = d.spheres;
   for (int i = 0; i < to.count; ++i) {
     const Quad& v = s.motion[2 * i];
-    addTo(s.start.position[i], time, v, to.position[i]);
+    setSum(s.start.position[i], time, v, to.position[i]);
     to.velocity[i] = v;
     to.angularVelocity[i] = s.motion[2 * i + 1];
   }

@@ -116,10 +116,9 @@ void loadFactor(const WorldData& d, ImplicitData& s, const std::vector<Block6>& 
 // The velocities that `impulses` give to nodes whose neighbours stay, and whose hosts stay, on top of `before`, which
 // may be null: 0.
 void moveNodes(const WorldData& d, const ImplicitData& s, const Quad* impulses, const Quad* before, Quad* out) {
-  const Lanes zero = splat(0);
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
     const Lanes3 impulse = gatherFour(impulses, 4 * g);
-    Lanes3 v{zero, zero, zero};
+    Lanes3 v = zeroVectors();
     if (before != nullptr) v = gatherFour(before, 4 * g);
     v = fma(loadFour(s.nodeMobility, 4 * g), impulse, v);
     if (!s.normalMobility.empty()) {

@@ -168,8 +168,7 @@ void addNodes(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   Nodes& n = d.nodes;
   n.count = static_cast<int>(order.node.size());
   n.displaced.resize(n.count);
-  for (std::vector<Lanes3>* a : {&n.position, &n.velocity})
-    a->resize(n.count / 4, Lanes3{splat(0), splat(0), splat(0)});
+  for (std::vector<Lanes3>* a : {&n.position, &n.velocity}) a->resize(n.count / 4, zeroVectors());
   for (StageArray<Lanes3>* a : {&n.force, &n.offset, &n.area}) a->resize(n.count / 4);
   n.mass.resize(n.count, 0);
   n.inverseMass.resize(n.count, 0);

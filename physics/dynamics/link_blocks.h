@@ -17,9 +17,7 @@ struct Matrix3Lanes {
 };
 
 inline Matrix3Lanes zeroMatrix() {
-  const Lanes zero = splat(0);
-  const Lanes3 none{zero, zero, zero};
-  return {{none, none, none}};
+  return {{zeroVectors(), zeroVectors(), zeroVectors()}};
 }
 // += a b^T
 MEDULLA_INLINE void addOuter(const Lanes3& a, const Lanes3& b, Matrix3Lanes& to) {

@@ -173,13 +173,13 @@ MEDULLA_INLINE Lanes bendingTorque(const LinkGroup& l, const Flexion& q0, const 
 // energy k (g^2 - (a^2 + b^2) / 2) with g = kFoldAngle, in value and slope the same there, k g^2 at 180. The difference
 // of the stiffnesses and the coupling are left as they are.
 MEDULLA_INLINE void fold(const LinkEnd& e, const Flexion& still, Lanes stiffnesses, Flexion& moments) {
-  const Lanes both = _mm256_and_pd(e.angle.folded, stiffnesses);
+  const Lanes both = masked(e.angle.folded, stiffnesses);
   moments.a = fnma(both, still.a, moments.a);
   moments.b = fnma(both, still.b, moments.b);
 }
 double foldEnergy(const LinkEnd& e, const Flexion& still, Lanes stiffnesses, int lane) {
   const double squared = still.a[lane] * still.a[lane] + still.b[lane] * still.b[lane];
-  const Lanes both = _mm256_and_pd(e.angle.folded, stiffnesses);
+  const Lanes both = masked(e.angle.folded, stiffnesses);
   return 0.5 * both[lane] * (kFoldAngle * kFoldAngle - squared);
 }
 
@@ -311,7 +311,7 @@ void evaluateBareGroup(const LinkGroup& link, const Spheres& spheres, Quad& unwo
   LinkState e;
   evaluate(link, spheres, unwoundTwist, e);
   const Lanes zero = splat(0), spin0 = zero - e.twistMoment, spin1 = e.twistMoment;
-  const Lanes3 none{zero, zero, zero};
+  const Lanes3 none = zeroVectors();
   EndLoads twisting;
   twisting.force1 = e.m.inverseLength * (none - spin0 * e.m.end0.lever - spin1 * e.m.end1.lever);
   twisting.force0 = none - twisting.force1;

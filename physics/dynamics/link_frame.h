@@ -37,7 +37,7 @@ struct EndLoads {
 // What loads on a link's anchors do to its ends and spheres: the transpose of the rates above and of the anchors'
 // velocities. Arms from the spheres' frames to the ends are the caller's.
 MEDULLA_INLINE EndLoads endLoads(const LinkGroup& g, const LinkFrame& f, const AnchorLoads& loads) {
-  Lanes3 moment = loads.moment, lean0{splat(0), splat(0), splat(0)}, lean1 = lean0;
+  Lanes3 moment = loads.moment, lean0 = zeroVectors(), lean1 = lean0;
   Lanes stretching = splat(0);
   if (g.hasBeams) {
     const Lanes length = dot(f.n, f.line);

@@ -39,11 +39,17 @@ inline Lanes load(const Quad& q) {
 inline void store(Quad& q, Lanes a) {
   _mm256_store_pd(q.v, a);
 }
+inline void addTo(Quad& q, Lanes a) {
+  store(q, load(q) + a);
+}
 inline Lanes splat(double a) {
   return _mm256_set1_pd(a);
 }
 inline Lanes3 splat(const Quad& q) {
   return {splat(q.v[0]), splat(q.v[1]), splat(q.v[2])};
+}
+inline Lanes3 zeroVectors() {
+  return {splat(0), splat(0), splat(0)};
 }
 template <int lane>
 inline Lanes splatLane(Lanes a) {
@@ -73,6 +79,9 @@ inline Lanes squareRoot(Lanes a) {
 inline Lanes larger(Lanes a, Lanes b) {
   return _mm256_max_pd(a, b);
 }
+inline Lanes smaller(Lanes a, Lanes b) {
+  return _mm256_min_pd(a, b);
+}
 inline Lanes nearest(Lanes a) {
   return _mm256_round_pd(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
 }
@@ -87,6 +96,13 @@ inline Lanes isLess(Lanes a, Lanes b) {
 }
 inline Lanes select(Lanes condition, Lanes yes, Lanes no) {
   return _mm256_blendv_pd(no, yes, condition);
+}
+// 0 where the condition does not hold. Of another condition: where both hold.
+inline Lanes masked(Lanes condition, Lanes a) {
+  return _mm256_and_pd(condition, a);
+}
+inline Lanes3 masked(Lanes condition, const Lanes3& a) {
+  return {masked(condition, a.x), masked(condition, a.y), masked(condition, a.z)};
 }
 inline bool any(Lanes condition) {
   return _mm256_movemask_pd(condition) != 0;
@@ -152,6 +168,9 @@ inline Lanes sumsOfLanes(Lanes a, Lanes b, Lanes c, Lanes d) {
 inline Lanes sumOfLanes(const Lanes3& v, Lanes w) {
   return sumsOfLanes(v.x, v.y, v.z, w);
 }
+inline Lanes sumOfLanes(const Lanes3& v) {
+  return sumOfLanes(v, splat(0));
+}
 
 // Columns of the rotation of a unit quaternion.
 struct Rotation {
@@ -173,6 +192,9 @@ inline Lanes3 rotateBack(const Rotation& r, const Lanes3& a) {
 }
 
 // Vectors as (x, y, z, 0), one per register.
+inline Lanes withoutFourth(Lanes a) {
+  return _mm256_blend_pd(a, splat(0), 8);
+}
 inline Lanes turnedLanes(Lanes a) {  // y, z, x, w
   return _mm256_permute4x64_pd(a, _MM_SHUFFLE(3, 0, 2, 1));
 }

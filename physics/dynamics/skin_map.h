@@ -119,8 +119,7 @@ MEDULLA_INLINE void addScaled(const float (&factor)[4], const double* numbers, c
 // then what a way does along its line and the nodes' own turns.
 template <bool withRates>
 MEDULLA_INLINE SkinPlace placeSkin(const Identified& s, const SkinGroup& g, const SkinTermState* states) {
-  const Lanes zero = splat(0);
-  const Lanes3 none{zero, zero, zero};
+  const Lanes3 none = zeroVectors();
   const double* numbers = reinterpret_cast<const double*>(states);
   ColumnSums ways{g.restOffset, none}, spares{none, none}, turns{none, none}, own{none, none};
   for (int k = g.firstShare; k < g.endShare; ++k) {
@@ -199,8 +198,7 @@ MEDULLA_INLINE HomeLoad giveToFrames(const Identified& s, const SkinHost& host, 
     moment = moment - torque - cross(states->place, onWay);
     give(s.terms[t].frame, rotate(rotation, onWay), rotate(rotation, torque));
   }
-  const Lanes zero = splat(0);
-  return {sumOfLanes(rotate(rotation, force), zero), sumOfLanes(rotate(rotation, moment), zero)};
+  return {sumOfLanes(rotate(rotation, force)), sumOfLanes(rotate(rotation, moment))};
 }
 
 }  // namespace medulla

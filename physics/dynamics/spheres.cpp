@@ -57,8 +57,7 @@ void stepNodes(Nodes& n, const std::vector<int>& groups, const Quad& gravity, do
   const Lanes3 fall = splat(h) * splat(gravity);
   for (const int g : groups) {
     const Lanes perMass = loadFour(n.inverseMass, 4 * g), moves = isLess(zero, perMass);
-    const Lanes3 falling{_mm256_and_pd(moves, fall.x), _mm256_and_pd(moves, fall.y), _mm256_and_pd(moves, fall.z)};
-    put(fma(splat(h) * perMass, n.force[g], n.velocity[g] + falling), n.velocity[g]);
+    put(fma(splat(h) * perMass, n.force[g], n.velocity[g] + masked(moves, fall)), n.velocity[g]);
   }
 }
 

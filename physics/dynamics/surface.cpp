@@ -104,8 +104,7 @@ void returnToLink(WorldData& d, const HostRange& range) {
 }
 
 void returnToSphere(WorldData& d, const HostRange& range) {
-  const Lanes zero = splat(0);
-  Lanes3 sum{zero, zero, zero}, moment = sum;
+  Lanes3 sum = zeroVectors(), moment = sum;
   const Lanes pressure = splat(pressureOf(d, range));
   const EdgePull edgePull(d, range);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
@@ -114,8 +113,8 @@ void returnToSphere(WorldData& d, const HostRange& range) {
     moment = moment + on.turn;
   }
   Quad &force = d.spheres.force[range.host], &torque = d.spheres.torque[range.host];
-  store(force, load(force) - sumOfLanes(sum, zero));
-  store(torque, load(torque) - sumOfLanes(moment, zero));
+  store(force, load(force) - sumOfLanes(sum));
+  store(torque, load(torque) - sumOfLanes(moment));
 }
 
 }  // namespace

@@ -25,10 +25,6 @@ void setFrameRates(const LinkGroup& g, const Motion& motion, LinkFrame& f) {
   setBendRates(g, omega0, omega1, lengthRate, f);
 }
 
-void addTo(Quad& q, Lanes a) {
-  store(q, load(q) + a);
-}
-
 }  // namespace
 
 void returnLinkLoads(const WorldData& d, const std::vector<LinkLoads>& loads, Motion& motion) {
@@ -74,8 +70,6 @@ void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried)
 }
 
 void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& motion) {
-  const Lanes zero = splat(0);
-  const Lanes3 none{zero, zero, zero};
   for (const HostRange& range : d.nodes.onLinks) {
     const LinkHost h = linkHost(d, range.host);
     AnchorLoads sum = noLoads();
@@ -93,14 +87,14 @@ void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& mot
       returnImpulsesToFrames(d, range, impulses);
       continue;
     }
-    Lanes3 sum = none, moment = none;
+    Lanes3 sum = zeroVectors(), moment = sum;
     for (int g = range.firstGroup; g < range.endGroup; ++g) {
       const Lanes3 impulse = gatherFour(impulses, 4 * g);
       sum = sum + impulse;
       moment = moment + cross(d.nodes.offset[g], impulse);
     }
-    addTo(motion[2 * range.host], sumOfLanes(sum, zero));
-    addTo(motion[2 * range.host + 1], sumOfLanes(moment, zero));
+    addTo(motion[2 * range.host], sumOfLanes(sum));
+    addTo(motion[2 * range.host + 1], sumOfLanes(moment));
   }
   returnFrameImpulses(d, motion);
 }

@@ -35,7 +35,7 @@ void layOutGive(WorldData& d) {
   s.give.resize(d.nodes.dynamicEnd / 4);
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
     const Lanes moves = isLess(splat(0), loadFour(d.nodes.inverseMass, 4 * g));
-    const Lanes give = _mm256_and_pd(moves, splat(1) / select(moves, d.nodes.groups[g].stiffness, splat(1)));
+    const Lanes give = masked(moves, splat(1) / select(moves, d.nodes.groups[g].stiffness, splat(1)));
     s.give[g] = {give, give * loadFour(d.nodes.mass, 4 * g)};
   }
 }
@@ -207,7 +207,7 @@ double measureShifts(WorldData& d, std::size_t part) {
     const Lanes3 off = gatherFour(d.nodes.displaced, 4 * g) - hangingAt(d, gravity, splat(pressure), g);
     const Lanes isNode = isLess(splat(0), loadFour(d.nodes.mass, 4 * g));  // pads drift
     storeFour(off, d.surface.shift, 4 * g);
-    if (g >= d.surface.parts[part].firstChoice) squared = larger(squared, _mm256_and_pd(isNode, dot(off, off)));
+    if (g >= d.surface.parts[part].firstChoice) squared = larger(squared, masked(isNode, dot(off, off)));
   }
   return longest(squared);
 }
@@ -224,7 +224,7 @@ double balanceShifts(WorldData& d, std::size_t part) {
     const Lanes3 alone = gatherFour(d.nodes.displaced, 4 * g) - gatherFour(s.shift, 4 * g);
     const Lanes3 pull = pullOfEdges(d.springs, d.nodes.groups.data(), d.nodes.displaced.data(), alone, g);
     const Lanes moves = isLess(zero, loadFour(d.nodes.inverseMass, 4 * g));
-    const Lanes perForce = _mm256_and_pd(moves, splat(1) / (group.stiffness + group.edges));
+    const Lanes perForce = masked(moves, splat(1) / (group.stiffness + group.edges));
     const Lanes3 shift = yielding(d, g, perForce, perForce * pull);
     storeFour(shift, s.shift, 4 * g);
     squared = larger(squared, dot(shift, shift));

@@ -53,7 +53,7 @@ void addMomenta(WorldData& d, int body, const WholeMotion& now, const Vector3d& 
   const auto at = [&](const Vector3d& x) { return Vector3d(velocity + spin.cross(x - centre)); };
   const BodyRange& r = d.ranges[body];
   for (const int i : spheresOf(r)) {
-    store(d.spheres.velocity[i], load(d.spheres.velocity[i]) + load(quadOf(at(vectorOf(d.spheres.position[i])))));
+    addTo(d.spheres.velocity[i], load(quadOf(at(vectorOf(d.spheres.position[i])))));
     d.spheres.angularVelocity[i] = quadOf(vectorOf(d.spheres.angularVelocity[i]) + spin);
     d.spheres.angularMomentum[i] = quadOf(vectorOf(d.spheres.angularMomentum[i]) + inertiaOf(d, i) * spin);
   }
