@@ -113,24 +113,31 @@ SurfacePoint closestPoint(const SurfaceTree& tree, const Vector3d& p, double wit
   return best;
 }
 
-void trianglesWithin(const SurfaceTree& tree, const Vector3d& p, double within, std::vector<TriangleDistance>& out) {
-  const std::size_t first = out.size();
+// Calls visit(triangle, in leaf order) for those of the leaves that are reached through nodes which all meet `enters`.
+template <class Enters, class Visit>
+static void visitLeaves(const SurfaceTree& tree, const Enters& enters, const Visit& visit) {
   std::array<int, kStackSize> stack;
   int size = 0;
   stack[size++] = 0;
   while (size > 0) {
     const SurfaceTree::Node& node = tree.nodes[stack[--size]];
-    if (squaredDistance(node, p) >= within * within) continue;
+    if (!enters(node)) continue;
     if (node.left >= 0) {
       stack[size++] = node.left;
       stack[size++] = node.right;
       continue;
     }
-    for (int i = node.begin; i < node.end; ++i) {
-      const double distance = (p - closestOnTriangle(p, tree.corners[i])).norm();
-      if (distance < within) out.push_back({i, distance});
-    }
+    for (int i = node.begin; i < node.end; ++i) visit(i);
   }
+}
+
+void trianglesWithin(const SurfaceTree& tree, const Vector3d& p, double within, std::vector<TriangleDistance>& out) {
+  const std::size_t first = out.size();
+  const auto isNear = [&](const SurfaceTree::Node& node) { return squaredDistance(node, p) < within * within; };
+  visitLeaves(tree, isNear, [&](int i) {
+    const double distance = (p - closestOnTriangle(p, tree.corners[i])).norm();
+    if (distance < within) out.push_back({i, distance});
+  });
   std::sort(out.begin() + static_cast<std::ptrdiff_t>(first), out.end(),
             [](const TriangleDistance& a, const TriangleDistance& b) {
               return a.distance != b.distance ? a.distance < b.distance : a.triangle < b.triangle;
@@ -153,27 +160,16 @@ template <typename Visit>
 static void forEachHit(const SurfaceTree& tree, const Vector3d& origin, const Vector3d& direction, double reach,
                        const Visit& visit) {
   const Vector3d inverse = direction.cwiseInverse();
-  std::array<int, kStackSize> stack;
-  int size = 0;
-  stack[size++] = 0;
-  while (size > 0) {
-    const SurfaceTree::Node& node = tree.nodes[stack[--size]];
-    if (!meetsBox(node, origin, inverse, reach)) continue;
-    if (node.left >= 0) {
-      stack[size++] = node.left;
-      stack[size++] = node.right;
-      continue;
-    }
-    for (int i = node.begin; i < node.end; ++i) {
-      const std::array<Vector3d, 3>& c = tree.corners[i];
-      const Vector3d e1 = c[1] - c[0], e2 = c[2] - c[0], h = direction.cross(e2);
-      const double determinant = e1.dot(h);
-      if (determinant == 0) continue;
-      const Vector3d s = origin - c[0], q = s.cross(e1);
-      const double u = s.dot(h) / determinant, v = direction.dot(q) / determinant, t = e2.dot(q) / determinant;
-      if (u >= 0 && v >= 0 && u + v <= 1 && t > 0 && t < reach) visit(t, i);
-    }
-  }
+  const auto isMet = [&](const SurfaceTree::Node& node) { return meetsBox(node, origin, inverse, reach); };
+  visitLeaves(tree, isMet, [&](int i) {
+    const std::array<Vector3d, 3>& c = tree.corners[i];
+    const Vector3d e1 = c[1] - c[0], e2 = c[2] - c[0], h = direction.cross(e2);
+    const double determinant = e1.dot(h);
+    if (determinant == 0) return;
+    const Vector3d s = origin - c[0], q = s.cross(e1);
+    const double u = s.dot(h) / determinant, v = direction.dot(q) / determinant, t = e2.dot(q) / determinant;
+    if (u >= 0 && v >= 0 && u + v <= 1 && t > 0 && t < reach) visit(t, i);
+  });
 }
 
 bool isInside(const SurfaceTree& tree, const Vector3d& p) {
