@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "app/commands/commands.h"
+#include "app/enum_names.h"
 #include "app/files/number_text.h"
 #include "app/files/output_file.h"
 #include "app/files/text.h"
@@ -208,8 +209,7 @@ void readPictures(const RenderArguments& a, RenderOptions& options) {
 
 void readView(const RenderArguments& a, ViewOptions& view) {
   view.panels.clear();
-  for (const std::string& name : a.view)
-    view.panels.push_back(name == "model" ? ViewKind::model : name == "both" ? ViewKind::both : ViewKind::tissue);
+  for (const std::string& name : a.view) view.panels.push_back(valueNamed<ViewKind>(name));
   try {
     view.shown = readShown(a.show);
   } catch (const std::invalid_argument& error) {
@@ -233,8 +233,8 @@ RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) 
   if (options.outputs.empty()) options.outputs = {fileOf(scene, a.still.empty() ? "{scene}.mp4" : "{scene}.png")};
   readView(a, options.view);
   readPictures(a, options);
-  const std::string quality = !a.quality.empty() ? a.quality : options.still ? "best" : "standard";
-  options.quality = quality == "draft" ? Quality::draft : quality == "best" ? Quality::best : Quality::standard;
+  if (options.still) options.quality = Quality::best;
+  if (!a.quality.empty()) options.quality = valueNamed<Quality>(a.quality);
   options.context = a.context;
   options.resume = a.resume;
   options.timings = a.timings;
@@ -289,7 +289,7 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
   c->add_option("--view", a.view,
                 "tissue: skins; model: what they hide; both: seen through; several stand side by side: tissue,model")
       ->delimiter(',')
-      ->check(CLI::IsMember({"tissue", "model", "both"}))
+      ->check(CLI::IsMember(namesOf(ViewKind{})))
       ->type_name("KIND,...")
       ->expected(1, 3)
       ->allow_extra_args(false)
@@ -306,7 +306,7 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
        "--quality", a.quality,
        "draft: no shadows, jagged edges; standard; best: four times the pixels, averaged [standard; of a still "
        "best]")
-      ->check(CLI::IsMember({"draft", "standard", "best"}));
+      ->check(CLI::IsMember(namesOf(Quality{})));
   c->add_option("--fps", a.fps, "pictures per second, 1 to 240 (default: the scene's)")
       ->check(numberFrom(1, 240))
       ->type_name("HZ");

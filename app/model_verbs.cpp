@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <memory>
 
 #include "app/commands/commands.h"
+#include "app/enum_names.h"
 #include "app/files/mesh_file.h"
 #include "app/verbs.h"
 
@@ -14,13 +14,13 @@ namespace {
 
 struct BuildArguments {
   BuildOptions options;
-  std::string method = "cover", linkForm = "full";
+  std::string method = nameOf(options.settings.method), linkForm = nameOf(options.identification.links);
   std::vector<const CLI::Option*> ofCover;  // which the skeleton follows none of
 };
 
 BuildOptions buildOptions(const BuildArguments& a) {
   BuildOptions options = a.options;
-  options.settings.method = a.method == "cover" ? BuildMethod::cover : BuildMethod::skeleton;
+  options.settings.method = valueNamed<BuildMethod>(a.method);
   const BuildSettings& s = options.settings;
   for (const CLI::Option* option : a.ofCover)
     if (option->count() > 0 && s.method != BuildMethod::cover)
@@ -29,8 +29,7 @@ BuildOptions buildOptions(const BuildArguments& a) {
   if (!options.fine.empty() && options.fine.size() != options.meshes.size())
     usageError("--fine", options.fine.back(),
                fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));
-  const auto form = std::find(kLinkForms.begin(), kLinkForms.end(), a.linkForm);
-  options.identification.links = static_cast<LinkForm>(form - kLinkForms.begin());
+  options.identification.links = valueNamed<LinkForm>(a.linkForm);
   if (options.identify && options.meshes.size() > 1)
     usageError("--identify", "", fmt::format("a single mesh, not {}", options.meshes.size()));
   if (options.identify && s.method == BuildMethod::cover && s.gap == 0 && s.spheres > kIdentifiedSpheresMax)
@@ -84,7 +83,7 @@ void addIdentification(CLI::App& c, BuildArguments& a) {
   c.add_option("--link-form", a.linkForm,
                "six scalars per link; any stiffness between its two frames; and one that couples the links of a cell: "
                "nearer, with shorter substeps")
-      ->check(CLI::IsMember(std::vector<std::string>(kLinkForms.begin(), kLinkForms.end())))
+      ->check(CLI::IsMember(namesOf(LinkForm{})))
       ->needs(identify)
       ->capture_default_str();
 }
@@ -102,7 +101,7 @@ Verb addBuild(CLI::App& app) {
       ->required();
   addCoverOptions(*c, a);
   c->add_option("--method", a.method, "cover: balls chosen to fill the body; skeleton: the raw edge collapse")
-      ->check(CLI::IsMember({"cover", "skeleton"}))
+      ->check(CLI::IsMember(namesOf(BuildMethod{})))
       ->capture_default_str();
   c->add_option("--unit", a.options.unit, "unit of the mesh files")
       ->check(CLI::IsMember(lengthUnits()))

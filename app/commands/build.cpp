@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "app/commands/commands.h"
+#include "app/enum_names.h"
 #include "app/files/fix_text.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
@@ -46,8 +47,8 @@ std::string repeatingCommand(const BuildJob& job, const BuildOptions& options) {
   if (options.unit != "m") command += " --unit " + options.unit;
   if (!job.finePath.empty()) command += " --fine " + shellWord(fs::path(job.finePath).filename().string());
   if (options.identify) {
-    const char* form = kLinkForms[static_cast<std::size_t>(options.identification.links)];
-    command += fmt::format(" --identify --poisson {} --link-form {}", options.identification.poisson, form);
+    command += fmt::format(" --identify --poisson {} --link-form {}", options.identification.poisson,
+                           nameOf(options.identification.links));
     for (const FixedPatch& patch : job.model.identified->patches) command += " --fix " + shellWord(patch.region);
   }
   return command;

@@ -4,12 +4,12 @@
 #include <filesystem>
 
 #include "app/commands/commands.h"
+#include "app/enum_names.h"
 #include "app/files/model_file.h"
 #include "app/files/recording_file.h"
 #include "app/files/text.h"
 #include "app/files/trajectory_file.h"
 #include "app/files/xml_element.h"
-#include "app/scene_names.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/model/build_report.h"
 #include "physics/model/mesh_topology.h"

@@ -6,6 +6,7 @@
 #include <set>
 #include <string_view>
 
+#include "app/enum_names.h"
 #include "app/files/mesh_file.h"
 #include "app/files/placement.h"
 #include "app/files/scene_overrides.h"
@@ -13,7 +14,6 @@
 #include "app/files/text.h"
 #include "app/files/xml_element.h"
 #include "app/scene.h"
-#include "app/scene_names.h"
 #include "physics/content_hash.h"
 #include "physics/model/rotation_between.h"
 

@@ -11,8 +11,8 @@
 namespace medulla {
 
 enum class BuildMethod {
-  skeleton,  // the paper's raw result: Li's edge collapse, nodes become spheres (2.1)
   cover,     // medial balls, inscribed but for `overshoot`, chosen by set cover
+  skeleton,  // the paper's raw result: Li's edge collapse, nodes become spheres (2.1)
 };
 
 constexpr int kSpheresMax = 2000;  // the choice of balls needs spheres^2 memory and time

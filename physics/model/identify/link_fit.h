@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <functional>
 #include <vector>
 
@@ -12,7 +11,6 @@ namespace medulla {
 // Six scalars along the link's axes; any positive semidefinite matrix; and a strain of each cell besides, which couples
 // its links: nearer, and stiffer in its fastest motions.
 enum class LinkForm { diagonal, uncoupled, full };
-inline constexpr std::array<const char*, 3> kLinkForms{"diagonal", "uncoupled", "full"};  // as users name them
 
 // Links between cells that share a face worth the name, and from cells to the patches that hold them, without
 // stiffness. `patchTriangles`: held triangles of each patch.
