@@ -88,7 +88,7 @@ void PngFolder::takeOver() const {
     const bool picture = entry.path().extension() == ".png" && isWholePng(entry.path());
     if (!(slice_.resume && same && picture)) fs::remove_all(entry.path());
   }
-  writeText(name.string(), run);
+  writeTextFile(name.string(), run);
 }
 
 PngFolder::~PngFolder() {

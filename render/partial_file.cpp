@@ -12,7 +12,7 @@
 
 namespace medulla {
 
-static std::runtime_error unwritable(const std::string& path) {
+std::runtime_error unwritable(const std::string& path) {
   return std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
 }
 

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <stdexcept>
 #include <string>
 
 namespace medulla {
+
+// Of what the system has just refused to write.
+std::runtime_error unwritable(const std::string& path);
 
 // A file beside its target that takes the target's name only when it is whole: TARGET.PID-N.part up to commit().
 // Destroyed before that it is removed, and an earlier file of that name stays as it was. What a symbolic link stands

@@ -51,8 +51,8 @@ int runNew(const NewOptions& options) {
     runBuild(build);
     const SoftBodyModel model = readModel(modelPath);
     const StarterScene starter = starterScene(name, model);
-    writeText(trajectoryPath, starter.trajectory);
-    writeText(scenePath, starter.scene);
+    writeTextFile(trajectoryPath, starter.trajectory);
+    writeTextFile(scenePath, starter.scene);
   } catch (...) {
     std::error_code missing;
     for (const std::string& path : {trajectoryPath, modelPath}) fs::remove(path, missing);

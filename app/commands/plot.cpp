@@ -28,7 +28,7 @@ int runPlot(const PlotOptions& options) {
   if (!picture)
     throw std::runtime_error(
         fmt::format("{}: gnuplot is not installed, expected it (Debian package gnuplot-nox)", options.output));
-  writeText(options.output, *picture);
+  writeTextFile(options.output, *picture);
   fmt::print("file {}\n", std::filesystem::absolute(path).lexically_normal().string());
   return 0;
 }

@@ -77,9 +77,9 @@ std::optional<std::string> runGnuplot(const std::string& script) {
 
 void drawByGnuplot(const std::string& stem, const std::string& script) {
   const std::string source = stem + ".gnuplot", picture = stem + ".svg";
-  writeText(source, script);
+  writeTextFile(source, script);
   if (const std::optional<std::string> svg = runGnuplot(script)) {
-    writeText(picture, *svg);
+    writeTextFile(picture, *svg);
   } else {
     fmt::print(stderr, "no {}: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {} > {}\n",
                std::filesystem::path(picture).filename().string(), shellWord(source), shellWord(picture));

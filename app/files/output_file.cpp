@@ -13,10 +13,6 @@
 
 namespace medulla {
 
-std::runtime_error unwritable(const std::string& path) {
-  return inputError(path, 0, std::string("cannot be written: ") + std::strerror(errno));
-}
-
 void writeAll(int descriptor, std::string_view text, const std::string& path) {
   while (!text.empty()) {
     const ssize_t count = ::write(descriptor, text.data(), text.size());
@@ -66,7 +62,7 @@ void OutputFile::commit() {
   file_.commit();
 }
 
-void writeText(const std::string& path, const std::string& text) {
+void writeTextFile(const std::string& path, const std::string& text) {
   OutputFile file(path);
   file.write(text);
   file.commit();

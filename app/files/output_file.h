@@ -35,14 +35,11 @@ class OutputFile {
 };
 
 // A whole OutputFile in one call.
-void writeText(const std::string& path, const std::string& text);
+void writeTextFile(const std::string& path, const std::string& text);
 
 // Before work whose results they are to take: throws what OutputFile throws for the first that cannot be written. Empty
 // names are skipped.
 void requireWritable(const std::vector<std::string>& paths);
-
-// Of what the system has just refused to write.
-std::runtime_error unwritable(const std::string& path);
 
 // All of it, where the system takes less at a time. Throws unwritable().
 void writeAll(int descriptor, std::string_view text, const std::string& path);

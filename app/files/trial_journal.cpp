@@ -77,7 +77,7 @@ void TrialJournal::forget(const std::vector<StabilityPoint>& done) {
 void TrialJournal::writeAnew() {
   std::string text = head_;
   for (const auto& [key, point] : known_) text += stabilityRow(point);
-  writeText(path_, text);
+  writeTextFile(path_, text);
   if (descriptor_ >= 0) ::close(descriptor_);
   descriptor_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
   if (descriptor_ < 0) throw unwritable(path_);

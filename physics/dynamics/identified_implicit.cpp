@@ -209,7 +209,7 @@ void listIdentifiedPairs(const WorldData& d, std::vector<std::array<int, 2>>& pa
         pairs.push_back({s.carried[link.frame0[lane]].sphere, s.carried[link.frame1[lane]].sphere});
 }
 
-void setFrameRates(WorldData& d, const Motion& motion) {
+void setIdentifiedFrameRates(WorldData& d, const Motion& motion) {
   Identified& s = d.identified;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const CarriedFrame& c = s.carried[i];

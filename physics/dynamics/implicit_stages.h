@@ -43,7 +43,7 @@ void addLinkBlocks(const LinkBlocks& m, const int (&pair)[4], ImplicitData& s);
 void addIdentifiedStiffness(const WorldData& d, ImplicitData& s);
 void listIdentifiedPairs(const WorldData& d, std::vector<std::array<int, 2>>& pairs);
 void layOutStars(const WorldData& d, ImplicitData& s);  // after all links' pairs
-void setFrameRates(WorldData& d, const Motion& motion);
+void setIdentifiedFrameRates(WorldData& d, const Motion& motion);
 void carryOnFrames(WorldData& d, const HostRange& range, std::vector<Quad>& carried);
 void returnImpulsesToFrames(WorldData& d, const HostRange& range, const std::vector<Quad>& impulses);
 // Adds to the impulses `given` of what stands in `carried` what attachments are stiffer along the normals.

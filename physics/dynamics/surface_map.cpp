@@ -57,7 +57,7 @@ void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried)
       storeFour(base + cross(omega, offset), carried, 4 * g);
     }
   }
-  setFrameRates(d, motion);
+  setIdentifiedFrameRates(d, motion);
   for (const HostRange& range : d.nodes.onSpheres) {
     if (range.onFrames) {
       carryOnFrames(d, range, carried);
