@@ -175,6 +175,12 @@ RunOptions runOptions(const RunArguments& a) {
   return options;
 }
 
+void addContext(CLI::App& command, std::string& context) {
+  command.add_option("--context", context, "how to draw off screen")
+      ->check(CLI::IsMember({"auto", "osmesa", "egl"}))
+      ->capture_default_str();
+}
+
 namespace {
 
 struct RenderArguments {
@@ -197,7 +203,9 @@ std::string fileOf(const std::string& scene, std::string path) {
 void readPictures(const RenderArguments& a, RenderOptions& options) {
   if (!a.size.empty()) {
     options.size = splitPair(a.size, 'x');
-    if (!options.size) usageError("--size", a.size, "WIDTHxHEIGHT, numbers from 16 to 8192, even for videos");
+    if (!options.size)
+      usageError("--size", a.size,
+                 fmt::format("WIDTHxHEIGHT, numbers from {} to {}, even for videos", kPictureSideMin, kPictureSideMax));
   }
   if (!a.frames.empty()) {
     options.frames = splitPair(a.frames, ':');
@@ -300,7 +308,8 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
   parts += " of the model what is named [mesh,spheres,links]";
   c->add_option("--show", a.show, parts)->delimiter(',')->type_name("PART,...")->allow_extra_args(false);
   c->add_option("--size", a.size,
-                "picture size in pixels, from 16 to 8192, of videos even numbers (default: the scene's)")
+                fmt::format("picture size in pixels, from {} to {}, of videos even numbers (default: the scene's)",
+                            kPictureSideMin, kPictureSideMax))
       ->type_name("WxH");
   c->add_option(
        "--quality", a.quality,
@@ -317,9 +326,7 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
       ->excludes(frames);
   c->add_option("--cache", a.cache, "draw the states that replay --cache wrote instead of simulating")
       ->type_name("FILE");
-  c->add_option("--context", a.context, "how to draw off screen")
-      ->check(CLI::IsMember({"auto", "osmesa", "egl"}))
-      ->capture_default_str();
+  addContext(*c, a.context);
 }
 
 Verb addRender(CLI::App& app) {

@@ -149,9 +149,7 @@ Verb addGolden(CLI::App& app) {
   c->add_option("--failures", o.failures, "where report.html and the pictures that fail go")
       ->type_name("DIR")
       ->capture_default_str();
-  c->add_option("--context", o.context, "how to draw off screen")
-      ->check(CLI::IsMember({"auto", "osmesa", "egl"}))
-      ->capture_default_str();
+  addContext(*c, o.context);
   return {c, [options] { return runGolden(*options); }};
 }
 

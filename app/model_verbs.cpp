@@ -68,8 +68,9 @@ void addCoverOptions(CLI::App& c, BuildArguments& a) {
 void addIdentification(CLI::App& c, BuildArguments& a) {
   CLI::Option* identify = c.add_flag(
       "--identify", a.options.identify,
-      "find the links' stiffness by finite elements of the very mesh, held as --fix says, "
-      "for bodies that are no network of beams; seconds for a few spheres, much longer for many, 300 at most");
+      fmt::format("find the links' stiffness by finite elements of the very mesh, held as --fix says, for bodies that "
+                  "are no network of beams; seconds for a few spheres, much longer for many, {} at most",
+                  kIdentifiedSpheresMax));
   c.add_option("--fix", a.options.fix,
                "what scenes hold, as their <fix>: box=x0,y0,z0,x1,y1,z1, sphere=x,y,z,r, plane=nx,ny,nz,d (m) or "
                "vertices=FILE.csv; may be given more than once")

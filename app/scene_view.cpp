@@ -43,12 +43,12 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   constexpr double kThinnest = 1.5e-3, kThickest = 7e-3;  // m
   instrument.scale = float(tool.settings.radius / std::clamp(tool.settings.radius, kThinnest, kThickest));
   instrument.touching = state.inContact || state.holding;
-  // A grip of 0.5 is where the jaws meet tissue and hold it. Over the grip's last part, a few pictures long, they close
+  // Where a grip closes the jaws meet tissue and hold it. Over the grip's last part, a few pictures long, they close
   // on it and it rises between them: it would jump into and out of the jaws else.
-  constexpr double kHeld = 0.5, kFirm = 0.95;
-  const double firm = std::clamp((input.grip - kHeld) / (kFirm - kHeld), 0.0, 1.0);
+  constexpr double kFirm = 0.95;
+  const double firm = std::clamp((input.grip - kGripCloses) / (kFirm - kGripCloses), 0.0, 1.0);
   constexpr double kOpenJaw = 0.38, kHoldingJaw = 0.11, kClosedJaw = 0.03;  // rad
-  const double closed = std::min(input.grip / kHeld, 1.0);
+  const double closed = std::min(input.grip / kGripCloses, 1.0);
   instrument.jawAngle = float(kOpenJaw + (kHoldingJaw - kOpenJaw) * closed + (kClosedJaw - kHoldingJaw) * firm);
   instrument.hold = state.holding ? float(firm * firm * (3 - 2 * firm)) : 0.f;
   // A dent as deep as Hertz's contact has it for a tip of 3 mm in tissue of some 10 kPa, up to what stays a dent.

@@ -32,6 +32,7 @@ struct RunArguments {
 };
 void addSceneOptions(CLI::App& command, RunArguments& a);  // SCENE, --set, --trajectory
 RunOptions runOptions(const RunArguments& a);
+void addContext(CLI::App& command, std::string& context);
 
 // model_verbs.cpp
 Verb addBuild(CLI::App& app);

@@ -18,6 +18,9 @@ struct TouchableBody {
   std::vector<double> give{};  // m/N per node, >= 0: what it yields at once to a force on it alone; empty: nothing
 };
 
+// Frames: the servo is one ahead of the frame that it blends, and a mean over a frame is as old as its middle.
+constexpr double kToolForceAge = 1.5;
+
 // The surfaces of all bodies in one numbering of nodes and triangles, between two dynamics frames.
 struct BlendedSurface {
   std::vector<std::array<int, 3>> triangles;  // node numbers
@@ -33,7 +36,7 @@ struct BlendedSurface {
   // N, by each tool on what it touched, means over the frame between `from` and `to`, and over the one before; empty:
   // not known. Blended between them, so many frames old.
   std::array<std::vector<Eigen::Vector3d>, 2> toolForce;
-  double toolForceAge = 1.5;
+  double toolForceAge = kToolForceAge;
 
   Eigen::Vector3d node(int n, double alpha) const { return blendPoint(from[n], to[n], alpha); }
   // What a node moves within one frame at its present velocity, m; continuous from frame to frame.
@@ -74,7 +77,7 @@ class Buckets {
   // Bounding spheres are renewed around both frames; Embree's bounds only by refitNear().
   void commit(const DynamicsFrame& from, const DynamicsFrame& to,
               const std::array<std::vector<Eigen::Vector3d>, 3>& stepsBefore,
-              const std::array<std::vector<Eigen::Vector3d>, 2>& toolForce = {}, double toolForceAge = 1.5);
+              const std::array<std::vector<Eigen::Vector3d>, 2>& toolForce = {}, double toolForceAge = kToolForceAge);
   // Renews Embree's bounds in the buckets within largestRadius + `distance` (m) of `centre`. Buckets that are left out
   // are searched triangle by triangle, with the same result.
   void refitNear(const Eigen::Vector3d& centre, double distance);

@@ -33,7 +33,7 @@ static void holdPatch(const BlendedSurface& surface, double alpha, const Proxy& 
 
 void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
                 double gripRadius, Grip& grip) {
-  const bool closes = device.grip > 0.5;
+  const bool closes = device.grip > kGripCloses;
   if (closes == grip.closed) return;
   grip.closed = closes;
   grip.slipped = false;

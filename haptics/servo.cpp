@@ -301,7 +301,7 @@ void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to, const std
     if (isFirst) before = last;  // a tool may start in contact
   }
   Buckets& buckets = data_->surfaces.writing();
-  buckets.commit(from, to, data_->steps, data_->toolForce, 1.5 + framesLate);
+  buckets.commit(from, to, data_->steps, data_->toolForce, kToolForceAge + framesLate);
   data_->steps = buckets.surface().steps;
   for (const ToolState& tool : tools) buckets.refitNear(tool.proxy, (tool.device - tool.proxy).norm() + kTravel);
   data_->surfaces.publish();

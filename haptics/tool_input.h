@@ -10,13 +10,15 @@ namespace medulla {
 // rounding would outgrow the 10 um by which the surface's bounds are padded. Also catches trajectories in millimetres.
 constexpr double kToolReach = 20;
 
+constexpr double kGripCloses = 0.5;  // a grip above this is closed, and holds what it closed on
+
 // One row of a haptic trajectory: where the device is and how far its grip is closed.
 struct ToolSample {
   double time = 0;                                     // s
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // m, world
   Eigen::Quaterniond worldFromTool =
       Eigen::Quaterniond::Identity();  // the tool's shaft runs along its +z, away from the tip
-  double grip = 0;                     // 0 open .. 1 closed; closes above 0.5
+  double grip = 0;                     // 0 open .. 1 closed; closes above kGripCloses
 };
 
 struct Trajectory {

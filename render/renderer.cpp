@@ -51,10 +51,11 @@ struct Framebuffer {
 };
 
 void checkSettings(const RendererSettings& s) {
-  const auto bad = [](int v) { return v < 16 || v > 8192; };
+  const auto bad = [](int v) { return v < kPictureSideMin || v > kPictureSideMax; };
   if (bad(s.width) || bad(s.height))
     throw std::runtime_error("picture size " + std::to_string(s.width) + "x" + std::to_string(s.height) +
-                             ", expected whole numbers from 16 to 8192");
+                             ", expected whole numbers from " + std::to_string(kPictureSideMin) + " to " +
+                             std::to_string(kPictureSideMax));
   assert(s.supersample >= 1 && s.supersample <= 4);
 }
 

@@ -117,8 +117,10 @@ struct Picture {
   Drawing overlay;  // over everything else: something said about the picture rather than in it
 };
 
+constexpr int kPictureSideMin = 16, kPictureSideMax = 8192;  // px
+
 struct RendererSettings {
-  int width = 1280, height = 720;  // 16..8192
+  int width = 1280, height = 720;  // kPictureSideMin..kPictureSideMax
   std::string context = "auto";    // auto | osmesa | egl
   bool shadows = true, antialias = true;
   int supersample = 1;  // 1 to 4: every pixel is the mean, in light, of its square

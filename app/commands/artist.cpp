@@ -20,9 +20,9 @@ constexpr int kSheets = 4;
 // What several panels leave over stays black between them.
 int panelWidth(const Scene& scene, const ViewOptions& view) {
   const int count = static_cast<int>(view.panels.size()), width = scene.width / count;
-  if (width < 16)
+  if (width < kPictureSideMin)
     throw std::runtime_error(fmt::format("{} pictures side by side: expected a width of {} at least, not {}", count,
-                                         16 * count, scene.width));
+                                         kPictureSideMin * count, scene.width));
   return width;
 }
 

@@ -142,7 +142,7 @@ std::vector<Result> trajectoryResults(const Trajectory& trajectory) {
   int closings = 0;
   for (std::size_t k = 0; k < samples.size(); ++k) {
     box.extend(samples[k].position);
-    if (samples[k].grip > 0.5 && (k == 0 || samples[k - 1].grip <= 0.5)) ++closings;
+    if (samples[k].grip > kGripCloses && (k == 0 || samples[k - 1].grip <= kGripCloses)) ++closings;
     if (k == 0) continue;
     const double step = samples[k].time - samples[k - 1].time;
     gap = std::max(gap, step);

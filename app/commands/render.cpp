@@ -20,10 +20,12 @@ void applyOverrides(const RenderOptions& options, Scene& scene) {
   if (options.size) {
     std::tie(scene.width, scene.height) = *options.size;
     const bool video = !options.still && std::any_of(options.outputs.begin(), options.outputs.end(), isVideoName);
-    const auto valid = [video](int n) { return n >= 16 && n <= 8192 && !(video && n % 2 != 0); };
+    const auto valid = [video](int n) {
+      return n >= kPictureSideMin && n <= kPictureSideMax && !(video && n % 2 != 0);
+    };
     if (!valid(scene.width) || !valid(scene.height))
-      throw std::runtime_error(fmt::format("--size {}x{}: expected {}numbers from 16 to 8192{}", scene.width,
-                                           scene.height, video ? "even " : "",
+      throw std::runtime_error(fmt::format("--size {}x{}: expected {}numbers from {} to {}{}", scene.width,
+                                           scene.height, video ? "even " : "", kPictureSideMin, kPictureSideMax,
                                            video ? " (video needs them even)" : ""));
   }
   if (options.fps) scene.fps = *options.fps;

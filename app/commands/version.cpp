@@ -11,7 +11,7 @@ int printVersion() {
   fmt::print("embree {}\n", embreeVersion());
   std::string context;
   try {
-    context = Renderer({.width = 16, .height = 16}).description();
+    context = Renderer({.width = kPictureSideMin, .height = kPictureSideMin}).description();
   } catch (const std::runtime_error& error) {
     context = error.what();
   }

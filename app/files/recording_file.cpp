@@ -188,7 +188,7 @@ ToolSample sampleOf(const Row& row, double start, const RecordingMap& map) {
   sample.position = map.worldFromRecording * (map.scale * map.metresPerUnit * map.mirror.cwiseProduct(row.position));
   sample.worldFromTool =
       Eigen::Quaterniond(map.worldFromRecording.linear()) * mirrored(row.orientation, map.mirror) * map.deviceFromTool;
-  const double grip = 0.5 * (row.grip - map.gripOpen) / (map.gripCloses - map.gripOpen);
+  const double grip = kGripCloses * (row.grip - map.gripOpen) / (map.gripCloses - map.gripOpen);
   sample.grip = grip > 0 ? std::min(grip, 1.0) : 0;  // overflow to no number included
   return sample;
 }

@@ -37,7 +37,7 @@ struct RecordingMap {
   bool writeState = false;                  // SOFA's text of one rigid instead of a table
   std::vector<RecordingColumns> layouts{};  // the first whose columns are in the file's header counts
   double metresPerUnit = 1;
-  // The grip's column where the grip is fully open, and where it closes: 0.5 of a trajectory's grip.
+  // The grip's column where the grip is fully open, and where it closes: kGripCloses of a trajectory's grip.
   double gripOpen = 0, gripCloses = 0.5;
   // world = position + orientation * scale * mirrored; forces are only mirrored and turned.
   Eigen::Vector3d mirror = Eigen::Vector3d::Ones();  // 1 or -1 per axis

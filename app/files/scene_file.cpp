@@ -16,6 +16,7 @@
 #include "app/scene.h"
 #include "physics/content_hash.h"
 #include "physics/model/rotation_between.h"
+#include "render/renderer.h"
 
 namespace medulla {
 
@@ -371,7 +372,7 @@ void readCaptions(const XmlElement& output, Scene& scene) {
 }
 
 void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene) {
-  const std::vector<int> size = readIntegers(output, "size", 2, {16, 8192});
+  const std::vector<int> size = readIntegers(output, "size", 2, {kPictureSideMin, kPictureSideMax});
   if (!size.empty()) {
     if (size[0] % 2 != 0 || size[1] % 2 != 0)
       refuse(output, "size", "expected even width and height (video needs them)");
