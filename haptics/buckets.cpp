@@ -11,6 +11,7 @@
 
 #include "haptics/tool_input.h"
 #include "physics/dynamics/simd.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -148,8 +149,7 @@ static void appendBody(const SoftBodyModel& model, BlendedSurface& surface, std:
       const std::array<int, 3>& corners = surface.triangles[t + firstTriangle];
       bucket.nodes.insert(bucket.nodes.end(), corners.begin(), corners.end());
     }
-    std::sort(bucket.nodes.begin(), bucket.nodes.end());
-    bucket.nodes.erase(std::unique(bucket.nodes.begin(), bucket.nodes.end()), bucket.nodes.end());
+    sortUnique(bucket.nodes);
   }
 }
 

@@ -20,6 +20,7 @@
 #include "physics/model/identify/check_loads.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -189,8 +190,7 @@ std::optional<IdentifiedError> errorOfFormulas(const BuildJob& job, const Identi
   body.tissue.poisson = found.network.poisson;
   for (const FixedPatch& patch : found.network.patches)
     body.fixedNodes.insert(body.fixedNodes.end(), patch.nodes.begin(), patch.nodes.end());
-  std::sort(body.fixedNodes.begin(), body.fixedNodes.end());
-  body.fixedNodes.erase(std::unique(body.fixedNodes.begin(), body.fixedNodes.end()), body.fixedNodes.end());
+  sortUnique(body.fixedNodes);
   for (const int sphere : spheresHeldBy(job.model, body.fixedNodes)) body.fixed.push_back({sphere});
   if (body.fixed.empty()) return std::nullopt;
   return errorOf(skeletonResponse(body, bodyMechanics(body), found.forces), found.displacements);

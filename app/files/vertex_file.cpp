@@ -11,6 +11,7 @@
 #include "app/files/input_error.h"
 #include "app/files/text.h"
 #include "app/files/text_file.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -51,8 +52,7 @@ void forEachVertex(std::string_view text, const std::string& name, const SoftBod
 std::vector<int> parseVertices(std::string_view text, const std::string& name, const SoftBodyModel& model) {
   std::vector<int> nodes;
   forEachVertex(text, name, model, kVertexColumns, [&](const CsvRows&, int node) { nodes.push_back(node); });
-  std::sort(nodes.begin(), nodes.end());
-  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  sortUnique(nodes);
   return nodes;
 }
 

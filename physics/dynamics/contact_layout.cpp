@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "physics/dynamics/contact_stages.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -141,10 +142,7 @@ void excludeWhatOverlapsAtRest(WorldData& d) {
   forEachPair(c, [&](std::uint32_t i, std::uint32_t j, double gap, double smaller) {
     if (c.colliders[i].body == c.colliders[j].body && gap < kTouchingAtRest * smaller) c.excluded[i].push_back(j);
   });
-  for (std::vector<std::uint32_t>& e : c.excluded) {
-    std::sort(e.begin(), e.end());
-    e.erase(std::unique(e.begin(), e.end()), e.end());
-  }
+  for (std::vector<std::uint32_t>& e : c.excluded) sortUnique(e);
 }
 
 void noteStartOverlaps(ContactData& c) {

@@ -1,10 +1,10 @@
 #include "physics/dynamics/fixation.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "physics/model/attachment.h"
 #include "physics/model/identify/voxel_solid.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -53,8 +53,7 @@ std::vector<int> spheresBehindPatches(const IdentifiedNetwork& network) {
     const double whole = penalty * network.frames[link.frame0].volume;
     if (std::abs(translation - whole) < tolerance * whole) out.push_back(link.frame0);
   }
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
+  sortUnique(out);
   return out;
 }
 

@@ -8,6 +8,7 @@
 
 #include "physics/model/cross_matrix.h"
 #include "physics/model/row_of_cells.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -66,10 +67,7 @@ void checkIdentified(const BodyDescription& body) {
                       body.tissue.poisson));
   std::vector<int> held, fixed = body.fixedNodes;
   for (const FixedPatch& p : n.patches) held.insert(held.end(), p.nodes.begin(), p.nodes.end());
-  for (std::vector<int>* nodes : {&held, &fixed}) {
-    std::sort(nodes->begin(), nodes->end());
-    nodes->erase(std::unique(nodes->begin(), nodes->end()), nodes->end());
-  }
+  for (std::vector<int>* nodes : {&held, &fixed}) sortUnique(*nodes);
   require(held == fixed,
           fmt::format("its model was identified with {} nodes held: expected the same ones, not these {}", held.size(),
                       fixed.size()));

@@ -7,6 +7,7 @@
 #include "physics/dynamics/stages.h"
 #include "physics/dynamics/still_nodes.h"
 #include "physics/dynamics/whole_motion.h"
+#include "physics/sort_unique.h"
 
 // SurfaceMode::contact: a host's nodes move by themselves only where something acts on them or what acts has spread to
 // them. The others are carried: they hang still from their anchors, and their mass is their spheres'. Parts join and
@@ -72,8 +73,7 @@ void listNeighbours(const WorldData& d, const std::vector<int>& ofGroup, const H
     for (int k = 0; k < 4; ++k)
       if (d.springs.groups[e].stiffness[k] > 0)
         part.neighbours.push_back(ofGroup[d.springs.groups[e].other[k] / sizeof(Quad) / 4]);
-  std::sort(part.neighbours.begin(), part.neighbours.end());
-  part.neighbours.erase(std::unique(part.neighbours.begin(), part.neighbours.end()), part.neighbours.end());
+  sortUnique(part.neighbours);
 }
 
 // N/m5: pressure per volume where the nodes from `firstGroup` on hang still under it.

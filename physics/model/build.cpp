@@ -20,6 +20,7 @@
 #include "physics/model/node_volumes.h"
 #include "physics/model/power_cells.h"
 #include "physics/model/render_surface.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -67,8 +68,7 @@ void dropEmptyCells(const VoxelBody& voxels, const MassProperties& exact, Sphere
       }
       if (link[0] > link[1]) std::swap(link[0], link[1]);
     }
-    std::sort(s.links.begin(), s.links.end());
-    s.links.erase(std::unique(s.links.begin(), s.links.end()), s.links.end());
+    sortUnique(s.links);
     std::erase_if(s.links, [](const std::array<int, 2>& l) { return l[0] == l[1]; });
     s.balls.erase(s.balls.begin() + gone);
     s.cells = divideByPower(voxels, s.balls, exact);

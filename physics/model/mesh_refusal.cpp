@@ -9,6 +9,7 @@
 #include "physics/model/mesh_topology.h"
 #include "physics/model/self_intersection.h"
 #include "physics/model/symmetric_eigen.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -126,8 +127,7 @@ void requireManifoldEdges(const MeshUnderRepair& repair) {
     }
   }
   if (bad.empty()) return;
-  std::sort(bad.begin(), bad.end());
-  bad.erase(std::unique(bad.begin(), bad.end()), bad.end());
+  sortUnique(bad);
   throw std::runtime_error(
       fmt::format("non-manifold: {} shared by more than two triangles, the first between vertices {} and {}",
                   counted(bad.size(), "edge is", "edges are"), bad[0][0], bad[0][1]));

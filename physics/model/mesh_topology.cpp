@@ -6,6 +6,7 @@
 #include <span>
 
 #include "physics/model/disjoint_sets.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -62,8 +63,7 @@ std::vector<std::array<int, 2>> uniqueEdges(const TriangleMesh& mesh) {
   edges.reserve(3 * mesh.triangles.size());
   for (const auto& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) edges.push_back({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  sortUnique(edges);
   return edges;
 }
 

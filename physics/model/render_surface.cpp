@@ -10,6 +10,7 @@
 
 #include "physics/model/loop_subdivision.h"
 #include "physics/model/surface_queries.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -41,8 +42,7 @@ std::vector<int> nodesOf(const LimitStencils& limit, std::size_t vertex) {
   std::vector<int> nodes;
   for (const Stencil* row : {&limit.position[vertex], &limit.tangent0[vertex], &limit.tangent1[vertex]})
     for (const auto& [node, weight] : *row) nodes.push_back(node);
-  std::sort(nodes.begin(), nodes.end());
-  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  sortUnique(nodes);
   return nodes;
 }
 

@@ -17,6 +17,7 @@
 #include "physics/model/identify/skin_fit.h"
 #include "physics/model/identify/thin_parts.h"
 #include "physics/model/row_of_cells.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -342,8 +343,7 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
                                        patchTriangles.back().end());
   }
   std::vector<int>& triangles = solidSettings.heldTriangles;  // each once, in however many regions
-  std::sort(triangles.begin(), triangles.end());
-  triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
+  sortUnique(triangles);
   solidSettings.heldSpaces = heldSpaces(mesh, held, patchTriangles);
   const auto stage = [&](double from, double to) -> Progress {
     return [&progress, from, to](double part) {

@@ -12,6 +12,7 @@
 
 #include "physics/model/identify/hex_stiffness.h"
 #include "physics/model/identify/parallel.h"
+#include "physics/sort_unique.h"
 
 namespace medulla {
 
@@ -96,8 +97,7 @@ class Dissector {
         nodes.insert(nodes.end(), cell.begin(), cell.end());
       }
     }
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    sortUnique(nodes);
     const auto rest = std::stable_partition(nodes.begin(), nodes.end(),
                                             [&](int node) { return first_[node] >= begin && last_[node] < end; });
     front.own = static_cast<int>(rest - nodes.begin());
