@@ -94,11 +94,7 @@ MEDULLA_INLINE Lanes3 baseVelocityOf(const LinkHost& h, const NodeGroup& g, cons
 // the line, twisted by its share of the torsion and as much shorter as a beam is thinner.
 MEDULLA_INLINE Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
   Lanes c, s;
-  const Lanes angle = g.twistShare * h.twist;
-  if (any(isLess(splat(kSmallAngle), magnitude(angle))))
-    cosineSine(angle, c, s);
-  else
-    smallCosineSine(angle, c, s);
+  quickCosineSine(g.twistShare * h.twist, c, s);
   Anchor a;
   a.area = fma(g.restArea.x, h.n,
                fma(fnma(g.restArea.z, s, g.restArea.y * c), h.axisU, fma(g.restArea.y, s, g.restArea.z * c) * h.axisV));

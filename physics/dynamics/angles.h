@@ -1,5 +1,7 @@
 #pragma once
 
+#include <numbers>
+
 #include "physics/dynamics/simd.h"
 
 // Angles from sines and cosines and back, by polynomials: accurate to 1e-15, the same on every machine.
@@ -47,7 +49,7 @@ inline AngleOverSine angleOverSine(Lanes cosine) {
   // asin(sqrt x) = pi/2 - 2 asin(sqrt y), y = (1 - sqrt x) / 2
   const Lanes root = squareRoot(x);
   const Lanes y = larger(select(isLarge, half * (one - root), zero), zero);
-  const Lanes arc = fnma(two * squareRoot(y), fma(y, arcSineRemainder(y), one), splat(1.57079632679489661923));
+  const Lanes arc = fnma(two * squareRoot(y), fma(y, arcSineRemainder(y), one), splat(std::numbers::pi / 2));
   const Lanes sine = larger(two * root * w, splat(0.5));  // folded ones are selected away below
   const Lanes value = two * arc / sine;
   out.value = select(isLarge, value, out.value);
@@ -67,14 +69,14 @@ inline Lanes angleOf(Lanes cosine, Lanes sine) {
   Lanes angle = magnitude(sine) * fma(xSmall, arcSineRemainder(xSmall), one) / squareRoot(one - xSmall);
   if (any(isLarge)) {
     const Lanes y = select(isLarge, half * (one - squareRoot(x)), zero);
-    const Lanes arc = fnma(two * squareRoot(y), fma(y, arcSineRemainder(y), one), splat(1.57079632679489661923));
+    const Lanes arc = fnma(two * squareRoot(y), fma(y, arcSineRemainder(y), one), splat(std::numbers::pi / 2));
     angle = select(isLarge, two * arc, angle);
   }
-  angle = select(isLess(cosine, zero), splat(3.14159265358979323846) - angle, angle);
+  angle = select(isLess(cosine, zero), splat(std::numbers::pi) - angle, angle);
   return withSignOf(angle, sine);
 }
 
-constexpr double kTurn = 6.28318530717958647693;
+constexpr double kTurn = 2 * std::numbers::pi;
 
 // Up to this angle (rad) the power series below are good to 1e-16 as they stand.
 constexpr double kSmallAngle = 0.25;
@@ -101,6 +103,14 @@ inline void smallCosineSine(Lanes angle, Lanes& cosine, Lanes& sine) {
   const Lanes s2 = two * s * c1, c2 = fnma(two * s, s, one);
   sine = two * s2 * c2;
   cosine = fnma(two * s2, s2, one);
+}
+
+// By the short series where all lanes are small, as they mostly are.
+MEDULLA_INLINE void quickCosineSine(Lanes angle, Lanes& cosine, Lanes& sine) {
+  if (any(isLess(splat(kSmallAngle), magnitude(angle))))
+    cosineSine(angle, cosine, sine);
+  else
+    smallCosineSine(angle, cosine, sine);
 }
 
 }  // namespace medulla

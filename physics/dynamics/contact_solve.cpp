@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "physics/dynamics/contact_stages.h"
 #include "physics/dynamics/stages.h"
@@ -16,7 +17,7 @@ namespace {
 
 // Half a period is one substep: implicit, so that any value is stable, and stiff because a light sphere may have to
 // bear a whole heap. What rests on a contact sinks in by acceleration / omega^2, micrometres.
-constexpr double kOmegaTimesStep = 3.141592653589793;
+constexpr double kOmegaTimesStep = std::numbers::pi;
 // Critical. Restitution comes out as 0.05: tissue does not bounce off tissue.
 constexpr double kDampingRatio = 1;
 // At least as stiff as so many cubes of the ball's radius of the tissue behind it, E r each. In long steps of light

@@ -38,10 +38,7 @@ Orientation turned(const Orientation& from, const Lanes3& turn) {
   const Lanes zero = splat(0);
   const Lanes angle = squareRoot(dot(turn, turn)), half = splat(0.5) * angle, turns = isLess(zero, angle);
   Lanes c, s;
-  if (any(isLess(splat(kSmallAngle), half)))
-    cosineSine(half, c, s);
-  else
-    smallCosineSine(half, c, s);
+  quickCosineSine(half, c, s);
   const Lanes3 axis = (s / select(turns, angle, splat(1))) * turn;
   const Lanes3 q = fma(c, from.q, fma(from.w, axis, cross(axis, from.q)));
   const Lanes w = c * from.w - dot(axis, from.q);

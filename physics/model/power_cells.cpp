@@ -1,6 +1,7 @@
 #include "physics/model/power_cells.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -10,21 +11,6 @@ namespace medulla {
 using Eigen::Vector3d;
 
 namespace {
-
-struct Bounds {
-  Vector3d low, high;
-};
-
-Bounds boundsOf(const TriangleMesh& mesh) {
-  Bounds b{mesh.vertices[mesh.triangles[0][0]], mesh.vertices[mesh.triangles[0][0]]};
-  for (const std::array<int, 3>& t : mesh.triangles) {
-    for (const int corner : t) {
-      b.low = b.low.cwiseMin(mesh.vertices[corner]);
-      b.high = b.high.cwiseMax(mesh.vertices[corner]);
-    }
-  }
-  return b;
-}
 
 // Heights at which the vertical line through every column's centre meets the surface. Column centres sit off the
 // mesh's likely coordinates, and an edge belongs to the triangle on one side of it alone (top-left rule of
@@ -105,10 +91,12 @@ double voxelSize(double volume, int target) {
 VoxelBody voxelise(const TriangleMesh& mesh, double volume, int target) {
   VoxelBody body;
   body.size = voxelSize(volume, target);
-  const Bounds bounds = boundsOf(mesh);
-  for (int a = 0; a < 3; ++a) body.count[a] = static_cast<int>((bounds.high[a] - bounds.low[a]) / body.size) + 2;
+  Eigen::AlignedBox3d box;
+  for (const std::array<int, 3>& t : mesh.triangles)
+    for (const int corner : t) box.extend(mesh.vertices[corner]);
+  for (int a = 0; a < 3; ++a) body.count[a] = static_cast<int>(box.sizes()[a] / body.size) + 2;
   Columns columns{
-      bounds.low - Vector3d(0.31, 0.27, 0.5) * body.size, body.size, body.count[0] + 1, body.count[1] + 1, {}};
+      box.min() - Vector3d(0.31, 0.27, 0.5) * body.size, body.size, body.count[0] + 1, body.count[1] + 1, {}};
   body.low = columns.origin - Vector3d(0.5, 0.5, 0) * body.size;
   body.count = {columns.countX, columns.countY, body.count[2] + 1};
   columns.crossings.resize(static_cast<std::size_t>(columns.countX) * columns.countY);
