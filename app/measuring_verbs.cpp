@@ -86,7 +86,7 @@ Verb addChart(CLI::App& app) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
-  a.options.methods = chartMethodNames(true);
+  a.options.methods = chartMethodsOfAnyModel();
   c->add_option("--methods", a.options.methods,
                 "curves; the first method's finest run is the reference where no body names one")
       ->check(CLI::IsMember(chartMethodNames()))

@@ -115,7 +115,7 @@ TEST(IdentifiedLink, TurnedTooFarLetsGoOfAWholeTurn) {
     }
     runStage(d, evaluateLinks);
     const double before = world.energies().elastic;
-    letGoOfWholeTurns(d);
+    dropCostlyTurns(d);
     const bool far = degrees > 232;
     EXPECT_NEAR(turnAgainstNext(d, 1), (far ? 360 - degrees : degrees) / 180 * std::numbers::pi, 1e-6) << degrees;
     EXPECT_NEAR(turnAgainstNext(d, 2), 0, 1e-6);

@@ -40,7 +40,7 @@ PictureOutputs::Settings outputSettings(const LoadedScene& loaded, const RenderO
       fmt::format("{} {}x{} {} {} {} {}", MEDULLA_PICTURE_SOURCES, scene.width, scene.height, scene.fps,
                   namesOf(options.view.shown), static_cast<int>(options.quality), renderer);
   for (const ViewKind panel : options.view.panels) drawing += fmt::format(" {}", static_cast<int>(panel));
-  const std::uint64_t run = contentHash(drawing, runHash(loaded, true));
+  const std::uint64_t run = contentHash(drawing, pictureHash(loaded));
   return {scene.width,
           scene.height,
           scene.fps,

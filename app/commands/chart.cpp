@@ -309,10 +309,16 @@ std::vector<SphereChartRow> sphereRows(const ChartOptions& options, const Loaded
 
 }  // namespace
 
-std::vector<std::string> chartMethodNames(bool ofAnyModel) {
+std::vector<std::string> chartMethodNames() {
+  std::vector<std::string> out;
+  for (const ChartMethod& method : chartMethods()) out.push_back(method.name);
+  return out;
+}
+
+std::vector<std::string> chartMethodsOfAnyModel() {
   std::vector<std::string> out;
   for (const ChartMethod& method : chartMethods())
-    if (method.anyModel || !ofAnyModel) out.push_back(method.name);
+    if (method.anyModel) out.push_back(method.name);
   return out;
 }
 

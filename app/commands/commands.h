@@ -82,7 +82,8 @@ struct ChartOptions {
   std::vector<std::string> methods;  // of chartMethodNames(), at least one; the first is the reference's
   std::vector<std::string> models;   // [BODY=]FILE: of the scene's mesh with other numbers of spheres; empty: its own
 };
-std::vector<std::string> chartMethodNames(bool ofAnyModel = false);  // true: those that need nothing of a model
+std::vector<std::string> chartMethodNames();
+std::vector<std::string> chartMethodsOfAnyModel();  // of these, those that need nothing of a model
 int runChart(const ChartOptions& options);
 
 struct StabilityOptions {

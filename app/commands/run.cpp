@@ -32,7 +32,7 @@ void recordFrames(const Simulation& simulation, bool last, std::vector<RecordedF
 
 CacheLayout cacheLayout(const LoadedScene& loaded) {
   CacheLayout layout;
-  layout.motionHash = runHash(loaded, false);
+  layout.motionHash = motionHash(loaded);
   layout.fps = loaded.scene.fps;
   for (const SceneBody& body : loaded.scene.bodies)
     layout.bodies.push_back(
@@ -284,12 +284,19 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
 }
 
 // The scene counts by what it says, the files that it names by their bytes: where they lie does not matter.
-std::uint64_t runHash(const LoadedScene& loaded, bool whole) {
-  const std::uint64_t scene = whole ? loaded.scene.contentHash : loaded.scene.motionHash;
+static std::uint64_t runHash(const LoadedScene& loaded, std::uint64_t scene) {
   std::uint64_t hash = contentHash(fmt::format("{} {} {:016x}", MEDULLA_VERSION, MEDULLA_MOTION_SOURCES, scene));
   for (const std::string& path : inputFiles(loaded.scene))
     if (path != loaded.scene.path && std::filesystem::exists(path)) hash = contentHash(readTextFile(path), hash);
   return hash;
+}
+
+std::uint64_t motionHash(const LoadedScene& loaded) {
+  return runHash(loaded, loaded.scene.motionHash);
+}
+
+std::uint64_t pictureHash(const LoadedScene& loaded) {
+  return runHash(loaded, loaded.scene.contentHash);
 }
 
 int pictureCount(const Scene& scene) {

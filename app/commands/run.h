@@ -69,8 +69,9 @@ std::vector<double> pictureTimes(const Scene& scene, int first, int last);
 int pictureCount(const Scene& scene);
 
 // What tells one run from another: everything that its motion follows from, this program's version and the sources of
-// its physics included; or with `whole` everything that its pictures do, but for options of the drawing.
-std::uint64_t runHash(const LoadedScene& loaded, bool whole);
+// its physics included; or everything that its pictures do, but for options of the drawing.
+std::uint64_t motionHash(const LoadedScene& loaded);
+std::uint64_t pictureHash(const LoadedScene& loaded);
 
 // Of a cache of this run.
 CacheLayout cacheLayout(const LoadedScene& loaded);

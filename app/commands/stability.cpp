@@ -189,7 +189,7 @@ int runStability(const StabilityOptions& options) {
   requireWritable(outputs);
   outputs.push_back(kept);
   requireDistinctOutputs(loaded, options.run, outputs);
-  TrialJournal journal(kept, runHash(loaded, false));
+  TrialJournal journal(kept, motionHash(loaded));
   const StabilityTables tables = runTrials(options, body, methods, journal);
   writeTables(folder, loaded.scene.name, tables);
   printResults(resultsOf(methods, tables.map, tables.trials));

@@ -13,9 +13,10 @@ double identifiedLinkEnergy(const WorldData&);
 double identifiedLinkEnergy(const Identified&, const IdentifiedBody&);
 
 // identified_turns.cpp
-// Of the state that frames were last placed at, before a dynamics frame: where that leaves less energy in the links, or
-// whatever it leaves.
-void letGoOfWholeTurns(WorldData&, bool whateverItLeaves = false);
+// Frames that links tell a whole turn apart are so no longer, of the state that frames were last placed at: where that
+// leaves less energy in the links, or whatever it leaves.
+void dropCostlyTurns(WorldData&);
+void dropWholeTurns(WorldData&);
 
 // identified_surface.cpp: the nodes of a range that hangs on frames.
 void pullOnFrames(WorldData&, const HostRange&);

@@ -85,9 +85,14 @@ void alignSigns(WorldData& d, const IdentifiedBody& body, bool whateverItLeaves)
 
 }  // namespace
 
-void letGoOfWholeTurns(WorldData& d, bool whateverItLeaves) {
+void dropCostlyTurns(WorldData& d) {
   for (const IdentifiedBody& body : d.identified.bodies)
-    if (anyTurnedTooFar(d.identified, body)) alignSigns(d, body, whateverItLeaves);
+    if (anyTurnedTooFar(d.identified, body)) alignSigns(d, body, false);
+}
+
+void dropWholeTurns(WorldData& d) {
+  for (const IdentifiedBody& body : d.identified.bodies)
+    if (anyTurnedTooFar(d.identified, body)) alignSigns(d, body, true);
 }
 
 }  // namespace medulla

@@ -406,7 +406,7 @@ void creep(WorldData& d, const ImplicitData& s) {
   slowDown(d, 0);
   const auto orientation = d.spheres.orientation;
   runStage(d, evaluateForces);
-  letGoOfWholeTurns(d, true);
+  dropWholeTurns(d);
   runStage(d, evaluateForces);
   if (!(elasticEnergy(d) <= d.mostEnergy)) d.spheres.orientation = orientation;
 }

@@ -219,7 +219,7 @@ std::vector<Eigen::Vector3d> World::advance(const Loads& loads) {
   visitLoadedNodes(loads, [&tools](const auto& load, int) { tools = std::max(tools, load.tool + 1); });
   std::vector<Eigen::Vector3d> toolImpulse(tools, Eigen::Vector3d::Zero());
   d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Eigen::Vector3d::Zero());
-  letGoOfWholeTurns(d);
+  dropCostlyTurns(d);
   wakeLoaded(d, loads);
   moveLoadedParts(d, loads);
   frameLoadedSkins(d, loads);
