@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "app/scene.h"
+#include "tests/complaint.h"
 #include "tests/temporary_folder.h"
 
 namespace medulla {
@@ -44,14 +45,7 @@ class SceneFile : public testing::Test {
   }
   // The complaint, without the folder; empty where there is none.
   std::string complaint(const std::string& text, const std::vector<SceneOverride>& overrides = {}) const {
-    try {
-      read(text, overrides);
-    } catch (const std::runtime_error& error) {
-      const std::string message = error.what();
-      EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-      return message.starts_with(folder + "/") ? message.substr(folder.size() + 1) : message;
-    }
-    return "";
+    return complaintOf([&] { read(text, overrides); }, folder);
   }
   // The complete scene with the first `from` replaced by `to`.
   static std::string edited(const std::string& from, const std::string& to) {

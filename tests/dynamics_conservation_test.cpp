@@ -11,7 +11,7 @@ namespace medulla {
 using namespace states;
 
 static BodyDescription freeTube(double damping, SurfaceMode surface = SurfaceMode::full) {
-  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
+  BodyDescription b = synthetic::body(synthetic::shortTube(), 6e3);
   b.tissue.damping = damping;
   b.surface = surface;
   return b;

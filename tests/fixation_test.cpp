@@ -17,7 +17,7 @@ using namespace states;
 
 // Five spheres along x from 0 to 0.08, 20 mm apart.
 static std::shared_ptr<const SoftBodyModel> tube() {
-  return synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10));
+  return synthetic::shortTube();
 }
 
 static Region box(const Vector3d& low, const Vector3d& high) {

@@ -4,6 +4,7 @@
 #include "app/files/model_file.h"
 #include "app/simulation.h"
 #include "physics/dynamics/region.h"
+#include "tests/complaint.h"
 #include "tests/identified_model.h"
 #include "tests/temporary_folder.h"
 
@@ -36,13 +37,7 @@ class IdentifiedScene : public testing::Test {
     return folder / "case.xml";
   }
   std::string refusal(const std::string& path) const {
-    try {
-      loadScene(readScene(path));
-      return {};
-    } catch (const std::runtime_error& error) {
-      const std::string message = error.what(), before = folder / "";
-      return message.starts_with(before) ? message.substr(before.size()) : message;
-    }
+    return complaintOf([&] { loadScene(readScene(path)); }, folder.path());
   }
   TemporaryFolder folder;
 };

@@ -17,6 +17,7 @@
 #include "physics/model/identify/reduction.h"
 #include "physics/model/identify/skin_fit.h"
 #include "physics/model/symmetric_eigen.h"
+#include "tests/complaint.h"
 #include "tests/reduced_cylinder.h"
 #include "tests/test_shapes.h"
 
@@ -334,12 +335,7 @@ TEST(IdentifiedNetwork, SpheresBehindAPatchAreHeld) {
 }
 
 std::string refusal(const std::vector<HeldRegion>& regions, const IdentifySettings& settings) {
-  try {
-    identifyNetwork(cylinderModel(), regions, settings);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
+  return complaintOf([&] { identifyNetwork(cylinderModel(), regions, settings); });
 }
 
 TEST(IdentifiedNetwork, WhatCannotBeIsRefused) {

@@ -4,28 +4,21 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
+
+#include "tests/complaint.h"
+#include "tests/program_run.h"
+#include "tests/temporary_folder.h"
 
 namespace medulla {
 namespace {
 
 namespace fs = std::filesystem;
 
-// A folder of its own that is gone after the test.
 class ImageTest : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              ("medulla_image_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  std::size_t filesInFolder() const {
-    return std::size_t(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
-  }
-  fs::path folder_;
+  std::string path(const std::string& name) const { return folder_ / name; }
+  std::size_t filesInFolder() const { return folder_.contents().size(); }
+  TemporaryFolder folder_;
 };
 
 Image pattern(int width, int height) {
@@ -55,21 +48,15 @@ TEST_F(ImageTest, PngRoundTripKeepsEveryByteAndText) {
 
 TEST_F(ImageTest, WhatIsNoPngIsRefusedWithItsPath) {
   EXPECT_THROW(readPng(path("missing.png")), std::runtime_error);
-  std::ofstream(path("text.png")) << "this is text and long enough to hold a header, but it is no picture";
-  try {
-    readPng(path("text.png"));
-    FAIL();
-  } catch (const std::runtime_error& e) {
-    EXPECT_NE(std::string(e.what()).find("text.png"), std::string::npos);
-  }
+  folder_.write("text.png", "this is text and long enough to hold a header, but it is no picture");
+  EXPECT_NE(complaintOf([&] { readPng(path("text.png")); }).find("text.png"), std::string::npos);
 }
 
 TEST_F(ImageTest, TruncatedPngIsRefused) {
   writePng(path("whole.png"), pattern(64, 64));
-  std::ifstream whole(path("whole.png"), std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(whole)), std::istreambuf_iterator<char>());
+  const std::string bytes = readFile(path("whole.png"));
   for (const std::size_t keep : {std::size_t(10), std::size_t(40), bytes.size() / 2}) {
-    std::ofstream(path("half.png"), std::ios::binary) << bytes.substr(0, keep);
+    folder_.write("half.png", bytes.substr(0, keep));
     EXPECT_THROW(readPng(path("half.png")), std::runtime_error) << keep;
   }
 }

@@ -25,7 +25,7 @@ static WorldSettings implicitly(double step, int order = 1, const Vector3d& grav
 }
 
 static BodyDescription tube(SurfaceMode surface, bool held, double damping = 0.1, LinkModel links = LinkModel::beam) {
-  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 8, 10)), 6e3);
+  BodyDescription b = synthetic::body(synthetic::shortTube(), 6e3);
   std::vector<int> heldNodes;
   if (held)
     for (int i = 0; i < 11; ++i) heldNodes.push_back(i);

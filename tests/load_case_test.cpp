@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <functional>
 #include <sstream>
 
 #include "app/files/reference_file.h"
 #include "app/files/vertex_file.h"
 #include "app/simulation.h"
+#include "tests/complaint.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 
@@ -22,15 +22,6 @@ SoftBodyModel repairedModel() {
   model.restNodes.resize(4);
   model.nodeOfInputVertex = {3, 3, -1, 0, 1, 2};
   return model;
-}
-
-std::string complaint(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(VertexFile, VerticesOfTheMeshFileBecomeNodes) {
@@ -59,7 +50,7 @@ TEST(ReferenceFile, MistakesAreRefusedWithTheLine) {
   SoftBodyModel model;
   model.restNodes.resize(2);
   model.nodeOfInputVertex = {1, -1, 0};
-  const auto refusal = [&](const char* text) { return complaint([&] { parseReference(text, "r.txt", model); }); };
+  const auto refusal = [&](const char* text) { return complaintOf([&] { parseReference(text, "r.txt", model); }); };
   EXPECT_EQ(refusal("# unit 1e-3 m\n1 0 0\n2 0 0\n3 0 0\n"), "");
   EXPECT_EQ(parseReference("# unit 1e-3 m\n1 0 0\n2 0 0\n3 0 0\n", "r.txt", model).displacement[0]->x(), 3e-3);
   EXPECT_EQ(refusal("1 0 0\n2 0\n3 0 0\n"), "r.txt:2: 2 words in this row, expected a displacement: x y z");
@@ -78,8 +69,10 @@ TEST(ReferenceFile, MistakesAreRefusedWithTheLine) {
 
 TEST(VertexFile, MistakesNameTheLine) {
   const SoftBodyModel model = repairedModel();
-  const auto vertices = [&](const char* text) { return complaint([&] { parseVertices(text, "v.csv", model); }); };
-  const auto forces = [&](const char* text) { return complaint([&] { parseVertexForces(text, "f.csv", model, {}); }); };
+  const auto vertices = [&](const char* text) { return complaintOf([&] { parseVertices(text, "v.csv", model); }); };
+  const auto forces = [&](const char* text) {
+    return complaintOf([&] { parseVertexForces(text, "f.csv", model, {}); });
+  };
   EXPECT_EQ(vertices("0\n6\n"), "v.csv:2: column vertex is '6', expected a whole number from 0 to 5");
   EXPECT_EQ(vertices("-1\n"), "v.csv:1: column vertex is '-1', expected a whole number from 0 to 5");
   EXPECT_EQ(vertices("0\n1.5\n"), "v.csv:2: column vertex is '1.5', expected a whole number from 0 to 5");
@@ -109,7 +102,7 @@ class LoadCase : public testing::Test {
   }
   std::string refusal(const std::string& inside) const {
     const std::string path = scene(inside);
-    std::string message = complaint([&] { loadScene(readScene(path)); });
+    std::string message = complaintOf([&] { loadScene(readScene(path)); });
     for (std::size_t at; (at = message.find(folder / "")) != std::string::npos;)
       message.erase(at, (folder / "").size());
     return message;
@@ -160,8 +153,8 @@ TEST_F(LoadCase, MistakesNameFileAndLine) {
             "far.csv:3: column vertex is '235', expected a whole number from 0 to 234");
   EXPECT_EQ(refusal("<fix plane='0 1 0 -5'/>"), "case.xml:4: no surface node of body \"pear\" lies in here");
   const std::string few = scene("<fix sphere='-0.05 -0.07 0.02 0.012'/>");
-  EXPECT_EQ(complaint([&] { loadScene(readScene(few)); }), "");
-  EXPECT_EQ(complaint([&] {
+  EXPECT_EQ(complaintOf([&] { loadScene(readScene(few)); }), "");
+  EXPECT_EQ(complaintOf([&] {
               loadScene(readScene(few, {{"body.pear.surface", "skin"}}));
             }),
             few +

@@ -2,10 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <stdexcept>
-
 #include "app/files/obj_reader.h"
 #include "app/files/off_reader.h"
+#include "tests/complaint.h"
 #include "tests/temporary_folder.h"
 
 namespace medulla {
@@ -15,23 +14,12 @@ using Eigen::Vector3d;
 static const std::string kTetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
 static const std::string kFaces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
-template <typename Action>
-static std::string refusal(const Action& action) {
-  try {
-    action();
-  } catch (const std::runtime_error& e) {
-    EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
-    return e.what();
-  }
-  return "accepted";
-}
-
 static std::string objRefusal(const std::string& text) {
-  return refusal([&] { parseObj(text, "a.obj"); });
+  return complaintOf([&] { parseObj(text, "a.obj"); });
 }
 
 static std::string offRefusal(const std::string& text) {
-  return refusal([&] { parseOff(text, "a.off"); });
+  return complaintOf([&] { parseOff(text, "a.off"); });
 }
 
 // Writes a file into the folder and gives its path.
@@ -150,14 +138,14 @@ TEST(MeshFile, UnitsScaleToMetres) {
   EXPECT_EQ(metresPerUnit("cm"), 0.01);
   EXPECT_EQ(metresPerUnit("mm"), 0.001);
   EXPECT_EQ(metresPerUnit("inch"), 0.0254);
-  EXPECT_EQ(refusal([] { metresPerUnit("feet"); }), "unknown unit 'feet', expected m, cm, mm, micron or inch");
+  EXPECT_EQ(complaintOf([] { metresPerUnit("feet"); }), "unknown unit 'feet', expected m, cm, mm, micron or inch");
   const TriangleMesh mesh = readMesh(written(folder, "a.OBJ", kTetrahedron + kFaces), metresPerUnit("mm"));
   EXPECT_EQ(mesh.vertices[1], Vector3d(0.001, 0, 0));
 }
 
 TEST(MeshFile, PathsThatHoldNoMeshAreRefusedInOneLine) {
   const TemporaryFolder folder;
-  const auto read = [](const std::string& path) { return refusal([&] { readMesh(path); }); };
+  const auto read = [](const std::string& path) { return complaintOf([&] { readMesh(path); }); };
   const std::string missing = folder / "missing.obj";
   EXPECT_EQ(read(missing), missing + ": cannot be opened: No such file or directory");
   EXPECT_EQ(read(folder.path()), folder.path() + ": is a folder, expected a mesh file");
@@ -173,7 +161,7 @@ TEST(MeshFile, PathsThatHoldNoMeshAreRefusedInOneLine) {
 TEST(MeshFile, ErrorsNameFileAndLine) {
   const TemporaryFolder folder;
   const std::string path = written(folder, "bad.obj", kTetrahedron + "v 0 nan 0\n" + kFaces);
-  EXPECT_EQ(refusal([&] { readMesh(path); }), path + ":5: expected a finite number, found 'nan'");
+  EXPECT_EQ(complaintOf([&] { readMesh(path); }), path + ":5: expected a finite number, found 'nan'");
 }
 
 static std::string asciiStl() {
@@ -202,22 +190,22 @@ TEST(MeshFile, BadAssimpFilesAreRefusedInOneLine) {
   const TemporaryFolder folder;
   for (const std::string name : {"a.stl", "a.ply", "a.gltf", "a.3ds", "a.dae", "a.x"}) {
     const std::string path = written(folder, name, "this is no mesh\nat all\n");
-    EXPECT_TRUE(refusal([&] { readMesh(path); }).starts_with(path + ": ")) << name;
+    EXPECT_TRUE(complaintOf([&] { readMesh(path); }).starts_with(path + ": ")) << name;
   }
   std::string text = asciiStl();
   text.replace(text.find("vertex 1 0 0"), 12, "vertex nan 0 0");
   const std::string path = written(folder, "nan.stl", text);
-  EXPECT_TRUE(refusal([&] { readMesh(path); }).starts_with(path + ": "));
+  EXPECT_TRUE(complaintOf([&] { readMesh(path); }).starts_with(path + ": "));
 }
 
 TEST(MeshFile, FilesWithoutTrianglesAreRefused) {
   const TemporaryFolder folder;
   const std::string stl = written(folder, "empty.stl", "solid a\nendsolid a\n");
-  EXPECT_TRUE(refusal([&] { readMesh(stl); }).starts_with(stl + ": "));
+  EXPECT_TRUE(complaintOf([&] { readMesh(stl); }).starts_with(stl + ": "));
   const std::string path = written(folder, "points.ply",
                                    "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
                                    "y\nproperty float z\nend_header\n0 0 0\n");
-  EXPECT_TRUE(refusal([&] { readMesh(path); }).starts_with(path + ": "));
+  EXPECT_TRUE(complaintOf([&] { readMesh(path); }).starts_with(path + ": "));
 }
 
 }  // namespace medulla

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "app/files/text_file.h"
+#include "tests/complaint.h"
 #include "tests/temporary_folder.h"
 
 namespace medulla {
@@ -69,14 +70,7 @@ class ModelFile : public testing::Test {
   }
   // The complaint, without the folder; empty where there is none.
   std::string complaint(const std::string& text) const {
-    try {
-      read(text);
-    } catch (const std::runtime_error& error) {
-      const std::string message = error.what();
-      EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-      return message.substr(message.starts_with(temporary.path()) ? temporary.path().size() + 1 : 0);
-    }
-    return "";
+    return complaintOf([&] { read(text); }, temporary.path());
   }
 
   TemporaryFolder temporary;
@@ -331,12 +325,8 @@ TEST_F(ModelFile, MistakesInWhatWasIdentified) {
 }
 
 TEST_F(ModelFile, AMissingFileIsNamed) {
-  try {
-    readModel(temporary / "none.model.xml");
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_EQ(error.what(), temporary / "none.model.xml: cannot be opened: No such file or directory");
-  }
+  EXPECT_EQ(complaintOf([&] { readModel(temporary / "none.model.xml"); }),
+            temporary / "none.model.xml: cannot be opened: No such file or directory");
 }
 
 TEST_F(ModelFile, AModelThatCannotBeWrittenHarmsNothing) {

@@ -7,18 +7,14 @@
 #include <csignal>
 
 #include "app/files/text_file.h"
+#include "tests/complaint.h"
 #include "tests/temporary_folder.h"
 
 namespace medulla {
 namespace {
 
 std::string complaint(const std::string& path) {
-  try {
-    OutputFile file(path);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
+  return complaintOf([&] { OutputFile file(path); });
 }
 
 TEST(OutputFile, AppearsUnderItsNameOnlyWhenWhole) {
@@ -120,14 +116,11 @@ TEST(OutputFile, AFullDiskIsReportedAndLeavesNothing) {
   ::getrlimit(RLIMIT_FSIZE, &before);
   const rlimit small{1 << 19, before.rlim_max};
   ::setrlimit(RLIMIT_FSIZE, &small);
-  std::string message;
-  try {
+  const std::string message = complaintOf([&] {
     OutputFile file(folder / "a.csv");
     for (int k = 0; k < 4; ++k) file.write(std::string(1 << 18, 'x'));
     file.commit();
-  } catch (const std::runtime_error& error) {
-    message = error.what();
-  }
+  });
   ::setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, previous);
   EXPECT_EQ(message, folder / "a.csv: cannot be written: File too large");

@@ -8,6 +8,7 @@
 
 #include "app/files/scene_rules.h"
 #include "app/files/text_file.h"
+#include "tests/complaint.h"
 #include "tests/complete_scene.h"
 
 namespace medulla {
@@ -382,14 +383,7 @@ TEST_F(SceneFile, FilesThatAreNoScenes) {
   EXPECT_EQ(complaint("\n<scene name='a'>\n<clock duration=1/></scene>"),
             "x.xml:3: broken XML: an attribute is not of the form name=\"value\", or stands twice");
   EXPECT_EQ(complaint(std::string("<scene\0/>", 9)), "x.xml: holds a zero byte, expected XML text");
-  const auto reading = [](const std::string& path) {
-    try {
-      readScene(path);
-    } catch (const std::runtime_error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
+  const auto reading = [](const std::string& path) { return complaintOf([&] { readScene(path); }); };
   EXPECT_EQ(reading(folder + "/none.xml"), folder + "/none.xml: cannot be opened: No such file or directory");
   EXPECT_EQ(reading(folder), folder + ": is a folder, expected a file");
   const std::string deep = [] {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/complaint.h"
 #include "tests/own_scene.h"
 
 // The state cache: exact where it says so, read at any place, refused when it is not whole.
@@ -41,15 +42,12 @@ void writeCache(const std::string& path, int pictures) {
   writer.commit(77);
 }
 
-std::string complaintOf(const std::string& path, int picture = -1) {
-  try {
+std::string readingComplaint(const std::string& path, int picture = -1) {
+  return complaintOf([&] {
     CacheReader reader(path);
     PictureState state;
     if (picture >= 0) reader.read(picture, state);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
+  });
 }
 
 TEST(StateCache, KeepsEveryBitInAnyOrder) {
@@ -88,23 +86,23 @@ TEST(StateCache, WhatIsNotWholeIsRefused) {
   const std::string bytes = readFile(folder / "a");
   for (std::size_t size = 0; size < bytes.size(); size += size < 200 ? 1 : 61) {
     folder.write("cut", bytes.substr(0, size));
-    EXPECT_NE(complaintOf(folder / "cut"), "") << size;
+    EXPECT_NE(readingComplaint(folder / "cut"), "") << size;
   }
   folder.write("longer", bytes + "x");
-  EXPECT_NE(complaintOf(folder / "longer").find("cut off or broken"), std::string::npos);
+  EXPECT_NE(readingComplaint(folder / "longer").find("cut off or broken"), std::string::npos);
   // A byte changed anywhere is noticed: in the head and the tail at once, in a picture when that is read.
   for (std::size_t at = 0; at < bytes.size(); at += 7) {
     std::string changed = bytes;
     changed[at] ^= 4;
     folder.write("changed", changed);
     std::string complaint;
-    for (int n = 0; n < 3 && complaint.empty(); ++n) complaint = complaintOf(folder / "changed", n);
+    for (int n = 0; n < 3 && complaint.empty(); ++n) complaint = readingComplaint(folder / "changed", n);
     EXPECT_NE(complaint, "") << at;
   }
-  EXPECT_NE(complaintOf(folder / "none").find("none: cannot be opened"), std::string::npos);
-  EXPECT_NE(complaintOf(folder.path()), "");
+  EXPECT_NE(readingComplaint(folder / "none").find("none: cannot be opened"), std::string::npos);
+  EXPECT_NE(readingComplaint(folder.path()), "");
   folder.write("log.csv", "t,x\n0,1\n");
-  EXPECT_NE(complaintOf(folder / "log.csv").find("this is no state cache"), std::string::npos);
+  EXPECT_NE(readingComplaint(folder / "log.csv").find("this is no state cache"), std::string::npos);
 }
 
 TEST(StateCache, AppearsOnlyWhenWhole) {

@@ -151,6 +151,10 @@ std::shared_ptr<SoftBodyModel> chainModel(const Tube& tube, double surfaceShare,
   return model;
 }
 
+std::shared_ptr<SoftBodyModel> shortTube() {
+  return chainModel(straightTube(5, 0.08, 0.012, 8, 10));
+}
+
 namespace {
 
 // The sizes of the speed comparison. `scale` metres per unit.

@@ -26,6 +26,9 @@ void addLink(SoftBodyModel& m, int a, int b, double radius, double share = 1);
 // link beyond their sphere, so that all cells of an even chain are alike.
 std::shared_ptr<SoftBodyModel> chainModel(const Tube& tube, double surfaceShare = 0.2, bool closeFirstTriple = false);
 
+// Of 5 spheres and 82 nodes: 8 cm long, 24 mm across.
+std::shared_ptr<SoftBodyModel> shortTube();
+
 BodyDescription body(std::shared_ptr<const SoftBodyModel> model, double young, std::vector<FixedSphere> fixed = {});
 
 // (a) of the speed comparison: 7 spheres, 7 links, 236 nodes, 702 springs.

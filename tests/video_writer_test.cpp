@@ -6,11 +6,12 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <functional>
 #include <random>
 
 #include "render/yuv.h"
+#include "tests/complaint.h"
+#include "tests/program_run.h"
+#include "tests/temporary_folder.h"
 
 namespace medulla {
 namespace {
@@ -19,17 +20,8 @@ namespace fs = std::filesystem;
 
 class VideoWriterTest : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() /
-              ("medulla_video_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  std::size_t filesInFolder() const {
-    return std::size_t(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
-  }
+  std::string path(const std::string& name) const { return folder_ / name; }
+  std::size_t filesInFolder() const { return folder_.contents().size(); }
   static std::string outputOf(const std::string& command) {
     std::string text;
     FILE* pipe = popen(command.c_str(), "r");
@@ -39,7 +31,7 @@ class VideoWriterTest : public testing::Test {
     pclose(pipe);
     return text;
   }
-  fs::path folder_;
+  TemporaryFolder folder_;
 };
 
 Image flat(int width, int height, std::uint8_t r, std::uint8_t g, std::uint8_t b) {
@@ -50,15 +42,6 @@ Image flat(int width, int height, std::uint8_t r, std::uint8_t g, std::uint8_t b
     image.pixels[i + 2] = b;
   }
   return image;
-}
-
-std::string messageOf(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const std::runtime_error& e) {
-    return e.what();
-  }
-  return "";
 }
 
 // ITU-R BT.709, table 4: the corners of the RGB cube in limited range.
@@ -118,8 +101,7 @@ TEST_F(VideoWriterTest, EveryKindOfVideoHasEveryPicture) {
     }
   }
   // ffmpeg reads no animated WebP: its chunks are counted (RIFF container of Google's WebP specification).
-  std::ifstream file(path("a.webp"), std::ios::binary);
-  const std::string webp((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  const std::string webp = readFile(path("a.webp"));
   EXPECT_EQ(webp.substr(0, 4) + webp.substr(8, 4), "RIFFWEBP");
   int pictures = 0;
   for (std::size_t at = webp.find("ANMF"); at != std::string::npos; at = webp.find("ANMF", at + 1)) ++pictures;
@@ -137,8 +119,7 @@ TEST_F(VideoWriterTest, TheSamePicturesMakeTheSameBytes) {
         writer.write(noise);
       }
       writer.finish();
-      std::ifstream file(path(name + kind), std::ios::binary);
-      return std::string((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+      return readFile(path(name + kind));
     };
     const std::string first = bytes("first");
     EXPECT_GT(first.size(), 100u) << kind;
@@ -147,9 +128,9 @@ TEST_F(VideoWriterTest, TheSamePicturesMakeTheSameBytes) {
 }
 
 TEST_F(VideoWriterTest, WhatAKindCannotHoldIsRefused) {
-  EXPECT_EQ(messageOf([&] { VideoWriter(path("a.mp4"), 65, 32, 30); }),
+  EXPECT_EQ(complaintOf([&] { VideoWriter(path("a.mp4"), 65, 32, 30); }),
             path("a.mp4") + ": a video of 65x32 pixels, expected even numbers");
-  EXPECT_NE(messageOf([&] { VideoWriter(path("a.gif"), 64, 32, 60); }).find("more than 50"), std::string::npos);
+  EXPECT_NE(complaintOf([&] { VideoWriter(path("a.gif"), 64, 32, 60); }).find("more than 50"), std::string::npos);
   EXPECT_TRUE(isVideoName("a.webm"));
   EXPECT_FALSE(isVideoName("a.png"));
   EXPECT_EQ(filesInFolder(), 0u);
@@ -157,15 +138,13 @@ TEST_F(VideoWriterTest, WhatAKindCannotHoldIsRefused) {
 
 TEST_F(VideoWriterTest, UnfinishedFilmLeavesNothingAndKeepsTheEarlierOne) {
   for (const char* name : {"a.mp4", "a.webm", "a.gif", "a.webp"}) {
-    std::ofstream(path(name)) << "earlier";
+    folder_.write(name, "earlier");
     {
       VideoWriter writer(path(name), 64, 32, 30);
       writer.write(flat(64, 32, 1, 2, 3));
     }
     EXPECT_EQ(filesInFolder(), 1u);
-    std::string text;
-    std::getline(std::ifstream(path(name)), text);
-    EXPECT_EQ(text, "earlier");
+    EXPECT_EQ(readFile(path(name)), "earlier");
     fs::remove(path(name));
   }
 }
@@ -211,7 +190,7 @@ TEST_F(VideoWriterTest, AFullDiskIsToldAndLeavesNothing) {
   Image noise = flat(320, 160, 0, 0, 0);
   for (const char* name : {"a.mp4", "a.webm", "a.gif", "a.webp"}) {
     const FileSizeLimit limit(30000);
-    const std::string message = messageOf([&] {
+    const std::string message = complaintOf([&] {
       VideoWriter writer(path(name), 320, 160, 30);
       for (int k = 0; k < 40; ++k) {
         for (std::uint8_t& byte : noise.pixels) byte = static_cast<std::uint8_t>(random());
@@ -236,7 +215,7 @@ TEST_F(VideoWriterTest, ADiskThatIsFullAtTheEndIsTold) {
     const auto size = fs::file_size(path(name));
     fs::remove(path(name));
     const FileSizeLimit limit(std::string(name) == "a.gif" ? 64 * 32 * 15 - 1 : size - 1);  // of a GIF: what waits
-    EXPECT_EQ(messageOf([&] { write(name); }), path(name) + ": cannot be written: File too large");
+    EXPECT_EQ(complaintOf([&] { write(name); }), path(name) + ": cannot be written: File too large");
     EXPECT_EQ(filesInFolder(), 0u) << name;
   }
 }
@@ -259,10 +238,10 @@ TEST_F(VideoWriterTest, WhatEncodingTookIsKnown) {
 }
 
 TEST_F(VideoWriterTest, UnwritableTargetIsRefusedAtOnce) {
-  EXPECT_NE(messageOf([&] { VideoWriter(path("none/a.mp4"), 64, 32, 30); }).find("No such file or directory"),
+  EXPECT_NE(complaintOf([&] { VideoWriter(path("none/a.mp4"), 64, 32, 30); }).find("No such file or directory"),
             std::string::npos);
   fs::create_directories(path("b.mp4"));
-  EXPECT_NE(messageOf([&] { VideoWriter(path("b.mp4"), 64, 32, 30); }).find("folder"), std::string::npos);
+  EXPECT_NE(complaintOf([&] { VideoWriter(path("b.mp4"), 64, 32, 30); }).find("folder"), std::string::npos);
 }
 
 }  // namespace
