@@ -1,7 +1,6 @@
 #include "app/simulation.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 
 #include "app/files/input_error.h"

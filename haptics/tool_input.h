@@ -16,9 +16,9 @@ constexpr double kGripCloses = 0.5;  // a grip above this is closed, and holds w
 struct ToolSample {
   double time = 0;                                     // s
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // m, world
-  Eigen::Quaterniond worldFromTool =
-      Eigen::Quaterniond::Identity();  // the tool's shaft runs along its +z, away from the tip
-  double grip = 0;                     // 0 open .. 1 closed; closes above kGripCloses
+  // The tool's shaft runs along its +z, away from the tip.
+  Eigen::Quaterniond worldFromTool = Eigen::Quaterniond::Identity();
+  double grip = 0;  // 0 open .. 1 closed; closes above kGripCloses
 };
 
 struct Trajectory {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "physics/dynamics/body_mechanics.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/node_motion.h"
 #include "tests/dynamics_states.h"

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 namespace medulla {
 
 static Proxy touching(int triangle) {

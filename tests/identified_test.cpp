@@ -6,11 +6,9 @@
 #include <functional>
 #include <numbers>
 
-#include "physics/dynamics/body_mechanics.h"
 #include "physics/dynamics/identified_measures.h"
 #include "physics/dynamics/identified_mechanics.h"
 #include "physics/dynamics/identified_stages.h"
-#include "physics/dynamics/rest_modes.h"
 #include "tests/complaint.h"
 #include "tests/dynamics_states.h"
 #include "tests/identified_model.h"

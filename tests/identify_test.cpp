@@ -9,13 +9,11 @@
 
 #include "physics/dynamics/fixation.h"
 #include "physics/dynamics/world.h"
-#include "physics/model/build.h"
 #include "physics/model/identify/check_loads.h"
 #include "physics/model/identify/held_give.h"
 #include "physics/model/identify/hex_stiffness.h"
 #include "physics/model/identify/lbfgs.h"
 #include "physics/model/identify/reduction.h"
-#include "physics/model/identify/skin_fit.h"
 #include "physics/model/symmetric_eigen.h"
 #include "tests/complaint.h"
 #include "tests/reduced_cylinder.h"

@@ -7,7 +7,6 @@
 #include <limits>
 #include <map>
 
-#include "app/files/mesh_file.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/self_intersection.h"
 #include "tests/complaint.h"

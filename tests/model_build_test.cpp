@@ -7,8 +7,6 @@
 #include "physics/model/build.h"
 #include "physics/model/build_report.h"
 #include "physics/model/identify/necks.h"
-#include "physics/model/link_sections.h"
-#include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
 #include "physics/model/plane_section.h"
 #include "physics/model/symmetric_eigen.h"

@@ -5,7 +5,6 @@
 #include "physics/model/identify/check_loads.h"
 #include "physics/model/identify/end_loads.h"
 #include "physics/model/identify/link_fit.h"
-#include "physics/model/identify/skin_fit.h"
 #include "physics/model/symmetric_eigen.h"
 #include "tests/reduced_cylinder.h"
 

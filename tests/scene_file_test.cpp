@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <regex>
-#include <set>
 
 #include "app/files/scene_rules.h"
 #include "app/files/text_file.h"

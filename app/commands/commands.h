@@ -38,8 +38,8 @@ int runReplay(const RunOptions& options);
 
 struct RenderOptions {
   RunOptions run;
-  std::vector<std::string>
-      outputs;              // FILE.mp4, .webm, .gif, .webp, a folder for numbered PNG files; of a still FILE.png
+  // FILE.mp4, .webm, .gif, .webp, a folder for numbered PNG files; of a still FILE.png
+  std::vector<std::string> outputs;
   std::string cacheToRead;  // states of an earlier run of the same motion; empty: simulate
   ViewOptions view;
   Quality quality = Quality::standard;

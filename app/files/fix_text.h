@@ -2,7 +2,8 @@
 
 #include <string>
 
-#include "physics/model/identify/identify.h"
+#include "physics/model/identify/held_region.h"
+#include "physics/model/soft_body_model.h"
 
 namespace medulla {
 

@@ -1,6 +1,5 @@
 #include "app/files/mesh_file.h"
 
-#include <algorithm>
 #include <cctype>
 #include <filesystem>
 #include <system_error>

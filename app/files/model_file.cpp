@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cassert>
 #include <functional>
-#include <string_view>
 
 #include "app/files/identified_part.h"
 #include "app/files/model_rows.h"

@@ -1,6 +1,5 @@
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 
 #include "physics/dynamics/identified_measures.h"
 #include "physics/dynamics/identified_stages.h"

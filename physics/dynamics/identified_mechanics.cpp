@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "physics/model/cross_matrix.h"
 #include "physics/model/row_of_cells.h"

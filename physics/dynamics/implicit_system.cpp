@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 
 #include "physics/dynamics/edge_springs.h"

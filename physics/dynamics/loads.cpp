@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "physics/dynamics/anchor.h"
 #include "physics/dynamics/node_motion.h"
 #include "physics/dynamics/point_spring.h"
 #include "physics/dynamics/stages.h"

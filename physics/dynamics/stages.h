@@ -49,9 +49,9 @@ void listAwake(WorldData&);  // WorldData::awake anew
 // The memory of a batch's stages: shared with the other batches where it can be, until useWholeStageArrays().
 void shareStageArrays(WorldData&, const Batch&);
 void useWholeStageArrays(WorldData&, const Batch&);
-void frameLoadedSkins(WorldData&,
-                      const Loads& loads);  // at a frame's start: Awake::loadedSkins, and the lists after it
-void layOutRest(WorldData&);                // all bodies awake
+// At a frame's start: Awake::loadedSkins, and the lists after it.
+void frameLoadedSkins(WorldData&, const Loads& loads);
+void layOutRest(WorldData&);  // all bodies awake
 // At the end of a frame: bodies that have kept still for long enough, with all that they touch, fall asleep. `loads`
 // are the frame's: what tools hold stays awake.
 void fallAsleep(WorldData&, const Loads& loads);

@@ -24,8 +24,8 @@ struct BuildSettings {
   // % of the diagonal, 0..5; cover only: how far balls may stick out of the surface. More fills more, and bodies touch
   // by so much too early instead of sinking in by the gap. Without a value: overshootOf.
   std::optional<double> overshoot;
-  double surfaceMassFraction =
-      0.2;               // of the body's mass, carried by the surface nodes, 0..0.4; more allows larger substeps
+  // Of the body's mass, carried by the surface nodes, 0..0.4; more allows larger substeps.
+  double surfaceMassFraction = 0.2;
   int renderLevels = 2;  // 0..4 Loop subdivisions of the physics mesh for the drawn surface
 };
 

@@ -1,9 +1,7 @@
 #pragma once
 
 #include "physics/model/build.h"
-#include "physics/model/mass_properties.h"
-#include "physics/model/power_cells.h"
-#include "physics/model/surface_queries.h"
+#include "physics/model/medial_balls.h"
 
 namespace medulla {
 

@@ -1,6 +1,5 @@
 #include "physics/model/greedy_cover.h"
 
-#include <algorithm>
 #include <bit>
 #include <queue>
 

@@ -1,7 +1,6 @@
 #include "physics/model/node_volumes.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "physics/model/attachment.h"

@@ -49,11 +49,11 @@ struct Attachment {
   bool onLink = false;
   int host = 0;      // link index if onLink, else sphere index
   double along = 0;  // 0..1 from sphere0 to sphere1 of the link; 0 on a sphere
-  Eigen::Vector3d restOffset =
-      Eigen::Vector3d::Zero();  // m, model frame, from the anchor on the skeleton to the node; perpendicular to a link
-  double area = 0;              // m2, a third of the triangles around the node
-  double volume = 0;            // m3, share of the body's volume whose mass the node carries when it is dynamic
-  int massSphere = 0;           // the sphere whose cell that volume is taken from
+  // m, model frame, from the anchor on the skeleton to the node; perpendicular to a link
+  Eigen::Vector3d restOffset = Eigen::Vector3d::Zero();
+  double area = 0;     // m2, a third of the triangles around the node
+  double volume = 0;   // m3, share of the body's volume whose mass the node carries when it is dynamic
+  int massSphere = 0;  // the sphere whose cell that volume is taken from
 };
 
 // The surface that is drawn, evaluated from the nodes: x = sum w_i x_i + frame * offset, where the frame's columns are

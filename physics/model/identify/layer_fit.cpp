@@ -1,7 +1,6 @@
 #include "physics/model/identify/layer_fit.h"
 
 #include <Eigen/SparseCholesky>
-#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>

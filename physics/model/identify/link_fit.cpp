@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 
 #include "physics/model/cross_matrix.h"
 #include "physics/model/identify/lbfgs.h"
