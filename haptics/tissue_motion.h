@@ -7,11 +7,11 @@
 #include "haptics/grab.h"
 #include "haptics/proxy.h"
 
-// Where touched or held tissue is by now, ahead of the blended surface, which is a frame late. Two things are known: how
-// far the tissue moved in each of the past frames (its steps), and how the device moves. Tissue follows the device by a
-// fraction that its compliance tells. Past steps already contain the response to the device's displacement of those
-// frames; only displacement beyond that (a first touch, a change of speed) is added, times that fraction. Steps alone
-// make a first touch on soft tissue twenty times too hard for two frames.
+// Where touched or held tissue is by now, ahead of the blended surface, which is a frame late. Two things are known:
+// how far the tissue moved in each of the past frames (its steps), and how the device moves. Tissue follows the device
+// by a fraction that its compliance tells. Past steps already contain the response to the device's displacement of
+// those frames; only displacement beyond that (a first touch, a change of speed) is added, times that fraction. Steps
+// alone make a first touch on soft tissue twenty times too hard for two frames.
 namespace medulla {
 
 // Of one device while it touches or holds.
