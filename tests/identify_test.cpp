@@ -32,7 +32,7 @@ using Eigen::VectorXd;
 
 VoxelBody voxelsOf(const TriangleMesh& mesh, double cellSize) {
   const double volume = massProperties(mesh).volume, voxel = cellSize / HexGrid::kVoxels;
-  return voxelise(mesh, volume, static_cast<int>(volume / (voxel * voxel * voxel)));
+  return voxeliseEvenly(mesh, volume, static_cast<int>(volume / (voxel * voxel * voxel)));
 }
 
 HeldRegion endOfCylinder(const TriangleMesh& mesh) {
@@ -77,6 +77,26 @@ TEST(HexGrid, CutCellsStoreWhatConstantStrainSays) {
     cut += grid.fractions[c] < 0.99;
   }
   EXPECT_GT(cut, 30);
+}
+
+// Thickness cubed bends a plate: the second moment across it, of the material that cells are filled with.
+TEST(HexGrid, APlateIsAsThickWhicheverWayItLies) {
+  const double length = 0.2, thickness = 0.01;
+  for (int across = 0; across < 3; ++across) {
+    Vector3d size = Vector3d::Constant(length);
+    size[across] = thickness;
+    const HexGrid grid = makeHexGrid(voxelsOf(boxMesh(size), 0.0064));
+    double second = 0;
+    for (std::size_t c = 0; c < grid.cells.size(); ++c) {
+      for (int q = 0; q < kHexGauss; ++q) {
+        const std::array<int, 3> at = {q / 25, q / 5 % 5, q % 5};
+        const double x =
+            grid.low[across] + grid.size * (grid.cells[c][across] + fivePointRule().points[at[across]]) - thickness / 2;
+        second += std::pow(grid.size, 3) * grid.weights(q, static_cast<Index>(c)) * x * x;
+      }
+    }
+    EXPECT_NEAR(second / (length * length * std::pow(thickness, 3) / 12), 1, 0.015) << across;
+  }
 }
 
 TEST(VoxelSolid, UniformTractionStrainsAFreeBodyUniformly) {

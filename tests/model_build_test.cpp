@@ -53,7 +53,7 @@ TEST(PowerCells, SumToTheBodyAndVoxelsAloneAreClose) {
   const MassProperties exact = massProperties(mesh);
   const VoxelBody voxels = voxelise(mesh, exact.volume, 60000);
   double volume = 0;
-  for (const VoxelPiece& piece : voxels.pieces) volume += voxels.size * voxels.size * piece.height;
+  for (const VoxelPiece& piece : voxels.pieces) volume += piece.volume;
   EXPECT_NEAR(volume / exact.volume, 1, 1e-3);
   const PowerCells cells = divideByPower(voxels, {{{-0.02, 0, 0}, 0.015}, {{0.015, 0, 0}, 0.018}}, exact);
   const MassProperties sum = combined(cells.cells);

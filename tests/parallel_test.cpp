@@ -22,7 +22,7 @@ using Eigen::MatrixXd;
 HexGrid ellipsoidGrid(double cellSize) {
   const TriangleMesh mesh = ellipsoidMesh(3, {0.06, 0.03, 0.03});
   const double volume = massProperties(mesh).volume;
-  return makeHexGrid(voxelise(mesh, volume, static_cast<int>(volume / std::pow(cellSize / HexGrid::kVoxels, 3))));
+  return makeHexGrid(voxeliseEvenly(mesh, volume, static_cast<int>(volume / std::pow(cellSize / HexGrid::kVoxels, 3))));
 }
 
 // With cells enough for halves on threads of their own.

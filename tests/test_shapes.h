@@ -49,6 +49,15 @@ inline TriangleMesh ellipsoidMesh(int levels, const Eigen::Vector3d& halfAxes) {
   return mesh;
 }
 
+// From the origin, of twelve triangles.
+inline TriangleMesh boxMesh(const Eigen::Vector3d& size) {
+  TriangleMesh mesh;
+  for (int k = 0; k < 8; ++k) mesh.vertices.push_back(size.cwiseProduct(Eigen::Vector3d(k & 1, k >> 1 & 1, k >> 2)));
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
 // A straight round tube along +x from 0 to `length` with flat ends.
 inline TriangleMesh cylinderMesh(double length, double radius, int around, int along) {
   TriangleMesh mesh;

@@ -133,7 +133,7 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
       for (int l = 0; l < 3; ++l) put(6 * i + 3 + k, 6 * i + 3 + l, cells.inertia[i](k, l));
     }
   }
-  const RestRates free = freeOnly(freedom, count), rates = links * free;
+  const RestRates toFree = freeOnly(freedom, count), rates = links * toFree;
   Eigen::SparseMatrix<double> k = rates.transpose() * rates;
   Eigen::SparseMatrix<double> mm(count, count);
   mm.setFromTriplets(mass.begin(), mass.end());
@@ -141,7 +141,7 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
   // Inverse iteration, rigid motions projected out; a shift far below any mode keeps the factorisation regular.
   MatrixXd rigid = holdsByLinks(body, mechanics) ? MatrixXd(count, 0) : freeRigidMotions(m, {}, freedom, count);
   if (rigid.cols() > 0 && holdsByNodes(body)) {  // what the spheres leave free, held nodes hold by their attachments
-    const RestRates attachments = heldAttachmentRates(body, mechanics) * free;
+    const RestRates attachments = heldAttachmentRates(body, mechanics) * toFree;
     k += Eigen::SparseMatrix<double>(attachments.transpose() * attachments);
     rigid = freeRigidMotions(m, heldNodes(body), freedom, count);
   }

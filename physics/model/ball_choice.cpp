@@ -45,7 +45,7 @@ static CoverTargets targetsOf(const BodyShape& shape, int count) {
     targets.surface.insert(targets.surface.end(), shape.mesh.vertices.begin(), shape.mesh.vertices.end());
   const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, std::max(20000, 30 * count));
   for (const VoxelPiece& piece : voxels.pieces)
-    if (piece.height > voxels.size / 2) targets.volume.push_back(piece.centre);
+    if (piece.extent.z() > voxels.size / 2) targets.volume.push_back(piece.centre);
   return targets;
 }
 

@@ -67,12 +67,12 @@ void measureCover(const SoftBodyModel& model, const std::vector<Ball>& balls, co
                   BuildReport& report) {
   double total = 0, inBalls = 0, inCones = 0;
   for (const VoxelPiece& piece : voxels.pieces) {
-    total += piece.height;
+    total += piece.volume;
     if (distanceToBalls(piece.centre, balls) <= 0) {
-      inBalls += piece.height;
-      inCones += piece.height;
+      inBalls += piece.volume;
+      inCones += piece.volume;
     } else if (distanceToCones(piece.centre, balls, model.links) <= 0) {
-      inCones += piece.height;
+      inCones += piece.volume;
     }
   }
   report.cover = inBalls / total * 100;

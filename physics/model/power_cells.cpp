@@ -78,8 +78,80 @@ void addSpan(VoxelBody& body, const Columns& columns, int i, int j, double low, 
     if (at < 0) at = static_cast<int>(body.pieces.size());
     body.pieces.push_back({{i, j, k},
                            {columns.origin.x() + i * body.size, columns.origin.y() + j * body.size, (bottom + top) / 2},
-                           top - bottom});
+                           {body.size, body.size, top - bottom},
+                           body.size * body.size * (top - bottom)});
   }
+}
+
+// Empty voxels around the mesh, and their columns.
+Columns layOutVoxels(const TriangleMesh& mesh, double volume, int target, VoxelBody& body) {
+  body.size = voxelSize(volume, target);
+  Eigen::AlignedBox3d box;
+  for (const std::array<int, 3>& t : mesh.triangles)
+    for (const int corner : t) box.extend(mesh.vertices[corner]);
+  for (int a = 0; a < 3; ++a) body.count[a] = static_cast<int>(box.sizes()[a] / body.size) + 2;
+  Columns columns{
+      box.min() - Vector3d(0.31, 0.27, 0.5) * body.size, body.size, body.count[0] + 1, body.count[1] + 1, {}};
+  body.low = columns.origin - Vector3d(0.5, 0.5, 0) * body.size;
+  body.count = {columns.countX, columns.countY, body.count[2] + 1};
+  body.pieceAt.assign(static_cast<std::size_t>(body.count[0]) * body.count[1] * body.count[2], -1);
+  return columns;
+}
+
+// Sorted, pairs of them enclose what is inside.
+void cutMesh(const TriangleMesh& mesh, Columns& columns) {
+  columns.crossings.resize(static_cast<std::size_t>(columns.countX) * columns.countY);
+  for (const std::array<int, 3>& t : mesh.triangles)
+    cutColumns({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]}, columns);
+  for (std::vector<double>& z : columns.crossings) std::sort(z.begin(), z.end());
+}
+
+// Lines that sample a column of voxels, laid out as rooks of which none attacks another: each has an x and a y of its
+// own, so that a face along z, wherever it cuts the column, is found to a part in kRooks. A lattice whose points are
+// far apart; its columns stand for strips a part in kRooks wide along x and along y.
+constexpr int kRooks = 32, kRookStep = 7;
+
+Vector3d rookOffset(int n) {
+  return {(n + 0.5) / kRooks - 0.5, (n * kRookStep % kRooks + 0.5) / kRooks - 0.5, 0};
+}
+
+// What of a voxel is inside, in voxels and about the voxel's middle.
+struct VoxelSums {
+  double part = 0;
+  Vector3d first = Vector3d::Zero(), second = Vector3d::Zero();  // integrals of x and x^2 along each axis
+
+  void add(const Vector3d& rook, double bottom, double top) {
+    constexpr double strip = 1. / kRooks;
+    const double height = top - bottom, share = height * strip;
+    const Vector3d at(rook.x(), rook.y(), (bottom + top) / 2);
+    part += share;
+    first += share * at;
+    second += share * (at.cwiseProduct(at) + Vector3d(strip * strip, strip * strip, height * height) / 12);
+  }
+};
+
+void addSums(const std::vector<double>& crossings, double floor, double size, const Vector3d& rook,
+             std::vector<VoxelSums>& sums) {
+  for (std::size_t s = 0; s + 1 < crossings.size(); s += 2) {
+    const double low = (crossings[s] - floor) / size, high = (crossings[s + 1] - floor) / size;
+    const int first = std::max(0, static_cast<int>(std::floor(low)));
+    const int last = std::min(static_cast<int>(sums.size()) - 1, static_cast<int>(std::floor(high)));
+    for (int k = first; k <= last; ++k) {
+      const double bottom = std::max(low - k, 0.) - 0.5, top = std::min(high - k, 1.) - 0.5;
+      if (top > bottom) sums[k].add(rook, bottom, top);
+    }
+  }
+}
+
+// A box has a twelfth of its squared extent for variance.
+VoxelPiece pieceOf(const VoxelSums& sums, const std::array<int, 3>& index, const VoxelBody& body) {
+  const Vector3d middle = body.low + body.size * (Vector3d(index[0], index[1], index[2]) + Vector3d::Constant(0.5));
+  const double voxel = body.size * body.size * body.size;
+  if (sums.part > 1 - 1e-9) return {index, middle, Vector3d::Constant(body.size), voxel};
+  const Vector3d centre = sums.first / sums.part;
+  const Vector3d variance = sums.second / sums.part - centre.cwiseProduct(centre);
+  const Vector3d extent = (12 * variance).cwiseMax(1e-8).cwiseMin(1).cwiseSqrt();
+  return {index, middle + body.size * centre, body.size * extent, sums.part * voxel};
 }
 
 }  // namespace
@@ -90,24 +162,36 @@ double voxelSize(double volume, int target) {
 
 VoxelBody voxelise(const TriangleMesh& mesh, double volume, int target) {
   VoxelBody body;
-  body.size = voxelSize(volume, target);
-  Eigen::AlignedBox3d box;
-  for (const std::array<int, 3>& t : mesh.triangles)
-    for (const int corner : t) box.extend(mesh.vertices[corner]);
-  for (int a = 0; a < 3; ++a) body.count[a] = static_cast<int>(box.sizes()[a] / body.size) + 2;
-  Columns columns{
-      box.min() - Vector3d(0.31, 0.27, 0.5) * body.size, body.size, body.count[0] + 1, body.count[1] + 1, {}};
-  body.low = columns.origin - Vector3d(0.5, 0.5, 0) * body.size;
-  body.count = {columns.countX, columns.countY, body.count[2] + 1};
-  columns.crossings.resize(static_cast<std::size_t>(columns.countX) * columns.countY);
-  for (const std::array<int, 3>& t : mesh.triangles)
-    cutColumns({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]}, columns);
-  body.pieceAt.assign(static_cast<std::size_t>(body.count[0]) * body.count[1] * body.count[2], -1);
+  Columns columns = layOutVoxels(mesh, volume, target, body);
+  cutMesh(mesh, columns);
   for (int i = 0; i < columns.countX; ++i) {
     for (int j = 0; j < columns.countY; ++j) {
-      std::vector<double>& z = columns.crossings[static_cast<std::size_t>(i) * columns.countY + j];
-      std::sort(z.begin(), z.end());
+      const std::vector<double>& z = columns.crossings[static_cast<std::size_t>(i) * columns.countY + j];
       for (std::size_t s = 0; s + 1 < z.size(); s += 2) addSpan(body, columns, i, j, z[s], z[s + 1]);
+    }
+  }
+  return body;
+}
+
+VoxelBody voxeliseEvenly(const TriangleMesh& mesh, double volume, int target) {
+  VoxelBody body;
+  std::vector<Columns> rooks(kRooks, layOutVoxels(mesh, volume, target, body));
+  for (int n = 0; n < kRooks; ++n) {
+    rooks[n].origin += body.size * rookOffset(n);
+    cutMesh(mesh, rooks[n]);
+  }
+  std::vector<VoxelSums> sums;
+  std::size_t column = 0;
+  for (int i = 0; i < body.count[0]; ++i) {
+    for (int j = 0; j < body.count[1]; ++j, ++column) {
+      sums.assign(body.count[2], {});
+      for (int n = 0; n < kRooks; ++n)
+        addSums(rooks[n].crossings[column], body.low.z(), body.size, rookOffset(n), sums);
+      for (int k = 0; k < body.count[2]; ++k) {
+        if (sums[k].part <= 0) continue;
+        if (sums[k].part >= 0.5) body.pieceAt[column * body.count[2] + k] = static_cast<int>(body.pieces.size());
+        body.pieces.push_back(pieceOf(sums[k], {i, j, k}, body));
+      }
     }
   }
   return body;
@@ -171,12 +255,11 @@ PowerSites sitesAround(const PowerSites& sites, std::pair<int, int> pair) {
 static std::vector<MassProperties> integrate(const VoxelBody& body, const std::vector<int>& cellOfPiece,
                                              std::size_t count) {
   std::vector<MassProperties> cells(count);
-  const double face = body.size * body.size;
   for (std::size_t p = 0; p < body.pieces.size(); ++p) {
     const VoxelPiece& piece = body.pieces[p];
     MassProperties& cell = cells[cellOfPiece[p]];
-    cell.volume += face * piece.height;
-    cell.centroid += face * piece.height * piece.centre;
+    cell.volume += piece.volume;
+    cell.centroid += piece.volume * piece.centre;
   }
   for (MassProperties& cell : cells)
     if (cell.volume > 0) cell.centroid /= cell.volume;
@@ -184,10 +267,10 @@ static std::vector<MassProperties> integrate(const VoxelBody& body, const std::v
     const VoxelPiece& piece = body.pieces[p];
     MassProperties& cell = cells[cellOfPiece[p]];
     const Vector3d r = piece.centre - cell.centroid;
-    const Vector3d own(face / 12, face / 12, piece.height * piece.height / 12);  // of a box about its centre
+    const Vector3d own = piece.extent.cwiseProduct(piece.extent) / 12;  // of a box about its centre
     Eigen::Matrix3d moment = r * r.transpose();
     moment.diagonal() += own;
-    cell.secondMoment += face * piece.height * moment;
+    cell.secondMoment += piece.volume * moment;
   }
   return cells;
 }
@@ -214,7 +297,7 @@ static std::map<std::pair<int, int>, double> contactAreas(const VoxelBody& body,
   for (std::size_t p = 0; p < body.pieces.size(); ++p) {
     const VoxelPiece& piece = body.pieces[p];
     const std::size_t at = piece.index[0] * stride[0] + piece.index[1] * stride[1] + piece.index[2];
-    if (body.pieceAt[at] != static_cast<int>(p)) continue;  // a second piece of the same voxel
+    if (body.pieceAt[at] != static_cast<int>(p)) continue;
     for (int a = 0; a < 3; ++a) {
       if (piece.index[a] + 1 >= body.count[a]) continue;
       const int neighbour = body.pieceAt[at + stride[a]];

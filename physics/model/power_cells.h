@@ -11,11 +11,12 @@
 
 namespace medulla {
 
-// A piece of a voxel inside the mesh: the whole of it in x and y, exact in z.
+// What of a voxel lies inside the mesh, as a box.
 struct VoxelPiece {
   std::array<int, 3> index;  // of the voxel
   Eigen::Vector3d centre;    // m
-  double height = 0;         // m, along z, at most the voxel's size
+  Eigen::Vector3d extent;    // m, along x, y and z, at most the voxel's size
+  double volume = 0;         // m3; may be less than the box's, which is then filled thinly
 };
 
 struct VoxelBody {
@@ -23,15 +24,21 @@ struct VoxelBody {
   Eigen::Vector3d low = Eigen::Vector3d::Zero();  // m, corner of voxel (0, 0, 0)
   std::array<int, 3> count{};
   std::vector<VoxelPiece> pieces;  // by x, y, then z
-  std::vector<int> pieceAt;        // first piece of voxel (i * count[1] + j) * count[2] + k, -1 where empty
+  std::vector<int> pieceAt;        // piece of voxel (i * count[1] + j) * count[2] + k that counts for faces, or -1
 };
 
 // The edge of `target` voxels of that volume (m3) together.
 double voxelSize(double volume, int target);
 
 // The solid inside a closed mesh of that volume (m3) as about `target` voxels. Every column is cut exactly along z, so
-// that the volume converges faster than by counting voxels.
+// that the volume converges faster than by counting voxels, and is whole or empty along x and y. A voxel may have
+// several pieces, of which the first counts for faces.
 VoxelBody voxelise(const TriangleMesh& mesh, double volume, int target);
+
+// The same with one piece for every voxel, which has the volume, the centroid and the second moments along the axes of
+// what is inside, nearly alike along all of them: a plate is as thick whichever way it lies. Many times the work.
+// Voxels that are half inside count for faces.
+VoxelBody voxeliseEvenly(const TriangleMesh& mesh, double volume, int target);
 
 // Voxels that give the cells of so many spheres their volumes and contacts.
 constexpr int voxelsFor(int spheres) {

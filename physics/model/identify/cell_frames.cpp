@@ -39,10 +39,9 @@ SharedPart& partOf(std::vector<SharedPart>& parts, int frame) {
 // r^T.
 void integrate(const VoxelSolid& solid, const std::vector<int>& frameOfPiece, const Vector3d& origin,
                std::vector<std::vector<SharedPart>>& parts, std::vector<RawCell>& cells, std::vector<RawCell>& held) {
-  const double face = solid.voxels.size * solid.voxels.size;
   for (std::size_t p = 0; p < solid.voxels.pieces.size(); ++p) {
     const VoxelPiece& piece = solid.voxels.pieces[p];
-    const double volume = face * piece.height;
+    const double volume = piece.volume;
     const Vector3d x = piece.centre - origin;
     const auto sum = [&](RawCell& cell) {
       cell.volume += volume;

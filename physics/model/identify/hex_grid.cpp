@@ -19,24 +19,23 @@ std::array<double, 6> legendre(double x) {
   return p;
 }
 
-// Five weights that integrate polynomials up to the fourth degree over [from, to] of 0..1 by their values at the Gauss
-// points of the whole: the projection on Legendre polynomials, whose antiderivative is (P[n+1] - P[n-1]) / (2 n + 1).
-std::array<double, 5> partWeights(double from, double to) {
+using AxisWeights = std::array<double, 5>;
+
+// Five weights that give the mean of polynomials up to the fourth degree over [from, to] of 0..1 by their values at the
+// Gauss points of the whole: the projection on Legendre polynomials, whose antiderivative is (P[n+1] - P[n-1]) / (2 n +
+// 1).
+AxisWeights meanWeights(double from, double to) {
   const std::array<double, 6> high = legendre(2 * to - 1), low = legendre(2 * from - 1);
   std::array<double, 5> moments;  // (2 n + 1) times the integral of P[n] over the part
   moments[0] = 2 * (to - from);
   for (int n = 1; n < 5; ++n) moments[n] = high[n + 1] - high[n - 1] - low[n + 1] + low[n - 1];
   const GaussRule& rule = fivePointRule();
-  std::array<double, 5> weights{};
+  AxisWeights weights{};
   for (int i = 0; i < 5; ++i) {
     const std::array<double, 6> at = legendre(2 * rule.points[i] - 1);
-    for (int n = 0; n < 5; ++n) weights[i] += rule.weights[i] / 2 * at[n] * moments[n];
+    for (int n = 0; n < 5; ++n) weights[i] += rule.weights[i] / (2 * (to - from)) * at[n] * moments[n];
   }
   return weights;
-}
-
-std::array<double, 5> voxelWeights(int voxel) {
-  return partWeights(static_cast<double>(voxel) / HexGrid::kVoxels, (voxel + 1.) / HexGrid::kVoxels);
 }
 
 void numberNodes(HexGrid& grid) {
@@ -92,11 +91,11 @@ std::size_t indexOf(const HexGrid& grid, const std::array<int, 3>& c) {
 
 // Of all pieces that count, in those that are large enough.
 void layOutCells(const VoxelBody& voxels, const std::vector<bool>& counts, HexGrid& grid) {
-  constexpr int n = HexGrid::kVoxels;
+  const double cell = grid.size * grid.size * grid.size;
   std::vector<double> inside(static_cast<std::size_t>(grid.count[0]) * grid.count[1] * grid.count[2], 0);
   for (std::size_t p = 0; p < voxels.pieces.size(); ++p) {
     const VoxelPiece& piece = voxels.pieces[p];
-    if (counts[p]) inside[indexOf(grid, cellOf(piece))] += piece.height / voxels.size / (n * n * n);
+    if (counts[p]) inside[indexOf(grid, cellOf(piece))] += piece.volume / cell;
   }
   grid.cellAt.assign(inside.size(), -1);
   for (int i = 0; i < grid.count[0]; ++i) {
@@ -114,28 +113,24 @@ void layOutCells(const VoxelBody& voxels, const std::vector<bool>& counts, HexGr
 
 void addGaussWeights(const VoxelBody& voxels, const std::vector<bool>& counts, HexGrid& grid) {
   constexpr int n = HexGrid::kVoxels;
-  std::array<std::array<double, 5>, n> across;
-  for (int v = 0; v < n; ++v) across[v] = voxelWeights(v);
-  struct Layer {
-    double centre = 0, height = 0;
-    std::array<double, 5> weights{};
-  };
-  std::vector<Layer> layers(voxels.count[2]);  // most pieces are as high as the one before them in their layer
+  std::array<AxisWeights, n> ofWholeVoxel;  // most pieces are
+  for (int v = 0; v < n; ++v) ofWholeVoxel[v] = meanWeights(static_cast<double>(v) / n, (v + 1.) / n);
+  const double whole = grid.size * grid.size * grid.size;
   for (std::size_t p = 0; p < voxels.pieces.size(); ++p) {
     const VoxelPiece& piece = voxels.pieces[p];
     const int cell = grid.cellAt[indexOf(grid, cellOf(piece))];
     if (cell < 0 || !counts[p]) continue;
-    Layer& layer = layers[piece.index[2]];
-    if (layer.centre != piece.centre.z() || layer.height != piece.height) {
-      const double middle = (piece.centre.z() - grid.low.z()) / grid.size - grid.cells[cell][2];
-      const double half = piece.height / grid.size / 2;
-      layer = {piece.centre.z(), piece.height, partWeights(middle - half, middle + half)};
-    }
-    const std::array<double, 5>&x = across[piece.index[0] % n], &y = across[piece.index[1] % n], &z = layer.weights;
+    const auto along = [&](int a) {
+      if (piece.extent[a] == voxels.size) return ofWholeVoxel[piece.index[a] % n];
+      const double middle = (piece.centre[a] - grid.low[a]) / grid.size - grid.cells[cell][a];
+      const double half = piece.extent[a] / grid.size / 2;
+      return meanWeights(middle - half, middle + half);
+    };
+    const AxisWeights x = along(0), y = along(1), z = along(2);
     double* weight = grid.weights.col(cell).data();
     for (int i = 0; i < 5; ++i) {
       for (int j = 0; j < 5; ++j) {
-        const double xy = x[i] * y[j];
+        const double xy = piece.volume / whole * x[i] * y[j];
         for (int k = 0; k < 5; ++k) *weight++ += xy * z[k];
       }
     }

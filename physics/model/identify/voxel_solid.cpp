@@ -250,7 +250,7 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
                           const std::function<void(double)>& progress) {
   VoxelSolid solid;
   const double volume = massProperties(mesh).volume;
-  solid.voxels = voxelise(mesh, volume, voxelsFor(volume, cellSize));
+  solid.voxels = voxeliseEvenly(mesh, volume, voxelsFor(volume, cellSize));
   const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
   for (const VoxelPiece& piece : solid.voxels.pieces) solid.isBehind.push_back(behind(piece.centre));
   solid.grid = makeHexGrid(solid.voxels, solid.isBehind);
