@@ -41,6 +41,19 @@ std::string place(const Eigen::Vector3d& p) {
   return fmt::format("({:.4g} {:.4g} {:.4g}) m", p.x(), p.y(), p.z());
 }
 
+double totalLength(const std::vector<TriangleCut>& cuts) {
+  double length = 0;
+  for (const TriangleCut& cut : cuts) length += cut.length;
+  return length;
+}
+
+std::string describe(const TriangleMesh& mesh, const std::vector<TriangleCut>& cuts) {
+  const auto& first = mesh.triangles[cuts[0].triangle0];
+  return fmt::format("the surface cuts through itself along {} ({} of triangles, the first near {})",
+                     millimetres(totalLength(cuts)), counted(cuts.size(), "pair", "pairs"),
+                     place((mesh.vertices[first[0]] + mesh.vertices[first[1]] + mesh.vertices[first[2]]) / 3));
+}
+
 }  // namespace
 
 std::string millimetres(double length) {
@@ -140,25 +153,24 @@ void requireVolume(const MeshUnderRepair& repair) {
                                        millimetres(thickness), millimetres(diagonal)));
 }
 
+// Pieces that cut each other are neither one body nor a body with a cavity, however short the cut; taken for a cavity,
+// one would leave the other a volume that says nothing.
+void requireApart(const MeshUnderRepair& repair) {
+  int components = 0;
+  const std::vector<int> component = componentOfTriangles(repair.mesh, components);
+  if (components == 1) return;
+  std::vector<TriangleCut> cuts = findSelfIntersections(repair.mesh);
+  std::erase_if(cuts, [&](const TriangleCut& c) { return component[c.triangle0] == component[c.triangle1]; });
+  if (!cuts.empty())
+    throw std::runtime_error(describe(repair.mesh, cuts) + ": separate pieces overlap, expected one closed surface");
+}
+
 void judgeSelfIntersections(MeshUnderRepair& repair) {
   const std::vector<TriangleCut> cuts = findSelfIntersections(repair.mesh);
   if (cuts.empty()) return;
-  double length = 0;
-  int components = 0;
-  const std::vector<int> component = componentOfTriangles(repair.mesh, components);
-  bool betweenComponents = false;
-  for (const TriangleCut& cut : cuts) {
-    length += cut.length;
-    betweenComponents = betweenComponents || component[cut.triangle0] != component[cut.triangle1];
-  }
-  const auto& first = repair.mesh.triangles[cuts[0].triangle0];
-  const std::string finding = fmt::format(
-      "the surface cuts through itself along {} ({} of triangles, the first near {})", millimetres(length),
-      counted(cuts.size(), "pair", "pairs"),
-      place((repair.mesh.vertices[first[0]] + repair.mesh.vertices[first[1]] + repair.mesh.vertices[first[2]]) / 3));
-  // Pieces that cut each other are neither one body nor a body with a cavity, however short the cut.
-  if (betweenComponents) throw std::runtime_error(finding + ": separate pieces overlap, expected one closed surface");
-  if (length > kSmallCuts * boundsDiagonal(repair.mesh)) throw std::runtime_error(finding + ", expected none");
+  const std::string finding = describe(repair.mesh, cuts);
+  if (totalLength(cuts) > kSmallCuts * boundsDiagonal(repair.mesh))
+    throw std::runtime_error(finding + ", expected none");
   repair.notes.push_back(finding);
 }
 

@@ -19,6 +19,7 @@ RepairedMesh repairMesh(const TriangleMesh& input) {
   fillSmallHoles(repair);
   splitPinchedVertices(repair);
   flipTrianglesWithoutArea(repair);
+  requireApart(repair);
   orientBodyAndCavities(repair);
   requireVolume(repair);
   judgeSelfIntersections(repair);

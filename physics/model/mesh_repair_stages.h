@@ -36,6 +36,7 @@ void fillSmallHoles(MeshUnderRepair& repair);         // mesh_holes.cpp; afterwa
 void splitPinchedVertices(MeshUnderRepair& repair);
 void flipTrianglesWithoutArea(MeshUnderRepair& repair);
 
+void requireApart(const MeshUnderRepair& repair);     // pieces do not overlap (mesh_refusal.cpp)
 void orientBodyAndCavities(MeshUnderRepair& repair);  // one body, outward; cavities inward (mesh_orientation.cpp)
 
 // mesh_refusal.cpp
