@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "physics/model/rotation_between.h"
+#include "physics/model/surface_queries.h"
 
 namespace medulla {
 
@@ -18,9 +19,10 @@ using Eigen::Vector3d;
 // Where things are on the body; everything else follows from these and from its size.
 struct Layout {
   Eigen::AlignedBox3d box;
-  double size = 0;  // m, the box's diagonal
-  int axis = 0;     // of the box's longest side
-  double held = 0;  // -1 or 1: which end along the axis
+  double size = 0;   // m, the box's diagonal
+  double grain = 0;  // m, what the tool's own size and ways go by: `size`, on a thin body what its thickness asks for
+  int axis = 0;      // of the box's longest side
+  double held = 0;   // -1 or 1: which end along the axis
   Vector3d touch = Vector3d::Zero(), normal = Vector3d::UnitZ();
 };
 
@@ -62,6 +64,20 @@ double volumeBeyond(const SoftBodyModel& m, const Layout& l, double end) {
   return volume;
 }
 
+// On a tube or a plate of a hundredth of its length a tool made for its length would close far behind it. So at most
+// 0.08 kThicknesses, two thirds of the thickness, lie between where the grip touches and where it has closed.
+constexpr double kThicknesses = 8;
+
+// Of the sphere there what lies inside: of a thin body's most may stick out.
+double thicknessAt(const SoftBodyModel& m, const Vector3d& point) {
+  const auto distance = [&](const FillingSphere& s) { return (s.restBallCentre - point).norm() - s.radius; };
+  const auto nearest =
+      std::min_element(m.spheres.begin(), m.spheres.end(),
+                       [&](const FillingSphere& a, const FillingSphere& b) { return distance(a) < distance(b); });
+  const SurfaceTree surface = makeSurfaceTree({m.restNodes, m.triangles});
+  return 2 * std::min(nearest->radius, closestPoint(surface, nearest->restBallCentre).distance);
+}
+
 // Held at the upper end where the body stands, otherwise at the bulkier one: a tail would not hold it.
 Layout layOutScene(const SoftBodyModel& m) {
   Layout l;
@@ -73,6 +89,7 @@ Layout layOutScene(const SoftBodyModel& m) {
   const int node = touchedNode(m, l, normals);
   l.touch = m.restNodes[node];
   l.normal = normals[node];
+  l.grain = std::min(l.size, kThicknesses * thicknessAt(m, l.touch));
   return l;
 }
 
@@ -117,8 +134,8 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
       "  <tool name=\"{}\" trajectory=\"{}.csv\" radius=\"{:.3g}\" stiffness=\"{:.3g}\" damping=\"{:.3g}\" "
       "friction=\"0.3 0.2\"\n        force_max=\"{:.3g}\" grip_force_max=\"{:.3g}\" "
       "grip_radius=\"{:.3g}\"/>\n",
-      name == "grasper" ? "tool" : "grasper", name, 0.03 * l.size, 0.6 * young * l.size, std::pow(scale, 2.5),
-      8 * std::pow(scale, 3), 8 * std::pow(scale, 3), 0.08 * l.size);
+      name == "grasper" ? "tool" : "grasper", name, 0.03 * l.grain, 0.6 * young * l.size, std::pow(scale, 2.5),
+      8 * std::pow(scale, 3), 8 * std::pow(scale, 3), 0.08 * l.grain);
   out += fmt::format("  <camera position=\"{}\" target=\"{}\" fov=\"{}\"/>\n",
                      vectorText(centre + distance * Vector3d::UnitZ()), vectorText(centre), fov);
   out += fmt::format("  <light offset=\"{}\" reference_distance=\"{:.3g}\"/>\n",
@@ -141,9 +158,10 @@ std::string trajectoryText(const Layout& l) {
     out += fmt::format("{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{}\n", t, x.x(), x.y(), x.z(), q.w(), q.x(),
                        q.y(), q.z(), grip);
   };
-  const auto above = [&](double share) -> Vector3d { return l.touch + share * l.size * l.normal; };
+  const auto above = [&](double share) -> Vector3d { return l.touch + share * l.grain * l.normal; };
+  const Vector3d far = l.touch + 0.4 * l.size * l.normal;
   out += "# approach\n";
-  key(0, above(0.4), straight, 0);
+  key(0, far, straight, 0);
   key(1, above(0.06), straight, 0.3);
   out += "# press and hold\n";
   key(1.8, above(-0.05), straight, 0.3);
@@ -160,7 +178,7 @@ std::string trajectoryText(const Layout& l) {
   key(6.7, pulled, twisted, 1);
   out += "# let go and leave\n";
   key(6.8, pulled, twisted, 0);
-  key(8, above(0.4), straight, 0);
+  key(8, far, straight, 0);
   return out;
 }
 
