@@ -99,6 +99,16 @@ TEST(HexGrid, APlateIsAsThickWhicheverWayItLies) {
   }
 }
 
+// Beyond the answers of finite elements there are fits to thousands of nodes: they tell how far they are, too.
+TEST(Identify, FitsOfTheSurfaceSayThatTheyGoOn) {
+  int calls = 0;
+  identifyNetwork(cylinderModel(), {endOfCylinder(cylinder())}, {}, [&](double part) {
+    calls += part > 0.93 && part < 1;
+    EXPECT_LE(part, 1);
+  });
+  EXPECT_GT(calls, 10);
+}
+
 TEST(VoxelSolid, UniformTractionStrainsAFreeBodyUniformly) {
   const TriangleMesh mesh = ellipsoidMesh(4, {0.05, 0.04, 0.03});
   const double poisson = 0.3;

@@ -4,7 +4,9 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <stdexcept>
 
@@ -224,6 +226,24 @@ class Trials {
   MatrixXd rigid_, weighted_, felt_, feltWeighted_;
 };
 
+// Calls `progress` at every trial of a fit, of which nobody knows how many there will be: nearer and nearer to the end
+// of its part.
+class FitProgress {
+ public:
+  FitProgress(const Progress& progress, double from, double length)
+      : progress_(progress), from_(from), length_(length), trials_(std::make_shared<int>(0)) {}
+  void operator()() const {
+    constexpr double kUsual = 10;
+    const double trials = ++*trials_;
+    progress_(from_ + length_ * trials / (trials + kUsual));
+  }
+
+ private:
+  const Progress& progress_;
+  double from_, length_;
+  std::shared_ptr<int> trials_;  // of all copies
+};
+
 // What finite elements say of a body and its cells.
 struct Solved {
   const TriangleMesh& mesh;
@@ -240,7 +260,7 @@ struct Solved {
 // few spheres are. Each skin is judged with the layer that goes with it: maps that take over a part of the dents are
 // the nearer without one. Of an end that is twisted beyond its frame no random load says anything.
 void chooseSkin(const Solved& solved, const Trials& trials, const RowMatrix& forces, const MatrixXd& under,
-                IdentifiedNetwork& out) {
+                IdentifiedNetwork& out, const Progress& progress) {
   constexpr double kScatter = 0.025;
   constexpr double kTwist = 30;  // at unit energy, as each of the loads on the frames; 30 to 100 differ little
   const auto& [mesh, solid, larger, cells, responses, ends] = solved;
@@ -249,11 +269,16 @@ void chooseSkin(const Solved& solved, const Trials& trials, const RowMatrix& for
   double first = 0, second = 0;
   std::vector<std::vector<SkinFrame>> skin;
   IdentifiedLayer layer;
-  for (const double weight : {0., 3., 10., 100., 300.}) {
+  constexpr int count = 5;
+  constexpr std::array<double, count> weights = {0, 3, 10, 100, 300};
+  for (int k = 0; k < count; ++k) {
+    const double weight = weights[k];
+    const FitProgress trying(progress, 1. * k / count, 1. / count);
     out.skin = fitSkin(mesh, cells, out.patches,
                        responses.frames + weight * responses.framesUnderTractions + kTwist * ends.framesUnderTwists,
                        responses.nodes + weight * responses.nodesUnderTractions + kTwist * ends.nodesUnderTwists);
-    out.layer = fitLayer(mesh, trials.surface, forces, under - trials.ofFrames(forces), largest, out.lengthScale);
+    out.layer =
+        fitLayer(mesh, trials.surface, forces, under - trials.ofFrames(forces), largest, out.lengthScale, trying);
     const MatrixXd found = trials.ofNetwork(forces);
     const double bulk = errorOf(found.leftCols(half), under.leftCols(half)).rms,
                  poke = errorOf(found.rightCols(half), under.rightCols(half)).rms;
@@ -293,13 +318,13 @@ void fitSurfaceAndMeasure(const Solved& solved, const std::vector<IdentifiedLink
   progress(0.5);
   const RowMatrix teaching = all.leftCols(2 * count);
   const MatrixXd under = exact.leftCols(2 * count);
-  chooseSkin(solved, trials, teaching, under, out);
+  chooseSkin(solved, trials, teaching, under, out, [&](double part) { progress(std::lerp(0.5, 0.9, part)); });
   if (!ends.cells.empty()) {
     const RowSparse skin = skinMatrix(out.skin, static_cast<int>(cells.frames.size()));
     out.links = unfitted;
     fitAndClampLinks(cells, responses, loadsOnEnds(ends, responses.frames, skin), form, out, {});
-    out.layer =
-        fitLayer(mesh, trials.surface, teaching, under - trials.ofFrames(teaching), largestOf(under), out.lengthScale);
+    out.layer = fitLayer(mesh, trials.surface, teaching, under - trials.ofFrames(teaching), largestOf(under),
+                         out.lengthScale, FitProgress(progress, 0.9, 0.1));
   }
   // Finite elements feel the forces spread into tractions. Fits to consistent ones gained pokes a tenth and lost as
   // much of tubes that are stretched or twisted.

@@ -81,7 +81,8 @@ MatrixXd layerResponse(const TriangleMesh& mesh, const NodeSurface& surface, con
 }
 
 IdentifiedLayer fitLayer(const TriangleMesh& mesh, const NodeSurface& surface, const RowMatrix& forces,
-                         const MatrixXd& rest, const VectorXd& scales, double lengthScale) {
+                         const MatrixXd& rest, const VectorXd& scales, double lengthScale,
+                         const std::function<void()>& goOn) {
   assert(forces.rows() == 3 * static_cast<Index>(mesh.vertices.size()));
   const std::array<SparseMatrix, 3> parts = layerParts(mesh, surface);
   // Where frames leave little that springs could do, as at the end of a slender body, the loads say nothing of them.
@@ -96,6 +97,7 @@ IdentifiedLayer fitLayer(const TriangleMesh& mesh, const NodeSurface& surface, c
   // Skins leave next to nothing to give across; stiffer springs there would only shorten the step.
   const Vector3d low(0, 0, std::log(1e-3)), high(std::log(1e3), std::log(2.), std::log(0.1));
   const auto objective = [&](const VectorXd& x, VectorXd& gradient) {
+    if (goOn) goOn();
     if ((x - low).minCoeff() < 0 || (x - high).maxCoeff() > 0) return std::numeric_limits<double>::infinity();
     const Vector3d k = units.cwiseProduct(Vector3d(x.array().exp()));
     factors.factorize(SparseMatrix(k[0] * parts[0] + k[1] * parts[1] + k[2] * parts[2] + still));
