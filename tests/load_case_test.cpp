@@ -209,6 +209,21 @@ TEST_F(LoadCase, ARunUntilRestEndsWhenNothingMoves) {
   EXPECT_LT(farthest(end, longer), 0.01 * farthest(start, longer));
 }
 
+// A scene that has been still for less than rest takes, though no load acts any more.
+TEST_F(LoadCase, ARunThatEndsBeforeRestIsSureSaysSinceWhenItIsStill) {
+  const std::string load = fmt::format("{}<load plane='0 1 0 -0.06' force='0 0 1e-3' to='0.1'/>", kHeld);
+  const ProgramResult run = runProgram({"replay", scene(load, "40"), "--until-rest"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const double rest = std::stod(run.out.substr(run.out.find("simulated ") + 10));
+  const ProgramResult shorter = runProgram({"replay", scene(load, fmt::format("{:.6g}", rest - 0.04)), "--until-rest"});
+  EXPECT_EQ(shorter.exitCode, 4);
+  ASSERT_EQ(complaints(shorter).size(), 1) << shorter.err;
+  EXPECT_EQ(complaints(shorter)[0],
+            fmt::format("medulla: not at rest: nodes moved up to {:.6g} s, expected 0.1 s of rest before the end at "
+                        "{:.6g} s",
+                        rest - 0.1, rest - 0.04));
+}
+
 TEST_F(LoadCase, ARunThatFindsNoRestSaysSoAndKeepsNothing) {
   const std::string load = fmt::format("{}<load plane='0 1 0 -0.06' force='0 0 1e-2' to='0'/>", kHeld);
   const ProgramResult moving = runProgram({"replay", scene(load, "0.3"), "--until-rest", "--log", folder / "log.csv"});

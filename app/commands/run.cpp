@@ -116,11 +116,15 @@ class RestWatch {
   }
   bool atRest() const { return atRest_; }
   [[noreturn]] void fail(double time) const {
-    throw NotAtRest(fastest_ < kStill
-                        ? fmt::format("not at rest: loads or tools act up to the end at {:.6g} s, or nearly", time)
-                        : fmt::format("not at rest at {:.6g} s: a node of body '{}' moves at {:.3g} m/s, expected less "
-                                      "than {:.0e} m/s",
-                                      time, body_, fastest_, kStill));
+    if (!(fastest_ < kStill))
+      throw NotAtRest(
+          fmt::format("not at rest at {:.6g} s: a node of body '{}' moves at {:.3g} m/s, expected less than {:.0e} m/s",
+                      time, body_, fastest_, kStill));
+    if (busyUntil_ > time - kStillFor)
+      throw NotAtRest(fmt::format("not at rest: loads or tools act up to the end at {:.6g} s, or nearly", time));
+    throw NotAtRest(
+        fmt::format("not at rest: nodes moved up to {:.6g} s, expected {:g} s of rest before the end at {:.6g} s",
+                    movedAt_, kStillFor, time));
   }
 
  private:
