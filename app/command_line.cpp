@@ -475,6 +475,9 @@ int runCommandLine(int argc, char** argv) {
   } catch (const NotAtRest& error) {
     std::fprintf(stderr, "medulla: %s\n", error.what());
     return 4;
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "medulla: out of memory: %s %s\n", argc > 1 ? argv[1] : "", argc > 2 ? argv[2] : "");
+    return 1;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "medulla: %s\n", error.what());
     return 1;

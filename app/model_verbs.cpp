@@ -114,9 +114,10 @@ Verb addBuild(CLI::App& app) {
                 "share of the mass that surface nodes carry; more allows larger substeps")
       ->check(numberFrom(0, 0.4))
       ->capture_default_str();
-  c->add_option("--render-levels", a.options.settings.renderLevels, "subdivisions of the mesh for the drawn surface")
-      ->check(wholeNumberFrom(0, 4))
-      ->capture_default_str();
+  c->add_option("--render-levels", a.options.renderLevels,
+                "subdivisions of the mesh for the drawn surface [2, of fine meshes fewer: 200000 triangles at most, or "
+                "the mesh's own]")
+      ->check(wholeNumberFrom(0, 4));
   c->add_option("--report", a.options.reportPath, "write the quality report as CSV too")->type_name("FILE.csv");
   addIdentification(*c, a);
   return {c, [arguments] { return runBuild(buildOptions(*arguments)); }};

@@ -9,6 +9,7 @@
 #include "physics/model/identify/necks.h"
 #include "physics/model/node_volumes.h"
 #include "physics/model/plane_section.h"
+#include "physics/model/render_surface.h"
 #include "physics/model/symmetric_eigen.h"
 #include "tests/complaint.h"
 #include "tests/test_shapes.h"
@@ -74,6 +75,12 @@ TEST(PlaneSection, EllipseAndItsHalves) {
   const PowerSites sites{{{0, -1, 0}, {0, 1, 0}, {5, 1, 0}}, {0, 0, 0}, {9, 9, 9}};
   EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 1}).area / area, 1, 3e-3);
   EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 2}).area / area, 0.5, 3e-3);
+}
+
+TEST(RenderSurface, FineMeshesAreNotDividedByThemselves) {
+  EXPECT_EQ(renderLevelsFor(12500), 2);
+  EXPECT_EQ(renderLevelsFor(12501), 1);
+  EXPECT_EQ(renderLevelsFor(327680), 0);
 }
 
 TEST(LinkSections, StraightTubeGivesItsBeam) {

@@ -20,6 +20,7 @@
 #include "physics/model/identify/check_loads.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
+#include "physics/model/render_surface.h"
 #include "physics/sort_unique.h"
 
 namespace medulla {
@@ -124,7 +125,8 @@ void requireDistinct(const BuildOptions& options, const std::vector<BuildJob>& j
   requireWritable(outputs);
 }
 
-void readMeshes(double scale, std::vector<BuildJob>& jobs) {
+void readMeshes(const BuildOptions& options, std::vector<BuildJob>& jobs) {
+  const double scale = metresPerUnit(options.unit);
   for (BuildJob& job : jobs) {
     const TriangleMesh input = readMesh(job.meshPath, scale);
     job.inputHash = hashMesh(input);
@@ -147,6 +149,7 @@ void readHeldRegions(const BuildOptions& options, BuildJob& job) {
 
 // The spheres asked for are those of all bodies together.
 void divideSpheres(std::vector<BuildJob>& jobs) {
+    job.settings.renderLevels = options.renderLevels.value_or(renderLevelsFor(job.mesh.mesh.triangles.size()));
   std::vector<BodyShape> shapes;
   shapes.reserve(jobs.size());
   BuildSettings average = jobs[0].settings;
@@ -243,12 +246,11 @@ std::vector<Result> resultsOf(const std::vector<BuildJob>& jobs) {
 }  // namespace
 
 int runBuild(const BuildOptions& options) {
-  const double scale = metresPerUnit(options.unit);
   std::vector<BuildJob> jobs = jobsOf(options);
   std::optional<OutputFolder> folder;
   if (jobs.size() > 1) folder.emplace(options.output);
   requireDistinct(options, jobs);
-  readMeshes(scale, jobs);
+  readMeshes(options, jobs);
   readHeldRegions(options, jobs[0]);  // --fix asks for --identify, and that for a single mesh
   const bool shared = jobs.size() > 1 && options.settings.method == BuildMethod::cover && options.settings.gap == 0;
   if (shared) divideSpheres(jobs);

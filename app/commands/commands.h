@@ -16,7 +16,8 @@ struct BuildOptions {
   std::vector<std::string> meshes;             // at least one
   std::vector<std::string> fine;               // none, or one per mesh
   std::string unit = "m", output, reportPath;  // output: the model, of several meshes a folder for NAME.model.xml each
-  BuildSettings settings;                      // spheres: of all meshes together
+  BuildSettings settings;                      // spheres: of all meshes together; renderLevels: as below
+  std::optional<int> renderLevels;             // without a value: renderLevelsFor each mesh
   bool identify = false;                       // of one mesh only
   std::vector<std::string> fix;                // as parseHeldRegion() reads them
   IdentifySettings identification;
