@@ -77,6 +77,19 @@ TEST(PlaneSection, EllipseAndItsHalves) {
   EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 2}).area / area, 0.5, 3e-3);
 }
 
+TEST(BuildReport, TellsOfEdgesLongerThanTheBodyIsThick) {
+  const auto edges = [](const TriangleMesh& mesh) { return longEdges(mesh, makeSurfaceTree(mesh)); };
+  const std::optional<LongEdges> of = edges(cylinderMesh(0.2, 0.02, 64, 1));
+  ASSERT_TRUE(of);
+  EXPECT_NEAR(of->edge, 0.2, 1e-3);
+  EXPECT_NEAR(of->thickness, 0.04, 1e-3);
+  EXPECT_TRUE(edges(boxMesh({0.2, 0.04, 0.04})));
+  EXPECT_FALSE(edges(boxMesh({0.05, 0.05, 0.05})));
+  EXPECT_FALSE(edges(cylinderMesh(0.2, 0.02, 32, 10)));
+  for (const char* organ : {"gallbladder/gallbladder.obj", "liver/liver.obj", "stomach/stomach.obj"})
+    EXPECT_FALSE(edges(assetMesh(organ))) << organ;
+}
+
 TEST(RenderSurface, FineMeshesAreNotDividedByThemselves) {
   EXPECT_EQ(renderLevelsFor(12500), 2);
   EXPECT_EQ(renderLevelsFor(12501), 1);

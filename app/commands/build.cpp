@@ -82,6 +82,15 @@ void warnOfCover(const BuildJob& job) {
              chosen ? "; do more of them (--spheres) fit it better?" : "");
 }
 
+// What no number of spheres makes good.
+void warnOfShape(const BuildJob& job) {
+  if (const std::optional<LongEdges>& coarse = job.report.longEdges)
+    fmt::print(stderr,
+               "{}: note: edges of {:.3g} mm on a body {:.3g} mm thick: split them to {:.3g} mm or use a finer mesh; "
+               "results may be off by a third, mostly too soft\n",
+               job.meshPath, 1e3 * coarse->edge, 1e3 * coarse->thickness, 500 * coarse->thickness);
+}
+
 // Of what the scene will get: links of the network, or of the beams' formulas.
 void warnOfErrors(const BuildJob& job) {
   constexpr double kLinks = 10, kElements = 5;  // %, RMS
@@ -90,9 +99,10 @@ void warnOfErrors(const BuildJob& job) {
   const double links = n.usesFormulas ? job.formulas->rms : n.bulk.rms;
   if (links > kLinks || n.ofFiniteElements.rms > kElements)
     fmt::print(stderr,
-               "{}: note: the links are off by {:.2g} % RMS, finite elements by {:.2g}; do more spheres fit better, or "
-               "more that is held?\n",
-               job.meshPath, links, n.ofFiniteElements.rms);
+               "{}: note: the links are off by {:.2g} % RMS, finite elements by {:.2g}; {} fit better, or more that "
+               "is held?\n",
+               job.meshPath, links, n.ofFiniteElements.rms,
+               job.report.longEdges ? "does a finer mesh" : "do more spheres");
 }
 
 // All that was repaired and found in one line.
@@ -133,6 +143,7 @@ void readMeshes(const BuildOptions& options, std::vector<BuildJob>& jobs) {
     job.mesh = naming(job.meshPath, [&] { return repairMesh(input); });
     warnOfSize(job.meshPath, input);  // of one that is not refused
     tellRepairs(job.meshPath, job.mesh.notes);
+    job.settings.renderLevels = options.renderLevels.value_or(renderLevelsFor(job.mesh.mesh.triangles.size()));
     if (!job.finePath.empty()) job.fine = readMesh(job.finePath, scale);
   }
 }
@@ -149,7 +160,6 @@ void readHeldRegions(const BuildOptions& options, BuildJob& job) {
 
 // The spheres asked for are those of all bodies together.
 void divideSpheres(std::vector<BuildJob>& jobs) {
-    job.settings.renderLevels = options.renderLevels.value_or(renderLevelsFor(job.mesh.mesh.triangles.size()));
   std::vector<BodyShape> shapes;
   shapes.reserve(jobs.size());
   BuildSettings average = jobs[0].settings;
@@ -260,6 +270,7 @@ int runBuild(const BuildOptions& options) {
   const std::vector<Result> results = resultsOf(jobs);
   for (const BuildJob& job : jobs) writeModel(job.modelPath, job.model);
   for (const BuildJob& job : jobs) warnOfCover(job);
+  for (const BuildJob& job : jobs) warnOfShape(job);
   for (const BuildJob& job : jobs) warnOfErrors(job);
   if (!options.reportPath.empty()) writeReport(options.reportPath, results);
   printResults(results);

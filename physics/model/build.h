@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "physics/model/long_edges.h"
 #include "physics/model/mesh_repair.h"
 #include "physics/model/soft_body_model.h"
 
@@ -40,7 +41,8 @@ struct BuildReport {
   int components = 0, centresOutside = 0, attachmentsCrossing = 0;
   double attachmentMax = 0;
   int degreeMax = 0;
-  double volume = 0, diagonal = 0;  // m3 of the mesh, m of its bounding box
+  std::optional<LongEdges> longEdges;  // where the mesh is too coarse for the body's thickness
+  double volume = 0, diagonal = 0;     // m3 of the mesh, m of its bounding box
   double seconds = 0;
 };
 
