@@ -77,6 +77,26 @@ TEST(PlaneSection, EllipseAndItsHalves) {
   EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 2}).area / area, 0.5, 3e-3);
 }
 
+TEST(PlaneSection, HolesAreFound) {
+  const TriangleMesh solid = ellipsoidMesh(4, {3, 2, 1}), hollow = hollowed(solid, ellipsoidMesh(3, {1.5, 1, 0.5}));
+  const auto at = [](double x) { return Plane{{x, 0.1, 0}, Vector3d::UnitY(), Vector3d::UnitZ()}; };
+  EXPECT_FALSE(sectionHasHole(solid, at(0.1)));
+  EXPECT_TRUE(sectionHasHole(hollow, at(0.1)));
+  EXPECT_FALSE(sectionHasHole(hollow, at(2)));
+  EXPECT_FALSE(sectionHasHole(solid, at(4)));  // beyond
+}
+
+TEST(BuildReport, CountsLinksAcrossWhichTheBodyIsHollow) {
+  const TriangleMesh solid = cylinderMesh(0.2, 0.02, 24, 30);
+  TriangleMesh core = cylinderMesh(0.18, 0.015, 24, 30);
+  for (Vector3d& v : core.vertices) v.x() += 0.01;
+  BuildReport report;
+  build(solid, {}, report);
+  EXPECT_EQ(report.hollowLinks, 0);
+  build(hollowed(solid, core), {}, report);
+  EXPECT_GT(report.hollowLinks, report.links / 2);
+}
+
 TEST(BuildReport, TellsOfEdgesLongerThanTheBodyIsThick) {
   const auto edges = [](const TriangleMesh& mesh) { return longEdges(mesh, makeSurfaceTree(mesh)); };
   const std::optional<LongEdges> of = edges(cylinderMesh(0.2, 0.02, 64, 1));

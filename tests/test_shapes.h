@@ -58,6 +58,15 @@ inline TriangleMesh boxMesh(const Eigen::Vector3d& size) {
   return mesh;
 }
 
+// The outer surface with the inner one, turned inside out, as a cavity.
+inline TriangleMesh hollowed(const TriangleMesh& outer, const TriangleMesh& inner) {
+  TriangleMesh mesh = outer;
+  const int first = static_cast<int>(outer.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), inner.vertices.begin(), inner.vertices.end());
+  for (const auto& [a, b, c] : inner.triangles) mesh.triangles.push_back({first + a, first + c, first + b});
+  return mesh;
+}
+
 // A straight round tube along +x from 0 to `length` with flat ends.
 inline TriangleMesh cylinderMesh(double length, double radius, int around, int along) {
   TriangleMesh mesh;

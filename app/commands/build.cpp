@@ -84,11 +84,17 @@ void warnOfCover(const BuildJob& job) {
 
 // What no number of spheres makes good.
 void warnOfShape(const BuildJob& job) {
+  constexpr double kManyLinks = 0.25;
   if (const std::optional<LongEdges>& coarse = job.report.longEdges)
     fmt::print(stderr,
                "{}: note: edges of {:.3g} mm on a body {:.3g} mm thick: split them to {:.3g} mm or use a finer mesh; "
                "results may be off by a third, mostly too soft\n",
                job.meshPath, 1e3 * coarse->edge, 1e3 * coarse->thickness, 500 * coarse->thickness);
+  if (!job.model.identified && job.report.hollowLinks > kManyLinks * job.report.links)
+    fmt::print(
+        stderr,
+        "{}: note: {} of {} links lie in a hollow or beside the body: beams may be far too soft; use --identify\n",
+        job.meshPath, job.report.hollowLinks, job.report.links);
 }
 
 // Of what the scene will get: links of the network, or of the beams' formulas.

@@ -99,6 +99,18 @@ static void measureLink(const TriangleMesh& mesh, const PowerSites& sites, const
   }
 }
 
+int countHollowLinks(const TriangleMesh& mesh, const SurfaceTree& tree, const PowerSites& sites,
+                     const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links) {
+  return static_cast<int>(std::count_if(links.begin(), links.end(), [&](const ElasticLink& link) {
+    const Vector3d &from = spheres[link.sphere0].restLinkEnd, &to = spheres[link.sphere1].restLinkEnd;
+    const Plane plane = planeAcross((from + to) / 2, (to - from).normalized());
+    if (sectionHasHole(mesh, plane)) return true;
+    const PowerSites around = sitesAround(sites, {link.sphere0, link.sphere1});
+    const SectionMoments s = planeSection(mesh, plane, &around, {0, 1});
+    return s.area > 0 && !isInside(tree, plane.origin + s.centroid.x() * plane.u + s.centroid.y() * plane.v);
+  }));
+}
+
 void measureLinks(const TriangleMesh& mesh, const PowerSites& sites, const std::vector<FillingSphere>& spheres,
                   std::vector<ElasticLink>& links) {
   for (ElasticLink& link : links) measureLink(mesh, sites, spheres, link);

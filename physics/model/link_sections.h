@@ -19,4 +19,9 @@ namespace medulla {
 void measureLinks(const TriangleMesh& mesh, const PowerSites& sites, const std::vector<FillingSphere>& spheres,
                   std::vector<ElasticLink>& links);
 
+// How many links have a section, in their middle, that encloses a hole or whose centroid lies outside of the mesh:
+// walls around a hollow, which no beam stands for.
+int countHollowLinks(const TriangleMesh& mesh, const SurfaceTree& tree, const PowerSites& sites,
+                     const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links);
+
 }  // namespace medulla

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+
+#include "physics/model/disjoint_sets.h"
 
 namespace medulla {
 
@@ -93,6 +96,15 @@ std::vector<double> crossingsOf(const Outline& outline, double b) {
   return crossings;
 }
 
+Span heightsOf(const Outline& outline) {
+  Span out{1e30, -1e30};
+  for (const std::array<Vector2d, 2>& e : outline) {
+    out.low = std::min({out.low, e[0].y(), e[1].y()});
+    out.high = std::max({out.high, e[0].y(), e[1].y()});
+  }
+  return out;
+}
+
 }  // namespace
 
 Plane planeAcross(const Vector3d& origin, const Vector3d& normal) {
@@ -107,11 +119,7 @@ SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const 
   const Outline outline = cut(mesh, plane);
   SectionMoments section;
   if (outline.empty()) return section;
-  double low = 1e30, high = -1e30;
-  for (const std::array<Vector2d, 2>& e : outline) {
-    low = std::min({low, e[0].y(), e[1].y()});
-    high = std::max({high, e[0].y(), e[1].y()});
-  }
+  const auto [low, high] = heightsOf(outline);
   const double step = (high - low) / kScanLines;
   // Of the scan line at `b`, what is inside: one span after the other.
   const auto visitSpans = [&](double b, const auto& visit) {
@@ -136,6 +144,37 @@ SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const 
   sum.second(1, 0) = sum.second(0, 1);
   section.secondMoment = sum.second - sum.area * section.centroid * section.centroid.transpose();
   return section;
+}
+
+// What is outside on a scan line, gap by gap, hangs together with what it faces on the next line. A hole is what does
+// not hang together with the outermost gaps.
+bool sectionHasHole(const TriangleMesh& mesh, const Plane& plane) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  const Outline outline = cut(mesh, plane);
+  const auto [low, high] = heightsOf(outline);
+  std::vector<Span> gaps{{-kFar, kFar}};  // below the section
+  std::vector<std::array<std::size_t, 2>> facing;
+  std::size_t before = 0;  // first gap of the line before
+  for (int line = 0; !outline.empty() && line <= kScanLines; ++line) {
+    const std::size_t begin = gaps.size();
+    std::vector<double> ends{-kFar, kFar};
+    if (line < kScanLines) {
+      const std::vector<double> crossings = crossingsOf(outline, low + (line + 0.5) * (high - low) / kScanLines);
+      ends.insert(ends.begin() + 1, crossings.begin(), crossings.end());
+    }
+    for (std::size_t k = 0; k + 1 < ends.size(); k += 2) {
+      for (std::size_t g = before; g < begin; ++g)
+        if (gaps[g].low < ends[k + 1] && ends[k] < gaps[g].high) facing.push_back({g, gaps.size()});
+      gaps.push_back({ends[k], ends[k + 1]});
+    }
+    before = begin;
+  }
+  DisjointSets sets(gaps.size());
+  for (const auto& [a, b] : facing) sets.join(static_cast<int>(a), static_cast<int>(b));
+  for (std::size_t g = 0; g < gaps.size(); ++g)
+    if (std::isfinite(gaps[g].low) && std::isfinite(gaps[g].high) && sets.of(static_cast<int>(g)) != sets.of(0))
+      return true;
+  return false;
 }
 
 }  // namespace medulla

@@ -27,6 +27,10 @@ struct SectionMoments {
 SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const PowerSites* sites = nullptr,
                             std::pair<int, int> pair = {0, 0});
 
+// Whether the section of the solid encloses a part of the plane that is outside: on the same scan lines, so that holes
+// narrower than these are apart may be missed.
+bool sectionHasHole(const TriangleMesh& mesh, const Plane& plane);
+
 // Two unit vectors that complete the unit vector `normal` to a right-handed frame (u, v, normal).
 Plane planeAcross(const Eigen::Vector3d& origin, const Eigen::Vector3d& normal);
 
