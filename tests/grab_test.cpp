@@ -65,8 +65,8 @@ TEST(Grab, ClosingWhileItPressesAtSpeedHasNoForceStep) {
 }
 
 TEST(Grab, TissueIsFeltWhereItIsByNowWhileItAccelerates) {
-  constexpr double kFrame = 0.02, kTick = 1e-3, kStart = 0.1, kAcceleration = 2;  // s, m/s2
-  const auto way = [](double t) { return 0.5 * kAcceleration * std::pow(std::max(0.0, t - kStart), 2); };
+  constexpr double kFrame = 0.02, kTick = 1e-3, start = 0.1, acceleration = 2;  // s, m/s2
+  const auto way = [](double t) { return 0.5 * acceleration * std::pow(std::max(0.0, t - start), 2); };
   const SurfaceMotion motion = [&](const Vector3d& x, double t) { return Vector3d(x + way(t) * Vector3d::UnitX()); };
   const TouchShape shape = plate(10, 0.03, 0.01, 5);
   ToolSettings tool;
@@ -78,9 +78,9 @@ TEST(Grab, TissueIsFeltWhereItIsByNowWhileItAccelerates) {
       servo.tick(k / 20.0, {deviceAt({0.001, 0.007, 0.002}, frame > 0 ? 1 : 0)});
       // The steps that it follows from are all of the steady acceleration.
       const double time = kFrame * frame + kTick * k;
-      if (time < kStart + 4 * kFrame) continue;
+      if (time < start + 4 * kFrame) continue;
       ASSERT_TRUE(servo.tools()[0].holding);
-      ASSERT_NEAR(servo.tools()[0].force.x() / tool.stiffness, way(time), 0.126 * kAcceleration * kFrame * kFrame);
+      ASSERT_NEAR(servo.tools()[0].force.x() / tool.stiffness, way(time), 0.126 * acceleration * kFrame * kFrame);
     }
     const double end = kFrame * (frame + 1);
     servo.commit(frameAt(*shape, end - kFrame, motion), frameAt(*shape, end, motion), servo.tools());
