@@ -207,12 +207,13 @@ static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& tou
 // goal, rather than moving `free` back, keeps grooves and bumps right.
 static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& start, const Vector3d& free,
                              const Vector3d& device, bool& slipping) {
+  constexpr double kStill = 1e-8;  // m per tick, 12 um/s: what slips no farther sticks, else it would slip at rest
   const double depth = (free - device).norm();
   const Vector3d normal = (free - device) / depth;
   Vector3d slide = free - start;
   slide -= slide.dot(normal) * normal;
   const double length = slide.norm();
-  if (length <= (slipping ? tool.dynamicFriction : tool.staticFriction) * depth) {
+  if (length <= (slipping ? tool.dynamicFriction * depth + kStill : tool.staticFriction * depth)) {
     slipping = false;
     return device - slide;
   }
@@ -333,6 +334,14 @@ const ProxyContact& Proxy::mainContact() const {
   assert(contactCount > 0);
   return *std::max_element(contacts.begin(), contacts.begin() + contactCount,
                            [](const ProxyContact& a, const ProxyContact& b) { return a.share < b.share; });
+}
+
+Vector3d Proxy::feltNormal() const {
+  assert(contactCount > 0);
+  if (!felt.isZero(0)) return felt.normalized();
+  Vector3d sum = Vector3d::Zero();
+  for (int k = 0; k < contactCount; ++k) sum += contacts[k].share * contacts[k].normal;
+  return sum.normalized();
 }
 
 Proxy placeProxy(const Buckets& buckets, const Vector3d& device, double toolRadius) {

@@ -33,6 +33,8 @@ struct Proxy {
   bool inContact() const { return contactCount > 0; }
   // The contact that presses most; only in contact.
   const ProxyContact& mainContact() const;
+  // Unit; along which it is pushed where there is no friction; only in contact.
+  Eigen::Vector3d feltNormal() const;
 };
 
 // A proxy at the device, or, when that is inside of a body, just outside at the nearest point of its surface, small, to

@@ -10,6 +10,7 @@
 
 #include "haptics/buckets.h"
 #include "haptics/contact_patch.h"
+#include "haptics/force_bounds.h"
 #include "haptics/grab.h"
 #include "haptics/proxy.h"
 #include "haptics/tissue_motion.h"
@@ -80,10 +81,6 @@ static void checkSettings(const ToolSettings& s, std::size_t tool) {
 
 // ---- One tick --------------------------------------------------------------------------------------------
 
-static Vector3d tangential(const Vector3d& v, const Vector3d& normal) {
-  return v - v.dot(normal) * normal;
-}
-
 // What the surface's motion adds to the spring's force. The damper, against the velocity of the surface point in the
 // dynamics: the proxy's own, differenced over ticks, would jump at every edge. And the lead: the blended surface is one
 // frame late; uncorrected, a device that presses at speed v feels k v T too much, on soft tissue several times the
@@ -102,49 +99,56 @@ static Vector3d givenForce(const BlendedSurface& surface, double alpha, const To
   return blendPoint(surface.toolForce[1][tool.index], surface.toolForce[0][tool.index], alpha);
 }
 
-// A push, as far as the dynamics can have it by now: what the tissue gave some frames ago, give or take what it can
-// have changed since. Where a stiff tool meets limp tissue, a place that is off by a tenth of a millimetre is several
-// times the force.
-static double keptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal,
-                           const TissueMotion& tissue, const Tool& tool, double push) {
-  if (surface.toolForce[0].empty()) return push;
+// A push along the normal, as far as the dynamics can have it by now: what the tissue gave some frames ago, give or
+// take what it can have changed since. Where a stiff tool meets limp tissue, a place that is off by a tenth of a
+// millimetre is several times the force.
+static double pushKeptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal,
+                               const TissueMotion& tissue, const Tool& tool) {
+  if (surface.toolForce[0].empty()) return tool.estimate;
   const double given = std::max(0.0, -givenForce(surface, alpha, tool).dot(normal));
   const double since = pushSince(surface, alpha, tissue, normal, tool.settings, tool.motion);
-  return std::clamp(push, std::max(0.0, given - since), given + since);
+  return std::clamp(tool.estimate, std::max(0.0, given - since), given + since);
 }
 
-// Coulomb's, about the unit vector `axis`.
-static Vector3d withinCone(const Vector3d& force, const Vector3d& axis, double friction) {
-  const Vector3d across = tangential(force, axis);
-  const double along = std::max(0.0, force.dot(axis)), size = across.norm(), most = friction * along;
-  return along * axis + (size > most ? most / size : 1) * across;
+// Likewise across it: a proxy on the late surface slips, or sticks, where the tissue itself does not.
+static Vector3d dragKeptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal,
+                                 const TissueMotion& tissue, const Tool& tool, const Vector3d& drag) {
+  if (surface.toolForce[0].empty()) return drag;
+  return keptNear(drag, tangential(-givenForce(surface, alpha, tool), normal),
+                  dragSince(surface, alpha, tissue, normal, tool.settings, tool.motion));
 }
 
 // The coupling of a contact that pushes, or that the tool is leaving: along the normal the spring, negative once the
 // device has left the late surface, plus the motion's part, never pulling. The motion's part is bounded by the largest
 // that the spring has been in this contact, so that force begins without a step on a surface that already moves.
-// Tangentially a slipping contact is dragged by friction alone, which the proxy's position already holds; one that
-// sticks by no more than friction carries.
+// Across, a slipping contact is dragged by friction alone, which the proxy's position already holds; one that sticks by
+// the coupling and the motion. Neither by more than friction carries.
 static Vector3d contactForce(const BlendedSurface& surface, double alpha, const Vector3d& way, Tool& tool) {
+  tool.estimate = 0;
   if (!tool.isLeaving) return Vector3d::Zero();
   const Proxy& proxy = tool.proxy;
   const ProxyContact& last = tool.lastContact;
+  const Vector3d& normal = tool.lastFelt;
   const Vector3d pull = proxy.centre + proxy.shading - tool.device.position;
-  const bool isPressed = proxy.inContact() && pull.squaredNorm() > 0;
-  const Vector3d normal = isPressed ? Vector3d(pull.normalized()) : tool.lastFelt;
-  const double depth =
-      isPressed ? pull.norm() : normal.dot(last.point + tool.settings.radius * last.normal - tool.device.position);
+  const double depth = proxy.inContact()
+                           ? pull.dot(normal)
+                           : normal.dot(last.point + tool.settings.radius * last.normal - tool.device.position);
   const double spring = tool.settings.stiffness * depth;
   tool.largestPush = std::max(tool.largestPush, spring);
-  tool.motion.way[0] += std::max(way.dot(normal), -std::max(0.0, depth)) * normal;  // from where it touched
-  const TissueMotion tissue =
-      contactMotion(surface, alpha, touchedContacts(tool), normal, tool.settings.stiffness, tool.motion);
+  const double along = way.dot(normal);
+  tool.motion.way[0] += std::max(along, -std::max(0.0, depth)) * normal;  // from where it touched
+  tool.motion.wayAcross[0] += way - along * normal;
+  const TissueMotion tissue = contactMotion(surface, alpha, touchedContacts(tool), normal, tool.motion);
   const Vector3d motion = motionForce(tool, tissue);
   tool.estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
-  const double push = keptToTissue(surface, alpha, normal, tissue, tool, tool.estimate);
-  return proxy.slipping
-             ? Vector3d(push * normal)
-             : withinCone(push * normal + tangential(motion, normal), tool.lastFelt, tool.settings.staticFriction);
+  const double push = pushKeptToTissue(surface, alpha, normal, tissue, tool);
+  Vector3d drag = proxy.inContact() ? Vector3d(tool.settings.stiffness * tangential(pull, normal)) : Vector3d::Zero();
+  if (!proxy.slipping)
+    drag += tangential(motion, normal);
+  else if (spring > 0)
+    drag *= push / spring;
+  return withinCone(push * normal + dragKeptToTissue(surface, alpha, normal, tissue, tool, drag), normal,
+                    tool.settings.staticFriction);
 }
 
 // The springs share the tool's stiffness equally.
@@ -161,9 +165,7 @@ static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const 
   if (surface.toolForce[0].empty()) return force;
   const double change = (1 - alpha) * tool.change[1] + alpha * tool.change[0];
   const double since = heldSince(surface, alpha, tissue, change, tool.settings, tool.motion);
-  const Vector3d given = -givenForce(surface, alpha, tool), beyond = force - given;
-  const double size = beyond.norm();
-  return size > since ? Vector3d(given + since / size * beyond) : force;
+  return keptNear(force, -givenForce(surface, alpha, tool), since);
 }
 
 // In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
@@ -172,7 +174,7 @@ static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const 
 static void followLeaving(const BlendedSurface& surface, double alphaBefore, double alpha, Tool& tool) {
   if (tool.proxy.inContact()) {
     tool.lastContact = tool.proxy.mainContact();
-    tool.lastFelt = tool.proxy.felt.isZero(0) ? tool.lastContact.normal : tool.proxy.felt.normalized();
+    tool.lastFelt = tool.proxy.feltNormal();
     if (!tool.isLeaving) {
       tool.largestPush = 0;
       beginContact(surface, alphaBefore, tool.lastContact, tool.lastFelt, tool.settings.stiffness, tool.motion);
@@ -186,11 +188,11 @@ static void followLeaving(const BlendedSurface& surface, double alphaBefore, dou
 
 static void record(const Vector3d& force, Tool& tool, ToolState& state) {
   const double size = force.norm();
-  state.clamped = size > tool.settings.forceMax;
-  state.force = state.clamped ? Vector3d(tool.settings.forceMax / size * force) : force;
+  state.force = size > tool.settings.forceMax ? Vector3d(tool.settings.forceMax / size * force) : force;
   // By the estimate, for what the tissue gives has followed softer springs before.
   const double most = std::max(size, tool.estimate);
-  tool.springScale = most > tool.settings.forceMax ? tool.settings.forceMax / most : 1;
+  state.clamped = most > tool.settings.forceMax;
+  tool.springScale = state.clamped ? tool.settings.forceMax / most : 1;
   state.device = tool.device.position;
   state.proxy = tool.proxy.centre;
   state.holding = !tool.grip.held.empty();
@@ -271,11 +273,18 @@ static void startFrame(const BlendedSurface& surface, double tickDuration, Tool&
   tool.deviceAtFrameStart = tool.device;
   tool.deviceSum.setZero();
   const bool holds = !tool.grip.held.empty();
-  startFrame(holds && tool.pathEnd ? Vector3d(tool.device.position - *tool.pathEnd) : Vector3d::Zero(), tool.motion);
-  if (holds) learnFollowing(surface, tool.grip, tool.motion);
-  tool.pathEnd.reset();
+  Vector3d lag = tool.pathEnd ? Vector3d(tool.device.position - *tool.pathEnd) : Vector3d::Zero();
+  if (!holds) lag = tool.isLeaving ? Vector3d(tool.lastFelt.dot(lag) * tool.lastFelt) : Vector3d::Zero();
+  startFrame(lag, surface.duration, tool.motion);
   const auto& given = surface.toolForce;
-  tool.change = {given[0].empty() ? 0 : (given[0][tool.index] - given[1][tool.index]).norm(), tool.change[0]};
+  const Vector3d change = given[0].empty() ? Vector3d::Zero() : Vector3d(given[0][tool.index] - given[1][tool.index]);
+  if (holds)
+    learnFollowing(surface, tool.grip, tool.motion);
+  else if (tool.isLeaving)
+    learnFollowing(surface, touchedContacts(tool), tool.lastFelt, tool.settings.stiffness,
+                   tool.springScale < 1 ? 0 : std::abs(tool.lastFelt.dot(change)), tool.motion);
+  tool.pathEnd.reset();
+  tool.change = {change.norm(), tool.change[0]};
   fadePatch(std::exp(-tool.ticks * tickDuration / memory), tool.patch);
   tool.ticks = 0;
 }
@@ -356,7 +365,7 @@ static void handOverContact(const BlendedSurface& surface, const Tool& tool, con
   spring.stiffness = tool.springScale * settings.stiffness * share;
   spring.damping = tool.springScale * settings.damping * share;
   spring.slides = proxy.slipping;
-  spring.friction = settings.dynamicFriction;
+  spring.friction = proxy.slipping ? settings.dynamicFriction : settings.staticFriction;
 }
 
 // What the tool has slid away from no longer pushes in full; the rest of the patch pushes so much more.

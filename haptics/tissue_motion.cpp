@@ -8,10 +8,16 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-void startFrame(const Vector3d& lag, DeviceMotion& device) {
+void startFrame(const Vector3d& lag, double duration, DeviceMotion& device) {
+  constexpr double kMemory = 0.1;  // s; a half or two and a half times as long feels the same within a few per cent
+  const double kept = std::exp(-duration / kMemory);
+  for (double* sum : {&device.seen.stepChange, &device.seen.wayChange, &device.seen.forceLength, &device.seen.length})
+    *sum *= kept;
   device.way[0] -= lag;
   std::rotate(device.way.begin(), device.way.end() - 1, device.way.end());
   device.way[0] = lag;
+  std::rotate(device.wayAcross.begin(), device.wayAcross.end() - 1, device.wayAcross.end());
+  device.wayAcross[0].setZero();
   device.sinceBefore = device.since;
   device.earlyBefore = device.early;
   device.since = 0;
@@ -64,21 +70,49 @@ Vector3d contactStep(const BlendedSurface& surface, double alpha, const ProxyCon
   return blendPoint(meanOver(surface, contact, surface.steps[1]), meanOver(surface, contact, surface.steps[0]), alpha);
 }
 
+// m, mean over contacts by their shares.
+template <class Of>
+Vector3d meanOverShares(std::span<const ProxyContact> contacts, const Of& of) {
+  Vector3d sum = Vector3d::Zero();
+  double shares = 0;
+  for (const ProxyContact& contact : contacts) {
+    sum += contact.share * of(contact);
+    shares += contact.share;
+  }
+  return sum / shares;
+}
+
 Vector3d heldStep(const BlendedSurface& surface, const Grip& grip, int framesAgo) {
   return meanOverHeld(grip, [&](const HeldOffset& held) { return surface.steps[framesAgo][held.node]; });
 }
 
-double heldFollows(const DeviceMotion& device, double alpha) {
+double partSeen(const DeviceMotion& device) {
+  constexpr double kLeast = 1e-12;  // m2, of 1 um: less is as if the device stood still
+  constexpr double kSafe = 1.5;     // forces follow the ways late; at 1, strokes of a live run give 4 mJ
+  const auto& seen = device.seen;
+  const double bySteps = (seen.stepChange + kLeast * device.followsAtOnce) / (seen.wayChange + kLeast);
+  const double byForce = 1 - kSafe * (seen.forceLength + kLeast * (1 - device.followsAtOnce)) / (seen.length + kLeast);
+  return std::clamp(std::max(bySteps, byForce), device.followsAtOnce, 1.0);
+}
+
+// `change`, m: by how much the step up to the surface's `to` differs from the one before.
+void seeStep(const Vector3d& change, DeviceMotion& device) {
+  const Vector3d way = device.way[1] - device.way[2];
+  device.seen.stepChange += change.dot(way);
+  device.seen.wayChange += way.squaredNorm();
+}
+
+double followsNow(const DeviceMotion& device, double alpha) {
   return (1 - alpha) * device.follows[1] + alpha * device.follows[0];
 }
 
-// m, of the device over the last `frames`, as the sum of `size` of its ways in them.
+// m, over the last `frames`, as the sum over them of `size` of the way and of the frames that it took.
 template <class Size>
-double wayOver(double frames, double alpha, const DeviceMotion& device, const Size& size) {
+double wayOver(double frames, double alpha, const std::array<Vector3d, 4>& ways, const Size& size) {
   double sum = 0;
-  for (std::size_t k = 0; frames > 0 && k < device.way.size(); ++k) {
+  for (std::size_t k = 0; frames > 0 && k < ways.size(); ++k) {
     const double within = std::min(frames, k == 0 ? alpha : 1.0);
-    sum += (k == 0 ? 1 : within) * size(device.way[k]);
+    sum += size(k == 0 ? ways[k] : Vector3d(within * ways[k]), within);
     frames -= within;
   }
   return sum;
@@ -88,8 +122,12 @@ double wayOver(double frames, double alpha, const DeviceMotion& device, const Si
 
 void beginContact(const BlendedSurface& surface, double alpha, const ProxyContact& contact, const Vector3d& normal,
                   double stiffness, DeviceMotion& device) {
-  device = {.velocity = device.velocity, .since = alpha};
-  const double part = followedPart(stiffness, contactGive(surface, {&contact, 1}));
+  device = {.velocity = device.velocity,
+            .since = alpha,
+            .followsAtOnce = followedPart(stiffness, contactGive(surface, {&contact, 1})),
+            .seen = device.seen};
+  const double part = partSeen(device);
+  device.follows = {part, part};
   if (!(part > 0)) return;
   for (int k = 0; k < 3; ++k)
     device.way[k + 1] = normal.dot(meanOver(surface, contact, surface.steps[k])) / part * normal;
@@ -104,29 +142,36 @@ void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, do
   device.way[0] = wayOfLead(device, alpha) - (1 - alpha) * device.way[1];
 }
 
+void learnFollowing(const BlendedSurface& surface, std::span<const ProxyContact> contacts, const Vector3d& normal,
+                    double stiffness, double forceChange, DeviceMotion& device) {
+  const auto stepOf = [&](int framesAgo) {
+    return meanOverShares(contacts,
+                          [&](const ProxyContact& c) { return meanOver(surface, c, surface.steps[framesAgo]); });
+  };
+  const Vector3d last = stepOf(0), before = stepOf(1);
+  seeStep(last - before, device);
+  if (forceChange > 0) {  // between two frames' means, which lie half of each frame's way apart
+    const auto half = [&](const Vector3d& sum) { return 0.5 * std::abs(normal.dot(sum)); };
+    const double length = std::max(half(device.way[1] + device.way[2]), half(last + before));
+    device.seen.forceLength += forceChange / stiffness * length;
+    device.seen.length += length * length;
+  }
+  device.followsAtOnce = followedPart(stiffness, contactGive(surface, contacts));
+  device.follows = {partSeen(device), device.follows[0]};
+}
+
 void learnFollowing(const BlendedSurface& surface, const Grip& grip, DeviceMotion& device) {
-  constexpr double kMemory = 0.1;   // s; a half or two and a half times as long feels the same within a few per cent
-  constexpr double kLeast = 1e-12;  // m2, of changes of 1 um: less is as if the device stood still
-  const double kept = std::exp(-surface.duration / kMemory);
-  const Vector3d step = heldStep(surface, grip, 0) - heldStep(surface, grip, 1), way = device.way[1] - device.way[2];
-  device.stepChange = kept * device.stepChange + step.dot(way);
-  device.wayChange = kept * device.wayChange + way.squaredNorm();
-  const double part = (device.stepChange + kLeast * device.followsAtOnce) / (device.wayChange + kLeast);
-  device.follows = {std::clamp(part, device.followsAtOnce, 1.0), device.follows[0]};
+  seeStep(heldStep(surface, grip, 0) - heldStep(surface, grip, 1), device);
+  device.follows = {partSeen(device), device.follows[0]};
 }
 
 TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
-                           const Vector3d& normal, double stiffness, const DeviceMotion& device) {
+                           const Vector3d& normal, const DeviceMotion& device) {
   assert(!contacts.empty());
   if (!(surface.duration > 0)) return {};
-  Vector3d step = Vector3d::Zero();
-  double shares = 0;
-  for (const ProxyContact& contact : contacts) {
-    step += contact.share * contactStep(surface, alpha, contact);
-    shares += contact.share;
-  }
-  step /= shares;
-  const double part = followedPart(stiffness, contactGive(surface, contacts));
+  const Vector3d step =
+      meanOverShares(contacts, [&](const ProxyContact& contact) { return contactStep(surface, alpha, contact); });
+  const double part = followsNow(device, alpha);
   const Vector3d answered = wayOfStep(device, alpha);
   const Vector3d beyond = latestWay(device, alpha) - answered, faster = device.velocity - answered / surface.duration;
   return {step + part * normal.dot(beyond) * normal, step / surface.duration + part * normal.dot(faster) * normal, step,
@@ -136,14 +181,25 @@ TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::spa
 double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Vector3d& normal,
                  const ToolSettings& tool, const DeviceMotion& device) {
   const auto along = [&](const Vector3d& v) { return std::abs(normal.dot(v)); };
-  const double way = wayOver(surface.toolForceAge, alpha, device, along);
+  const double way =
+      wayOver(surface.toolForceAge, alpha, device.way, [&](const Vector3d& v, double) { return along(v); });
   const double longer = std::max(way, surface.toolForceAge * along(tissue.step));
   return (1 - tissue.followed) * (tool.stiffness * longer + tool.damping * along(device.velocity));
 }
 
+double dragSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Vector3d& normal,
+                 const ToolSettings& tool, const DeviceMotion& device) {
+  const auto across = [&](const Vector3d& v) { return Vector3d(v - normal.dot(v) * normal); };
+  const Vector3d step = across(tissue.step), slip = across(device.velocity) - step / surface.duration;
+  const double off = wayOver(surface.toolForceAge, alpha, device.wayAcross,
+                             [&](const Vector3d& v, double frames) { return (v - frames * step).norm(); });
+  return tool.stiffness * off + tool.damping * slip.norm();
+}
+
 double heldSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, double changePerFrame,
                  const ToolSettings& tool, const DeviceMotion& device) {
-  const double way = wayOver(surface.toolForceAge, alpha, device, [](const Vector3d& v) { return v.norm(); });
+  const double way =
+      wayOver(surface.toolForceAge, alpha, device.way, [](const Vector3d& v, double) { return v.norm(); });
   const double longer = std::max(way, surface.toolForceAge * tissue.step.norm());
   return 2 * surface.toolForceAge * changePerFrame +
          (1 - tissue.followed) * (tool.stiffness * longer + tool.damping * device.velocity.norm());
@@ -151,7 +207,7 @@ double heldSince(const BlendedSurface& surface, double alpha, const TissueMotion
 
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, const DeviceMotion& device) {
   if (!(surface.duration > 0)) return {};
-  const double part = heldFollows(device, alpha);
+  const double part = followsNow(device, alpha);
   const Vector3d beyond = latestWay(device, alpha) - wayOfLead(device, alpha);
   const Vector3d faster = device.velocity - wayOfStep(device, alpha) / surface.duration;
   const Vector3d lead = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeLead(h.node, alpha); });

@@ -21,16 +21,21 @@ struct DeviceMotion {
   // the dynamics was given ended to where it ended next.
   std::array<Eigen::Vector3d, 4> way{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
                                      Eigen::Vector3d::Zero()};
+  std::array<Eigen::Vector3d, 4> wayAcross = way;  // m, likewise, across the normal of a contact
   // alpha from which on the device's own way counts, in this frame and in the one before; and m, what of the way came
   // earlier in these frames, evenly, of tissue that had moved by itself.
   double since = 0, sinceBefore = 0;
   Eigen::Vector3d early = Eigen::Vector3d::Zero(), earlyBefore = Eigen::Vector3d::Zero();
-  // Of a grip, the fraction of the device's displacement that the held tissue follows: at once, by its compliance; and
-  // as observed up to the surface's `to` and `from`. Below, m2, the sums of the least-squares estimate, in which older
-  // frames fade: step's change times the change of the displacement that it answers, and the latter's square.
+  // The fraction of the device's displacement that touched or held tissue follows: at once, by its compliance; and as
+  // observed up to the surface's `to` and `from`.
   double followsAtOnce = 0;
   std::array<double, 2> follows{};
-  double stepChange = 0, wayChange = 0;
+  // m2, sums over frames, of which older ones fade: step's change times the change of the way that it answers, and the
+  // latter's square; and what the tissue's force changed by, over the tool's stiffness, times the length that tissue or
+  // device went, and the latter's square. They outlast a contact: what comes back soon is likely the same tissue.
+  struct {
+    double stepChange = 0, wayChange = 0, forceLength = 0, length = 0;
+  } seen{};
 };
 
 // Tissue that moved by itself begins to follow the device: its steps so far count as answers to ways of a device.
@@ -40,10 +45,18 @@ void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, do
 // `lag`, m: how far the device is ahead of the end of the path that the dynamics was given. Tissue answers that path,
 // not the device: straight and with the frame's mean kept, it ends a T^2 / 12 behind a device that speeds up by a. Ways
 // of the device itself would leave a body that follows it behind by as much, felt as a mass of k T^2 / 12 more.
-void startFrame(const Eigen::Vector3d& lag, DeviceMotion& device);
-// How far what is held follows, by the frame that begins: least squares of its steps' changes by those of the ways that
-// they answer. Its give tells what yields with the spheres still, within a frame; a limp organ swings along within a
-// few, a free body goes all the way. Steady ways tell nothing, as tissue may drift by itself.
+// `duration`, s: of the frame that ended.
+void startFrame(const Eigen::Vector3d& lag, double duration, DeviceMotion& device);
+// How far what is touched or held follows, by the frame that begins. Its give tells what yields with the spheres still,
+// within a frame; a limp organ swings along within a few, a free body goes all the way. Two things show it, and the
+// larger counts:
+// - least squares of the tissue's steps' changes by those of the ways that they answer. Steady ways tell nothing, as
+//   tissue may drift by itself.
+// - of a contact, how much its force changes per length that it or the device went, against the tool's stiffness:
+//   tissue that swings on its own, or has been knocked off, has steps that answer no way, but little force.
+// `forceChange`, N: of the tissue's force along `normal`, over the frame that ended; 0 where it is not known.
+void learnFollowing(const BlendedSurface& surface, std::span<const ProxyContact> contacts,
+                    const Eigen::Vector3d& normal, double stiffness, double forceChange, DeviceMotion& device);
 void learnFollowing(const BlendedSurface& surface, const Grip& grip, DeviceMotion& device);
 
 struct TissueMotion {
@@ -54,14 +67,19 @@ struct TissueMotion {
   double followed = 0;
 };
 
-// Mean over contacts that share a push along `normal`, by a device of this stiffness (N/m). The steps are in all
-// directions, what lies beyond them along the normal: along the surface, friction lets tissue follow or not.
+// Mean over contacts that share a push along `normal`. The steps are in all directions, what lies beyond them along the
+// normal: along the surface, friction lets tissue follow or not.
 TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
-                           const Eigen::Vector3d& normal, double stiffness, const DeviceMotion& device);
+                           const Eigen::Vector3d& normal, const DeviceMotion& device);
 
 // N: by how much a push along `normal` can differ from what it was BlendedSurface::toolForceAge ago: by what device and
 // tissue went since and the stiffness of tool and tissue in series, and by the tool's damper.
 double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Eigen::Vector3d& normal,
+                 const ToolSettings& tool, const DeviceMotion& device);
+
+// N: likewise of the drag across `normal`: by what the device went off the tissue since, on either side of what
+// friction holds.
+double dragSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Eigen::Vector3d& normal,
                  const ToolSettings& tool, const DeviceMotion& device);
 
 // N: likewise of a grip's force, in any direction, and by twice what the tissue's force lately changed by in a frame,

@@ -300,7 +300,7 @@ TEST(Servo, SlidingDragsTheTissueByFrictionOnly) {
       drag -= tool.force.x();
     });
     // The ellipsoid slopes by 0.05 x / (0.1 sqrt(0.1^2 - x^2)) = 0.144 in the middle of the way, at x = 0.0275.
-    EXPECT_NEAR(drag / press, friction - 0.144, 0.03);
+    EXPECT_NEAR(drag / press, friction - 0.144, 0.035);
   }
 }
 

@@ -73,7 +73,7 @@ TEST(TissueMotion, AtASteadySpeedTheStepsAreTheWholeLead) {
   grip.held = {{0, Vector3d::Zero()}, {1, Vector3d::Zero()}};
   for (const double alpha : {0.25, 0.5, 1.0}) {
     device.way[0] = alpha * device.way[1];
-    for (const TissueMotion& motion : {contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), 400, device),
+    for (const TissueMotion& motion : {contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), device),
                                        heldMotion(surface, alpha, grip, device)}) {
       EXPECT_LT((motion.lead - surface.steps[0][0]).norm(), 1e-15);
       EXPECT_LT((motion.velocity - surface.steps[0][0] / 0.02).norm(), 1e-13);
@@ -96,13 +96,13 @@ TEST(TissueMotion, AtFirstTouchTissueFollowsByThePartThatItsGiveTells) {
   device.velocity = {0.03, -0.05, 0};
   const double part = 400 * 0.01 / (1 + 400 * 0.01);
   const auto lead = [&](double alpha) {
-    return contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), 400, device).lead;
+    return contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), device).lead;
   };
   device.way[0] = {0, -3e-4, 0};
   EXPECT_LT((lead(0.8) - part * Vector3d(0, -3e-4, 0)).norm(), 1e-15);
   device.way[0] = {0, -5e-4, 0};
   const Vector3d end = lead(1);
-  startFrame(Vector3d::Zero(), device);
+  startFrame(Vector3d::Zero(), surface.duration, device);
   EXPECT_LT((lead(1e-9) - end).norm(), 1e-11);  // no step from frame to frame
 }
 
@@ -125,11 +125,11 @@ TEST(TissueMotion, TissueThatAlreadyMovesIsTouchedWithoutAStepInItsLead) {
     beginContact(surface, began, contact, Vector3d::UnitY(), 400, device);
     device.velocity = way / surface.duration;
     const auto lead = [&](double alpha) {
-      return contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), 400, device).lead;
+      return contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), device).lead;
     };
     device.way[0] += (1 - began) * way;
     EXPECT_LT((lead(1) - part * way).norm(), 1e-15) << began;
-    startFrame(Vector3d::Zero(), device);
+    startFrame(Vector3d::Zero(), surface.duration, device);
     for (const double alpha : {0.05, 0.3, 0.5, 0.75, 0.95, 1.0}) {
       device.way[0] = alpha * way;
       EXPECT_LT((lead(alpha) - part * way).norm(), 1e-15) << began << " " << alpha;
@@ -150,7 +150,7 @@ static double followedAfter(double answered, double atOnce, int frames) {
   for (int frame = 0; frame < frames; ++frame) {
     const Vector3d way(1e-4 * std::sin(0.4 * frame), 2e-4 * std::cos(0.3 * frame), 0);
     device.way[0] += way;
-    startFrame(Vector3d::Zero(), device);
+    startFrame(Vector3d::Zero(), surface.duration, device);
     surface.steps = {{{Vector3d(3e-5, 0, -4e-5) + answered * way}, surface.steps[0], surface.steps[1]}};
     learnFollowing(surface, grip, device);
   }
@@ -163,6 +163,36 @@ TEST(TissueMotion, HowFarHeldTissueFollowsIsSeenFromItsSteps) {
   EXPECT_NEAR(followedAfter(0.9, 0, 40), 0.9, 1e-3);
   EXPECT_NEAR(followedAfter(0.3, 0.5, 40), 0.5, 1e-12);  // not less than what it gives at once
   EXPECT_NEAR(followedAfter(1.2, 0.5, 40), 1, 1e-12);    // nor beyond the device
+}
+
+// Tissue that swings on its own, and that a way of 0.1 mm more presses by so much of the tool's stiffness more.
+static double followedByForce(double series, double atOnce, int frames) {
+  BlendedSurface surface;
+  surface.duration = 0.02;
+  surface.triangles = {{0, 1, 2}};
+  surface.give.assign(3, atOnce / (1 - atOnce) / 400);
+  for (auto& steps : surface.steps) steps.assign(3, Vector3d::Zero());
+  ProxyContact contact;
+  contact.triangle = 0;
+  contact.weights = {1, 0, 0};
+  contact.share = 1;
+  DeviceMotion device;
+  beginContact(surface, 1, contact, Vector3d::UnitY(), 400, device);
+  for (int frame = 0; frame < frames; ++frame) {
+    const Vector3d way(0, -1e-4, 0);
+    device.way[0] += way;
+    startFrame(Vector3d::Zero(), surface.duration, device);
+    surface.steps[1] = surface.steps[0];
+    surface.steps[0].assign(3, Vector3d(0, 9e-5 * std::sin(frame), 0));
+    learnFollowing(surface, {&contact, 1}, Vector3d::UnitY(), 400, series * 400 * way.norm(), device);
+  }
+  return device.follows[0];
+}
+
+TEST(TissueMotion, HowFarTouchedTissueFollowsIsSeenFromItsForce) {
+  EXPECT_NEAR(followedByForce(0.01, 0.5, 0), 0.5, 1e-12);
+  EXPECT_NEAR(followedByForce(0.01, 0.5, 20), 0.985, 3e-3);  // half as much again, to be safe
+  EXPECT_NEAR(followedByForce(0.8, 0.5, 20), 0.5, 1e-12);    // not less than what it gives at once
 }
 
 // The other nodes beyond the neighbours, and the spheres, stand still.

@@ -1,0 +1,96 @@
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <functional>
+
+#include "haptics/servo.h"
+#include "physics/dynamics/world.h"
+#include "tests/synthetic_model.h"
+#include "tests/tool_run.h"
+
+// Tissue that goes along with a stiff tool: what hand and tissue get agrees although the servo sees it a frame late.
+namespace medulla {
+
+using Eigen::Vector3d;
+
+namespace {
+struct Felt {
+  Vector3d hand = Vector3d::Zero(), tissue = Vector3d::Zero();  // N s
+  double apart = 0;                                             // N s, sum over frames
+  double largestStep = 0, largest = 0, energy = 0;              // N between ticks, N, J
+};
+}  // namespace
+
+constexpr double kRadius = 0.01;  // m, of the rod along x
+
+// A rod of 8 cm, clamped at one end or free, touched from above (z).
+static Felt touchRod(bool isClamped, const std::function<Vector3d(double)>& device, double duration) {
+  constexpr int kTicks = 24;
+  constexpr double kTick = 1.0 / 1200;
+  const auto model = synthetic::chainModel(synthetic::straightTube(5, 0.08, kRadius, 16, 12));
+  BodyDescription body = synthetic::body(model, 1e5);
+  if (isClamped) body.fixed = {{0, FixedFreedom::all}};
+  WorldSettings settings;
+  settings.gravity.setZero();
+  World world(settings, {body});
+  ToolSettings tool;
+  tool.stiffness = 4000;
+  DynamicsFrame last, now;
+  world.readFrame(last);
+  now = last;
+  const auto touched = std::make_shared<SoftBodyModel>(*model);
+  touched->buckets.assign(1, {});
+  for (std::size_t t = 0; t < touched->triangles.size(); ++t) touched->buckets[0].push_back(int(t));
+  Servo servo({{touched, world.nodeGive(0)}}, {tool}, kTick, now, {deviceAt(device(0))});
+  Felt felt;
+  Loads loads;
+  Vector3d before = Vector3d::Zero();
+  for (int tick = 0; tick < int(std::lround(duration / kTick)); tick += kTicks) {
+    Vector3d hand = Vector3d::Zero();
+    for (int k = 1; k <= kTicks; ++k) {
+      servo.tick(double(k) / kTicks, {deviceAt(device((tick + k) * kTick))});
+      const ToolState& state = servo.tools()[0];
+      hand -= kTick * state.force;
+      felt.largestStep = std::max(felt.largestStep, (state.force - before).norm());
+      felt.largest = std::max(felt.largest, state.force.norm());
+      felt.energy = std::max(felt.energy, state.energy);
+      before = state.force;
+    }
+    servo.handOver(kTicks * kTick, loads);
+    std::vector<Vector3d> impulse = world.advance(loads);
+    impulse.resize(1, Vector3d::Zero());  // empty without loads
+    felt.hand += hand;
+    felt.tissue += impulse[0];
+    felt.apart += (hand - impulse[0]).norm();
+    last = now;
+    world.readFrame(now);
+    servo.commit(last, now, servo.tools(), &impulse);
+    servo.beginFrame();
+  }
+  std::printf("[  reached ] hand %.5f, tissue %.5f, apart %.5f N s; largest %.4f N, step %.4f N; energy %.3g J\n",
+              felt.hand.norm(), felt.tissue.norm(), felt.apart, felt.largest, felt.largestStep, felt.energy);
+  return felt;
+}
+
+// Pressed smoothly by 8 mm within a second and held.
+TEST(LimpTissue, APressedRodFeelsAsSoftAsItIs) {
+  const double top = kRadius + ToolSettings{}.radius;
+  const Felt felt = touchRod(
+      true, [=](double t) { return Vector3d(0.07, 0, top + 5e-4 - 8.5e-3 * ease(t, 0.1, 1)); }, 1.5);
+  EXPECT_GT(felt.tissue.norm(), 0.01);
+  EXPECT_LT((felt.hand - felt.tissue).norm(), 0.05 * felt.tissue.norm());
+  EXPECT_LT(felt.apart, 0.1 * felt.tissue.norm());
+  EXPECT_LT(felt.largestStep, 0.025);
+}
+
+// Poked at 0.1 m/s.
+TEST(LimpTissue, AFreeRodIsNotHeavierThanItIs) {
+  const double top = kRadius + ToolSettings{}.radius;
+  const Felt felt = touchRod(
+      false, [=](double t) { return Vector3d(0.04, 0, top + 0.005 - 0.1 * std::min(0.07, std::max(0.0, t - 0.1))); },
+      0.6);
+  EXPECT_GT(felt.tissue.norm(), 1e-3);
+  EXPECT_LT((felt.hand - felt.tissue).norm(), 1.2 * felt.tissue.norm());
+}
+
+}  // namespace medulla
