@@ -242,7 +242,7 @@ TEST(Loads, ASlidingSpringDragsByFrictionAlone) {
         const double normal = -impulse[0].dot(s.outward);
         return normal;
       }();
-      for (const double speed : {0.05, -0.5}) {
+      for (const double speed : {0.05, -0.5, -2e-4}) {
         s.anchorVelocity = speed * along;
         std::vector<Vector3d> impulse;
         for (int i = 0; i < 100; ++i) impulse = world.advance(loads);
@@ -250,6 +250,29 @@ TEST(Loads, ASlidingSpringDragsByFrictionAlone) {
         EXPECT_NEAR(normal, push, 0.2 * push);
         EXPECT_NEAR(drag, (speed > 0 ? 0.3 : -0.3) * normal, 1e-3 * normal) << speed;
       }
+    }
+  }
+}
+
+// Where the push on late tissue is less than it seemed, so is what sticks.
+TEST(Loads, ASpringThatSticksHoldsWithinFriction) {
+  for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit}) {
+    for (const double friction : {0.3, 100.0}) {
+      World world = tubeWorld(SurfaceMode::full, true, 1, integrator);
+      Loads loads;
+      loads.toolSprings = {pushAt(world, 80, 0.003)};
+      ToolSpring& s = loads.toolSprings[0];
+      const Vector3d along = s.outward.unitOrthogonal();
+      s.friction = friction;
+      s.anchor += 0.004 * along;
+      std::vector<Vector3d> impulse;
+      for (int i = 0; i < 200; ++i) impulse = world.advance(loads);
+      const double normal = -impulse[0].dot(s.outward), drag = impulse[0].dot(along);
+      EXPECT_GT(normal, 0);
+      if (friction < 1)
+        EXPECT_NEAR(drag, friction * normal, 1e-3 * normal);
+      else
+        EXPECT_GT(drag, 0.5 * normal);
     }
   }
 }

@@ -117,7 +117,7 @@ void settleTool(WorldData& d, const ImplicitData& s, const PointLoad& load, cons
   Vector3d x = Vector3d::Zero();
   for (int i = 0; i < p.count; ++i) x += p.weights[i] * nodePosition(d, p.nodes[i]);
   const Vector3d rate = ratesOf(s, rows);
-  constexpr double kSticking = 1e-3;  // m/s: slower slip is dragged by less than Coulomb's friction
+  constexpr double kSticking = 1e-5;  // m/s: slower slip is dragged by less than Coulomb's friction, and sticks soon
   const double h = s.duration, spring = h * (h * p.stiffness + p.damping);
   const auto act = [&](int a, double weight, double along) {
     rows[a].weight = weight;
@@ -131,8 +131,10 @@ void settleTool(WorldData& d, const ImplicitData& s, const PointLoad& load, cons
   }
   d.loadForces[load.index].setZero();
   if (p.outward == nullptr || pull[0] <= 0) act(0, spring, pull[0]);
-  const double drag = p.friction * std::max(0.0, -pull[0]) / std::max(kSticking, std::hypot(slip[1], slip[2]));
-  for (int a = 1; a < 3; ++a) p.slides ? act(a, h * drag, drag * slip[a]) : act(a, spring, pull[a]);
+  const double most = pull[0] < 0 ? p.friction * -pull[0] : 0,
+               drag = most / std::max(kSticking, std::hypot(slip[1], slip[2]));
+  const double whole = std::hypot(pull[1], pull[2]), share = p.outward != nullptr && whole > most ? most / whole : 1;
+  for (int a = 1; a < 3; ++a) p.slides ? act(a, h * drag, drag * slip[a]) : act(a, share * spring, share * pull[a]);
 }
 
 void addDeadLoads(const WorldData& d, ImplicitData& s, double time) {

@@ -94,15 +94,17 @@ void addImpulse(WorldData& d, const SettlingSpring& s, const Vector3d& impulse) 
     addNodeImpulse(d, s.spring.nodes[i], s.hosts[i], s.spring.weights[i] * impulse);
 }
 
-// Towards the anchor's velocity across `outward`, by what makes them equal or by what friction carries. `force` is what
-// has acted so far.
-Vector3d dragOf(const SettlingSpring& s, const Vector3d& velocity, const Vector3d& force, double push, double substep) {
+// Across `outward`, by no more than friction carries: the spring's `pull`, or, where it slides, what makes velocities
+// equal. `force` is what has acted so far.
+Vector3d dragOf(const SettlingSpring& s, const Vector3d& velocity, const Vector3d& force, const Vector3d& pull,
+                double push, double substep) {
   constexpr double kLeastMobility = 1e-9;  // 1/kg: what is held
   const Vector3d& n = *s.spring.outward;
   const auto across = [&n](const Vector3d& a) { return Vector3d(a - a.dot(n) * n); };
-  const Vector3d sticking =
-      across(force) + across(s.spring.anchorVelocity - velocity) / (substep * std::max(kLeastMobility, s.mobility));
-  const double size = sticking.norm(), most = s.spring.friction * push;
+  const Vector3d equal =
+      force + (s.spring.anchorVelocity - velocity) / (substep * std::max(kLeastMobility, s.mobility));
+  const Vector3d sticking = across(s.spring.slides ? equal : pull);
+  const double size = sticking.norm(), most = push > 0 ? s.spring.friction * push : 0;
   return size > most ? Vector3d(most / size * sticking) : sticking;
 }
 
@@ -117,7 +119,7 @@ double settle(WorldData& d, const SettlingSpring& s, Vector3d& force) {
   if (p.outward != nullptr) {
     const Vector3d& n = *p.outward;
     const double along = next.dot(n), push = std::max(0.0, -along);
-    next = p.slides ? Vector3d(dragOf(s, v, force, push, h) - push * n) : Vector3d(next - std::max(0.0, along) * n);
+    next = dragOf(s, v, force, next, push, h) - push * n;
   }
   const Vector3d change = next - force;
   addImpulse(d, s, h * change);

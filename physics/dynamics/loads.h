@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <vector>
 
 // Loads from outside that the dynamics evaluates in its own substeps. What a tool does is new in every frame and comes
@@ -13,10 +14,10 @@ struct SoftBodyModel;
 
 // The virtual coupling between a tool and the point of the surface that it touches. The surface point is
 // x = sum weights x_nodes; force on it: stiffness (anchor - x) + damping (anchorVelocity - x'), spread to the nodes by
-// the same weights (paper 4). A pushing spring never pulls: its component along `outward` is dropped when positive. One
-// that slides is such a spring along `outward` alone, and across it Coulomb's friction against the anchor's velocity: a
-// spring would hold the tissue where it was touched at the frame's start, as a drag of stiffness times the frame's
-// duration, 8 N s/m at 50 Hz.
+// the same weights (paper 4). A pushing spring never pulls: its component along `outward` is dropped when positive, and
+// across it holds by no more than friction times the push. One that slides is such a spring along `outward` alone, and
+// across it Coulomb's friction against the anchor's velocity: a spring would hold the tissue where it was touched at
+// the frame's start, as a drag of stiffness times the frame's duration, 8 N s/m at 50 Hz.
 struct ToolSpring {
   int tool = 0;  // whose reaction this is
   int body = 0;
@@ -28,7 +29,7 @@ struct ToolSpring {
   double stiffness = 0;                                      // N/m
   double damping = 0;                                        // N s/m
   bool slides = false;
-  double friction = 0;  // Coulomb's, >= 0, where it slides
+  double friction = std::numeric_limits<double>::infinity();  // Coulomb's, >= 0: dynamic where it slides, else static
 };
 
 // A grabbed node: the same spring on one node, pulling and pushing.

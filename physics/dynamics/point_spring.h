@@ -25,8 +25,8 @@ struct PointSpring {
   Eigen::Vector3d anchor, anchorVelocity;  // m, m/s, at the substep's end
   const Eigen::Vector3d* outward;          // null: pulls and pushes
   double stiffness, damping;
-  bool slides;  // across `outward`: no spring, but Coulomb's friction
-  double friction;
+  bool slides;      // across `outward`: no spring, but Coulomb's friction
+  double friction;  // times the push: the most across `outward`
 };
 
 // One of them while the velocities of a substep settle, with all that stays meanwhile.
