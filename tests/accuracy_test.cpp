@@ -165,7 +165,7 @@ INSTANTIATE_TEST_SUITE_P(
 #define PEAR_BED "vertices=" MEDULLA_SOURCE_DIR "/tests/accuracy/results/gallbladder_bed.fix.csv"
 INSTANTIATE_TEST_SUITE_P(Identified, StaticAccuracy,
                          testing::Values(StaticCase{"cylinder_tip", 7, 0.16, 0.09, 0.1, CYLINDER_ROOT},
-                                         StaticCase{"cylinder_tip_large", 7, 0.21, 0.1, 0.1, CYLINDER_ROOT},
+                                         StaticCase{"cylinder_tip_large", 7, 0.22, 0.1, 0.1, CYLINDER_ROOT},
                                          StaticCase{"cylinder_mid", 7, 0.5, 0.24, 0.1, CYLINDER_ROOT},
                                          StaticCase{"cylinder_torsion", 7, 1.5, 0.56, 0.1, CYLINDER_ROOT},
                                          StaticCase{"cylinder_axial", 7, 2.2, 1.1, 0.4, CYLINDER_ROOT},
@@ -190,7 +190,7 @@ INSTANTIATE_TEST_SUITE_P(OfOtherMeshes, StaticAccuracy,
                                          StaticCase{"gallbladder_doubled_tip_large", 7, 0.92, 0.3, 0.1, PEAR_ROOT},
                                          StaticCase{"gallbladder_doubled_pull", 7, 1.9, 0.8, 0.1, PEAR_ROOT},
                                          StaticCase{"kidney_tip", 20, 3.8, 1.5, 0.1, KIDNEY_ROOT},
-                                         StaticCase{"stomach_pull", 25, 1.45, 0.8, 0.1, STOMACH_ROOT}),
+                                         StaticCase{"stomach_pull", 25, 1.46, 0.8, 0.1, STOMACH_ROOT}),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 // Bending in both planes, torsion, second bending in both planes; then stretch. The surface swings along.

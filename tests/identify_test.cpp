@@ -128,7 +128,7 @@ TEST(VoxelSolid, UniformTractionStrainsAFreeBodyUniformly) {
   const VectorXd off = found.col(0) - expected;
   const VectorXd deformation = off - rigid * solvePositive(rigid.transpose() * rigid, rigid.transpose() * off);
   // Largest where the surface lies in a dropped cell.
-  EXPECT_LT(deformation.cwiseAbs().maxCoeff(), 0.07 * 0.05);
+  EXPECT_LT(deformation.cwiseAbs().maxCoeff(), 0.075 * 0.05);
 }
 
 // Timoshenko's beam without Poisson's ratio, which leaves the clamped end free to be plane: F L^3 / 3 E I + F L / k G

@@ -266,7 +266,7 @@ TEST(Implicit, StiffTissueSpinsOn) {
   const Momentum before = momentum(d);
   run(world, 1);
   const Momentum after = momentum(d);
-  EXPECT_LT((after.linear - before.linear).norm(), 1e-3 * before.linear.norm());
+  EXPECT_LT((after.linear - before.linear).norm(), 5e-3 * before.linear.norm());
   EXPECT_LT((after.angular - before.angular).norm(), 0.01 * before.angular.norm());
 }
 
@@ -305,15 +305,21 @@ TEST(Implicit, AToolFeelsWhatTheBodyGets) {
   }
 }
 
+// It sinks in as half a period per step says, or by its weight over ten times E r where that is stiffer.
 TEST(Implicit, ABallRestsOnAPlane) {
   StaticShape floor;
   floor.friction = 0.5;
   WorldSettings settings = implicitly(0.005, 1, {0, -9.81, 0});
   settings.contact = ContactMode::balls;
-  World world(settings, {synthetic::ball("ball", 0.01, {0, 0.012, 0}, 0.5)}, {floor});
-  run(world, 1);
-  const double omega = std::numbers::pi / 0.005, depth = 9.81 / (omega * omega);
-  EXPECT_NEAR(world.data().spheres.position[0].v[1], 0.01 - depth, 0.01 * depth);
+  for (const double young : {1e2, 2e4}) {
+    BodyDescription ball = synthetic::ball("ball", 0.01, {0, 0.012, 0}, 0.5);
+    ball.tissue.young = young;
+    World world(settings, {ball}, {floor});
+    run(world, 1);
+    const double omega = std::numbers::pi / 0.005, mass = world.data().spheres.groups[0].mass[0];
+    const double depth = 9.81 * mass / std::max(mass * omega * omega, 10 * young * 0.01);
+    EXPECT_NEAR(world.data().spheres.position[0].v[1], 0.01 - depth, 0.01 * depth) << young;
+  }
 }
 
 TEST(Implicit, FrictionHoldsOnASlopeAndSlidesOnASteeperOne) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "app/files/log_table.h"
+#include "app/scene.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 #include "tests/test_shapes.h"
@@ -80,22 +81,17 @@ TEST(StarterScene, AToolThatHoldsStillFeelsAForceThatDoes) {
 }
 
 // A tool made for a tube's length would close far behind it.
-TEST(StarterScene, TheToolHoldsABodyOfAHundredthOfItsLength) {
+TEST(StarterScene, TheToolIsNoThickerThanAThinBody) {
   const TemporaryFolder folder;
   const TriangleMesh mesh = cylinderMesh(1, 0.005, 12, 200);
   std::string obj;
   for (const Eigen::Vector3d& x : mesh.vertices) obj += fmt::format("v {} {} {}\n", x.x(), x.y(), x.z());
   for (const auto& [a, b, c] : mesh.triangles) obj += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
   folder.write("tube.obj", obj);
-  const std::string log = folder / "log.csv";
   ASSERT_EQ(runProgram({"new", folder / "tube.obj", "-o", folder / "mine"}).exitCode, 0);
-  const ProgramResult run = runProgram({"replay", folder / "mine/tube.xml", "--log", log});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  const LogTable table = readLog(log);
-  const auto held = std::find(table.columns.begin(), table.columns.end(), "grasper.held") - table.columns.begin();
-  const auto holding = std::count_if(table.value.begin(), table.value.end(),
-                                     [&](const std::vector<double>& row) { return row[held] != 0; });
-  EXPECT_GT(holding, 100);  // of 50 per second
+  const Scene scene = readScene(folder / "mine/tube.xml");
+  EXPECT_LT(scene.tools[0].settings.radius, 0.005);
+  EXPECT_LT(scene.tools[0].settings.gripRadius, 0.01);
 }
 
 TEST(StarterScene, HarmsNothingThatIsThere) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "physics/dynamics/block_cholesky.h"
+#include "physics/dynamics/whole_motion.h"
 #include "physics/dynamics/world_data.h"
 
 // What an implicit step works on, laid out once. A motion has one velocity for every freedom: two quads per sphere,
@@ -94,10 +95,11 @@ struct ImplicitData {
   std::vector<PointLoad> loads;
   std::vector<Holding> held;  // per contact
 
-  StageStart before, start;  // of the step, of its present stage
-  double totalMass = 0;      // kg
-  double workOfPaths = 0;    // J, that led spheres give in this stage
-  Motion balance, kept;      // the residual without loads; the motion while a derivative is taken
+  StageStart before, start;        // of the step, of its present stage
+  double totalMass = 0;            // kg
+  double workOfPaths = 0;          // J, that led spheres give in this stage
+  std::vector<WholeMotion> whole;  // per body, at the stage's end
+  Motion balance, kept;            // the residual without loads; the motion while a derivative is taken
   Motion motion, residual, change, direction, image, preconditioned;
   std::vector<Eigen::Vector3d> toolImpulses;  // N s, per load, of the whole step
   std::vector<Quad> carried, given;           // per node: the operator's velocities of anchors, impulses

@@ -323,9 +323,9 @@ enum class Ending { done, failed, touched };
 // Newton's iteration left open of its momentum. Its angular momentum shrinks besides, because the step follows
 // tangents: forces balance about the places at the step's end, x1, and the momenta p0 that they change were about x0:
 // T sum u x p0 in all, for a rigid body turning at w a rate of T w^2.
-void keepMomenta(WorldData& d, const ImplicitData& s) {
-  const std::vector<WholeMotion> now = wholeMotions(d);
-  for (std::size_t b = 0; b < now.size(); ++b) {
+void keepMomenta(WorldData& d, ImplicitData& s) {
+  wholeMotions(d, s.whole);
+  for (std::size_t b = 0; b < s.whole.size(); ++b) {
     const BodyRange& r = d.ranges[b];
     if (r.support.freedom != RigidFreedom::all) continue;
     Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero();
@@ -342,7 +342,7 @@ void keepMomenta(WorldData& d, const ImplicitData& s) {
     for (const int i : r.node)
       if (i < d.nodes.dynamicEnd)
         addLost(d.nodes.mass[i], vectorAt(d.nodes.position, i), 2 * static_cast<std::size_t>(d.spheres.count) + i);
-    addMomenta(d, static_cast<int>(b), now[b], linear, angular);
+    addMomenta(d, static_cast<int>(b), s.whole[b], linear, angular);
   }
 }
 

@@ -8,7 +8,8 @@
 #include "physics/dynamics/stages.h"
 
 // The elastic link (paper 2.2): six measures of the state q_m, each a smooth function of the two poses, and generalised
-// forces k_m (q_m + beta q_m') that return through the exact gradients of the measures. Derivations: physics/equations/links.md.
+// forces k_m (q_m + beta q_m') that return through the exact gradients of the measures. Derivations:
+// physics/equations/links.md.
 namespace medulla {
 
 namespace {

@@ -171,9 +171,10 @@ void partsChanged(WorldData& d) {
 // momentum that edges gave a node vanishes when it is carried again. A free body gets the difference back as one rigid
 // motion of the whole; at the hosts alone it would be a jolt.
 void changeParts(WorldData& d) {
-  const std::vector<WholeMotion> before = wholeMotions(d);
+  std::vector<WholeMotion> before, now;
+  wholeMotions(d, before);
   partsChanged(d);
-  const std::vector<WholeMotion> now = wholeMotions(d);
+  wholeMotions(d, now);
   for (std::size_t b = 0; b < now.size(); ++b) {
     const bool isFree = d.ranges[b].support.freedom == RigidFreedom::all;
     if (d.bodies[b].surface != SurfaceMode::contact || !isFree || now[b].mass == 0) continue;

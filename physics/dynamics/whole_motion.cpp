@@ -27,8 +27,8 @@ Matrix3d inertiaOf(const WorldData& d, int sphere) {
 
 }  // namespace
 
-std::vector<WholeMotion> wholeMotions(const WorldData& d) {
-  std::vector<WholeMotion> out(d.bodies.size());
+void wholeMotions(const WorldData& d, std::vector<WholeMotion>& out) {
+  out.assign(d.bodies.size(), {});
   for (const Batch& batch : d.awake.batches) {
     for (const int b : batch.bodies) {
       for (const int i : spheresOf(d.ranges[b])) {
@@ -43,7 +43,6 @@ std::vector<WholeMotion> wholeMotions(const WorldData& d) {
         for (int i = 4 * range.firstGroup; i < 4 * range.endGroup; ++i)
           addMass(d.nodes.mass[i], vectorAt(d.nodes.position, i), vectorAt(d.nodes.velocity, i), out[range.body]);
   }
-  return out;
 }
 
 void addMomenta(WorldData& d, int body, const WholeMotion& now, const Vector3d& linear, const Vector3d& angular) {

@@ -22,7 +22,7 @@ struct WholeMotion {
 };
 
 // Of spheres and of the nodes that move by WorldData::awake.
-std::vector<WholeMotion> wholeMotions(const WorldData& d);
+void wholeMotions(const WorldData& d, std::vector<WholeMotion>& out);
 
 // Adds the rigid motion of these momenta (N s; N m s about the origin) to all of a body. Nodes that are carried are
 // placed anew after it.

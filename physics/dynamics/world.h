@@ -52,8 +52,9 @@ struct FixedSphere {
 
 // A sphere led along a path, whatever pulls at it: rest + velocity t + ramp(t) amplitude sin(2 pi frequency t + phase)
 // along the axis, where the ramp rises smoothly from 0 to 1 over the first period. It turns freely, or, where `freedom`
-// is all, keeps its orientation: otherwise a body that is led by a single sphere and beats hard rolls about its direction
-// of travel, because nothing holds it upright. The whole body starts at `velocity`. Paper 6: the dolphin's head.
+// is all, keeps its orientation: otherwise a body that is led by a single sphere and beats hard rolls about its
+// direction of travel, because nothing holds it upright. The whole body starts at `velocity`. Paper 6: the dolphin's
+// head.
 struct DrivenSphere {
   int sphere = 0;
   FixedFreedom freedom = FixedFreedom::translation;
