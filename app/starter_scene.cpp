@@ -122,7 +122,7 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
   out += "  <clock servo=\"1200\" dynamics=\"50\" duration=\"9\"/>\n";
   out += "  <!-- the mesh is taken as the shape under weight; for free fall: gravity=\"0 -9.81 0\" -->\n";
   out += "  <dynamics gravity=\"0 0 0\"/>\n";
-  out += fmt::format("  <tissue name=\"soft\" young=\"{:.3g}\" poisson=\"0.45\" density=\"1040\" damping=\"0.15\"/>\n",
+  out += fmt::format("  <tissue name=\"soft\" young=\"{:.3g}\" poisson=\"0.45\" density=\"1040\" damping=\"0.4\"/>\n",
                      young);
   out += fmt::format("  <body name=\"{0}\" model=\"{0}.model.xml\" tissue=\"soft\" look=\"stomach\">\n", name);
   out += "    <!-- numbers of filling spheres; the model view shows the held ones grey -->\n";

@@ -213,14 +213,14 @@ TEST(ImplicitContact, FastBodiesDoNotPassEachOther) {
 TEST(ImplicitContact, FrictionThatHeldGivesBackNoMoreThanItTookIn) {
   const double slope = 0.35;
   BodyDescription soft = raft("raft", {0, kRadius, 0}, 0.5);
-  soft.tissue.young = 1e3;  // no contact as stiff as the tissue asks for is stiffer than k
+  soft.tissue.young = 1.5e4;  // ten times E r is less than that k, and the raft gives way a little
   World world(contactSettings(1, kGravity * Vector3d(std::sin(slope), -std::cos(slope), 0)), {soft}, {floorOf(0.5)});
   runUntil(world, 1);
   double stored = 0;
   for (const HeldFriction& held : world.data().contact.held) stored += held.energy;
   const double mass = 4 * world.data().spheres.groups[0].mass[0], along = kGravity * std::sin(slope), step = 0.005;
   EXPECT_NEAR(stored, mass * along * along * step * step / (2 * std::numbers::pi * (2 + std::numbers::pi)),
-              0.2 * stored);
+              0.3 * stored);
   const double before = totalEnergy(world) - world.energies().gravity;
   world.data().gravity = quadOf({0, -kGravity * std::cos(slope), 0});
   for (int k = 0; k < 10; ++k) {

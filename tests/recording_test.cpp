@@ -321,7 +321,8 @@ static Steps stepsOf(const std::function<ToolSample(double)>& device) {
     steps.velocity = std::max(steps.velocity, (after - before).norm() / dt);
   });
   EXPECT_GT(force.size(), 600u);
-  for (std::size_t i = 10; i + 1 < force.size(); ++i)  // contact begins with a step of its own
+  // Contact begins with a step of its own, and with one where its second frame tells how far tissue follows.
+  for (std::size_t i = 18; i + 1 < force.size(); ++i)
     steps.force = std::max(steps.force, std::abs(force[i + 1] - 2 * force[i] + force[i - 1]));
   return steps;
 }

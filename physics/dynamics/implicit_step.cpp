@@ -198,6 +198,12 @@ double leastResidual(const ImplicitData& s) {
   return s.duration * kLeastAcceleration * std::sqrt(s.totalMass);
 }
 
+// J, below which motion is what the iteration leaves open.
+double restEnergy(const ImplicitData& s) {
+  const double least = kSettled * leastResidual(s);
+  return 0.5 * least * least;
+}
+
 // From the present state, which `s.start` holds, with its momenta there. False where the iteration does not settle.
 bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   constexpr int kIterations = 20;
@@ -357,8 +363,7 @@ Ending checkEnergy(WorldData& d, const ImplicitData& s, bool twoStages, const St
   if (twoStages) return kinetic <= allowed + 0.5 * scale ? Ending::done : Ending::failed;
   if (kinetic <= allowed) return Ending::done;
   // At rest what the iteration leaves open has either sign: such a world stays.
-  const double least = kSettled * leastResidual(s);
-  if (std::max(kinetic, before.kinetic) < 0.5 * least * least) {
+  if (std::max(kinetic, before.kinetic) < restEnergy(s)) {
     restore(d, s.before);
     slowDown(d, 0);
     return Ending::done;
@@ -392,7 +397,7 @@ Ending attempt(WorldData& d, ImplicitData& s, std::size_t halvings, const Loads&
   const Ending last = solve(time, s.duration);
   if (last != Ending::done) return last;
   visitAngularMomenta(d, s, [&](int i, Lanes momentum) { store(d.spheres.angularMomentum[i], momentum); });
-  if (late == 0) keepMomenta(d, s);
+  if (late == 0 && kineticEnergy(d, s) > restEnergy(s)) keepMomenta(d, s);
   return checkEnergy(d, s, late > 0, before);
 }
 
