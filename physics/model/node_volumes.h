@@ -18,8 +18,8 @@ namespace medulla {
 //   secondMoment_i  - sum_n v_n r_n r_n^T      r_n from restFrame_i to node n, over the nodes of that cell
 // and restFrame_i is the centroid of exactly that remainder: spheres and nodes together have the mass, centre and
 // inertia of the cells. (Rejected: taking the mass from the two spheres of the node's link. Thin cells beside long
-// links have too small a second moment to give their nodes any mass.) Where anchors lie on links depends on the frames: call in turn
-// with attachNodes until both stand still.
+// links have too small a second moment to give their nodes any mass.) Where anchors lie on links depends on the frames:
+// call in turn with attachNodes until both stand still.
 //
 // The nodes carry `fraction` (0..0.4) of the body in all, each by the stiffness of its attachment (area over depth), so
 // that all swing alike and none alone bounds the step of the dynamics. A cell gives at most half of its volume and 70 %
