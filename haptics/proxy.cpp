@@ -16,8 +16,8 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-// The proxy stops this far short of a surface, so that rounding never puts it inside; farther than `touching` a contact
-// is over. Both in metres.
+// The proxy stops this far short of a surface, so that rounding never puts it inside; farther than `kTouching` a
+// contact is over. Both in metres.
 static constexpr double kStandOff = 5e-8, kTouching = 1e-6;
 // Below this a proxy has arrived, m.
 static constexpr double kArrived = 1e-9;
