@@ -81,16 +81,26 @@ TEST(TissueMotion, AtASteadySpeedTheStepsAreTheWholeLead) {
   }
 }
 
-TEST(TissueMotion, AtFirstTouchTissueFollowsByThePartThatItsGiveTells) {
+struct TouchedTriangle {
   BlendedSurface surface;
-  surface.duration = 0.02;
-  surface.triangles = {{0, 1, 2}};
-  surface.give = {0.01, 0, 0};
-  for (auto& steps : surface.steps) steps.assign(3, Vector3d::Zero());
   ProxyContact contact;
-  contact.triangle = 0;
-  contact.weights = {1, 0, 0};
-  contact.share = 1;
+};
+
+// At its first corner; `give` in m/N.
+static TouchedTriangle touchedTriangle(double give) {
+  TouchedTriangle out;
+  out.surface.duration = 0.02;
+  out.surface.triangles = {{0, 1, 2}};
+  out.surface.give.assign(3, give);
+  for (auto& steps : out.surface.steps) steps.assign(3, Vector3d::Zero());
+  out.contact.triangle = 0;
+  out.contact.weights = {1, 0, 0};
+  out.contact.share = 1;
+  return out;
+}
+
+TEST(TissueMotion, AtFirstTouchTissueFollowsByThePartThatItsGiveTells) {
+  const auto [surface, contact] = touchedTriangle(0.01);
   DeviceMotion device;
   beginContact(surface, 0.5, contact, Vector3d::UnitY(), 400, device);
   device.velocity = {0.03, -0.05, 0};
@@ -167,15 +177,7 @@ TEST(TissueMotion, HowFarHeldTissueFollowsIsSeenFromItsSteps) {
 
 // Tissue that swings on its own, and that a way of 0.1 mm more presses by so much of the tool's stiffness more.
 static double followedByForce(double series, double atOnce, int frames) {
-  BlendedSurface surface;
-  surface.duration = 0.02;
-  surface.triangles = {{0, 1, 2}};
-  surface.give.assign(3, atOnce / (1 - atOnce) / 400);
-  for (auto& steps : surface.steps) steps.assign(3, Vector3d::Zero());
-  ProxyContact contact;
-  contact.triangle = 0;
-  contact.weights = {1, 0, 0};
-  contact.share = 1;
+  auto [surface, contact] = touchedTriangle(atOnce / (1 - atOnce) / 400);
   DeviceMotion device;
   beginContact(surface, 1, contact, Vector3d::UnitY(), 400, device);
   for (int frame = 0; frame < frames; ++frame) {
