@@ -233,7 +233,7 @@ Buckets::Buckets(const std::vector<TouchableBody>& bodies, double largestRadius,
   for (const TouchableBody& body : bodies) {
     appendBody(*body.model, surface, data_->buckets);
     surface.give.insert(surface.give.end(), body.give.begin(), body.give.end());
-    surface.give.resize(surface.bodyOfNode.size(), 0);
+    surface.give.resize(surface.bodyOfNode.size());
   }
   listTrianglesOfNodes(surface);
   data_->near.reserve(surface.triangles.size());

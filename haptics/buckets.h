@@ -15,7 +15,7 @@ namespace medulla {
 // A surface that a tool can touch: a soft body's triangles grouped by filling sphere.
 struct TouchableBody {
   std::shared_ptr<const SoftBodyModel> model;
-  std::vector<double> give{};  // m/N per node, >= 0: what it yields at once to a force on it alone; empty: nothing
+  std::vector<NodeGive> give{};  // per node; empty: nothing
 };
 
 // Frames: the servo is one ahead of the frame that it blends, and a mean over a frame is as old as its middle.
@@ -26,7 +26,7 @@ struct BlendedSurface {
   std::vector<std::array<int, 3>> triangles;  // node numbers
   std::vector<int> bodyOfNode;
   std::vector<int> firstNode;  // of each body
-  std::vector<double> give;    // m/N per node: TouchableBody::give
+  std::vector<NodeGive> give;  // per node: TouchableBody::give
   // The triangles of node n: trianglesOfNode[firstTriangleOfNode[n]] up to those of n + 1.
   std::vector<int> firstTriangleOfNode, trianglesOfNode;
   std::vector<Eigen::Vector3d> from, to;  // m, world, per node

@@ -9,8 +9,8 @@ namespace medulla {
 static double heldGive(const BlendedSurface& surface, const Grip& grip) {
   double stiffness = 0;
   for (const HeldOffset& held : grip.held) {
-    if (!(surface.give[held.node] > 0)) return 0;
-    stiffness += 1 / surface.give[held.node];
+    if (!(surface.give[held.node].own > 0)) return 0;
+    stiffness += 1 / surface.give[held.node].own;
   }
   return 1 / stiffness;
 }

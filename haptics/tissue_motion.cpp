@@ -54,15 +54,18 @@ Vector3d meanOver(const BlendedSurface& surface, const ProxyContact& contact, co
 
 // m/N, mean over the contacts: what each yields to its share of a push.
 double contactGive(const BlendedSurface& surface, std::span<const ProxyContact> contacts) {
-  double sum = 0, shares = 0;
+  double sum = 0, carried = 0, shares = 0;
   for (const ProxyContact& contact : contacts) {
     double own = 0;
-    for (int k = 0; k < 3; ++k)
-      own += contact.weights[k] * contact.weights[k] * surface.give[surface.triangles[contact.triangle][k]];
+    for (int k = 0; k < 3; ++k) {
+      const NodeGive& give = surface.give[surface.triangles[contact.triangle][k]];
+      own += contact.weights[k] * contact.weights[k] * give.own;
+      carried += contact.share * contact.weights[k] * give.carried;
+    }
     sum += contact.share * contact.share * own;
     shares += contact.share;
   }
-  return shares > 0 ? sum / (shares * shares) : 0;
+  return shares > 0 ? sum / (shares * shares) + carried / shares : 0;
 }
 
 // m, of the point that is touched, within a frame at its present velocity.

@@ -49,7 +49,7 @@ TEST(Grab, ClosingWhileItPressesAtSpeedHasNoForceStep) {
   constexpr double kSpeed = 0.04;  // m/s
   for (const double give : {0.0, 0.02}) {
     ToolRun run = grabbing();
-    run.give.assign(run.body.shape->restNodes.size(), give);
+    run.give.assign(run.body.shape->restNodes.size(), NodeGive{give});
     run.device = [=](double t) { return deviceAt(touch - kSpeed * t * Vector3d::UnitZ(), t > 0.15 ? 1 : 0); };
     Vector3d last = Vector3d::Zero();
     bool held = false;

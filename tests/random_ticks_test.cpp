@@ -94,7 +94,8 @@ static int runEpisode(std::uint64_t seed, int frames) {
   std::vector<TouchableBody> touchable;
   touchable.reserve(bodies);
   for (const TouchShape& shape : shapes)
-    touchable.push_back({shape, std::vector<double>(shape->restNodes.size(), seed % 2 == 0 ? 0 : 0.05)});
+    touchable.push_back(
+        {shape, std::vector<NodeGive>(shape->restNodes.size(), {seed % 2 == 0 ? 0 : 0.05, seed % 4 < 2 ? 0 : 0.1})});
   const std::vector<ToolSettings> tools = {randomTool(random), randomTool(random)};
   RandomDevice devices[2] = {RandomDevice(random), RandomDevice(random)};
   const int ticksPerFrame = std::array<int, 4>{50, 20, 10, 1}[int(random.uniform(0, 4))];

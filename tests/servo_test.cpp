@@ -190,7 +190,7 @@ TEST(Servo, StrokesNeverGiveEnergy) {
     ToolRun run = pressing(0.1);
     run.live = live;
     run.body.ground *= 10;  // stiffer than the tool
-    run.give.assign(run.body.shape->restNodes.size(), 1 / run.body.ground);
+    run.give.assign(run.body.shape->restNodes.size(), NodeGive{1 / run.body.ground});
     run.device = [](double t) { return deviceAt({0.012, 0.004, 0.0545 - 0.008 * (1 - std::cos(8 * t))}); };
     double most = 0, largest = 0;
     run.run(2.4, [&](double, const ToolState& tool) {

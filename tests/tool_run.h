@@ -20,7 +20,7 @@ struct ToolRun {
   Eigen::Vector3d bodyImpulse = Eigen::Vector3d::Zero();  // N s, that the dynamics took
   double bodyImpulseLength = 0;                           // N s, sum over frames of its size
   bool blend = true;                                      // false: every tick at the newest frame
-  std::vector<double> give{};                             // TouchableBody::give
+  std::vector<NodeGive> give{};                           // TouchableBody::give
   bool live = false;                                      // what was handed over waits for a frame
 
   void run(double duration, const std::function<void(double time, const ToolState&)>& each = {}) {

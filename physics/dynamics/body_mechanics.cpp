@@ -256,29 +256,6 @@ BodyMechanics bodyMechanics(const BodyDescription& body) {
   return out;
 }
 
-std::vector<double> nodeGive(const BodyDescription& body, const BodyMechanics& mechanics) {
-  const std::vector<std::array<int, 2>>& edges = body.model->edges;
-  const std::size_t count = body.model->restNodes.size();
-  if (body.surface == SurfaceMode::skin) return std::vector<double>(count, 0);
-  std::vector<double> own = mechanics.attachmentStiffness, all;  // N/m
-  for (std::size_t i = 0; i < mechanics.normalExcess.size(); ++i) own[i] += mechanics.normalExcess[i];
-  all = own;
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    for (const int n : edges[e]) all[n] += mechanics.edgeStiffness[e];
-  for (std::size_t e = 0; e < edges.size(); ++e) {
-    for (int k = 0; k < 2; ++k) {
-      const int beside = edges[e][1 - k];
-      const double stiffness = mechanics.edgeStiffness[e];
-      const bool yields = mechanics.nodeMoves[beside] && all[beside] > 0;
-      own[edges[e][k]] += yields ? stiffness * (1 - stiffness / all[beside]) : stiffness;
-    }
-  }
-  std::vector<double> give(count, 0);
-  for (std::size_t i = 0; i < count; ++i)
-    if (mechanics.nodeMoves[i] && own[i] > 0) give[i] = 1 / own[i];
-  return give;
-}
-
 double meanRadius(const SoftBodyModel& model) {
   double sum = 0;
   for (const FillingSphere& s : model.spheres) sum += s.radius;

@@ -46,9 +46,6 @@ struct BodyMechanics {
 // Throws std::runtime_error, without the body's name, where the description cannot be simulated.
 BodyMechanics bodyMechanics(const BodyDescription& body);
 
-// m/N per node: World::nodeGive().
-std::vector<double> nodeGive(const BodyDescription& body, const BodyMechanics& mechanics);
-
 double meanRadius(const SoftBodyModel& model);  // m, of its balls
 
 }  // namespace medulla

@@ -16,6 +16,12 @@ struct BodyFrame {
   std::vector<SpherePose> spheres;
 };
 
+// m/N, >= 0: how far a node yields within a frame to a small force on it alone, into the surface.
+struct NodeGive {
+  double own = 0;      // by its attachment and edges, while the spheres and what lies beyond its neighbours stand still
+  double carried = 0;  // by what the spheres that carry it are moved
+};
+
 struct DynamicsFrame {
   double time = 0;  // s
   std::vector<BodyFrame> bodies;

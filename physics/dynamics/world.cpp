@@ -12,6 +12,7 @@
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/layout.h"
+#include "physics/dynamics/node_give.h"
 #include "physics/dynamics/node_motion.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/dynamics/stages.h"
@@ -172,8 +173,6 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
   data_ = layOut(settings, std::move(bodies), mechanics);
   data_->stableSubstep = stable;
   data_->frame = -settings.settleFrames;
-  for (std::size_t b = 0; b < mechanics.size(); ++b)
-    data_->nodeGive.push_back(medulla::nodeGive(data_->bodies[b], mechanics[b]));
   // Below this a second of simulation takes over an hour: a wrong unit rather than a stiff tissue.
   constexpr double kLeastSubstep = 1e-8;
   if (settings.integrator == Integrator::explicitEuler && settings.substeps == 0 &&
@@ -188,6 +187,8 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
     data_->substeps = std::max(
         1, static_cast<int>(std::ceil(settings.frameDuration / (implicit ? kImplicitStep : kStepSafety * stable))));
   data_->substep = settings.frameDuration / data_->substeps;
+  for (std::size_t b = 0; b < mechanics.size(); ++b)
+    data_->nodeGive.push_back(medulla::nodeGive(data_->bodies[b], mechanics[b], {data_->substeps, data_->substep}));
   layOutDeadLoads(*data_);
   layOutContact(*data_, statics);
 }
@@ -288,7 +289,7 @@ double World::nodeSpeed(int body) const {
   return std::sqrt(squared);
 }
 
-const std::vector<double>& World::nodeGive(int body) const {
+const std::vector<NodeGive>& World::nodeGive(int body) const {
   return data_->nodeGive.at(body);
 }
 

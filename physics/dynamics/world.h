@@ -130,9 +130,7 @@ class World {
   Energies energies() const;
   double volumeRatio(int body) const;  // enclosed by the nodes, over rest
   double nodeSpeed(int body) const;    // m/s, of the fastest node
-  // m/N per node: what it yields at once to a force on it alone, while spheres and what lies beyond its neighbours
-  // stay. 0 where nodes have no mass of their own or are fixed.
-  const std::vector<double>& nodeGive(int body) const;
+  const std::vector<NodeGive>& nodeGive(int body) const;  // per node, within one dynamics frame
   int dynamicNodes(int body) const;  // that moved by themselves in the last frame: none on a skin or asleep
   // What contact has let through so far; who overlapped before anything moved, each pair of bodies once, in order.
   PenetrationReport penetration() const;

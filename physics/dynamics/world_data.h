@@ -255,14 +255,14 @@ struct CarriedNode {
   BareSphere mass;
 };
 
-struct NodeGive {              // of four nodes' attachments alone
+struct AttachmentGive {        // of four nodes' attachments alone
   Lanes perForce, perGravity;  // m/N, and m per m/s2
 };
 
 struct SurfaceParts {
   std::vector<SurfacePart> parts;
   std::vector<int> ofGroup;          // per group of dynamic nodes
-  std::vector<NodeGive> give;        // per group of dynamic nodes
+  std::vector<AttachmentGive> give;  // per group of dynamic nodes
   std::vector<Quad> shift;           // m, per node: from where it would hang still by itself
   std::vector<Quad> velocityBefore;  // m/s, per sphere: at the end of the frame before
   std::vector<Quad> felt;  // m/s2, per body: gravity less the mean acceleration of its carried mass in this frame
@@ -349,9 +349,9 @@ struct WorldData {
   Springs springs;
   Identified identified;
   SurfaceParts surface;
-  std::vector<Rest> rest;                     // per body
-  std::vector<std::vector<double>> nodeGive;  // per body: World::nodeGive()
-  std::vector<StillPlace> stillPlace;         // per sphere; state
+  std::vector<Rest> rest;                       // per body
+  std::vector<std::vector<NodeGive>> nodeGive;  // per body: World::nodeGive()
+  std::vector<StillPlace> stillPlace;           // per sphere; state
   Awake awake;
   std::vector<SphereDrive> drives;
   std::vector<NodeForce> deadLoads;  // body after body, as described
