@@ -20,7 +20,7 @@ MEDULLA_INLINE void orient(Turning& t) {
   t.bodyMomentum = rotateBack(t.rotation, t.momentum);
 }
 
-Turning readTurning(const Spheres& s, std::size_t i) {
+MEDULLA_INLINE Turning readTurning(const Spheres& s, std::size_t i) {
   Turning t;
   t.q = gatherFour(s.orientation, i, t.w);
   t.momentum = gatherFour(s.angularMomentum, i);
@@ -46,7 +46,7 @@ void turn(const SphereGroup& g, Turning& t, Lanes h) {
   t.w = scale * w;
 }
 
-void storeAngularVelocity(const SphereGroup& g, const Turning& t, Quad* out) {
+MEDULLA_INLINE void storeAngularVelocity(const SphereGroup& g, const Turning& t, Quad* out) {
   const Lanes3 omega = rotate(t.rotation, timesInverseInertia(g, t.bodyMomentum));
   storeFour(omega, out, 0);
 }
