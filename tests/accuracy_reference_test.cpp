@@ -22,7 +22,7 @@ using namespace reference;
 const char* const kStatic[] = {
     "cylinder_tip", "cylinder_tip_large", "cylinder_mid", "cylinder_axial", "cylinder_torsion", "cylinder_poke_small",
     "cylinder_poke_large", "gallbladder_tip", "gallbladder_tip_large", "gallbladder_mid", "gallbladder_axial",
-    "gallbladder_torsion", "gallbladder_poke_small", "gallbladder_poke_large", "liver_tip", "liver_tip_in_plane", "liver_mid",
+    "gallbladder_torsion", "gallbladder_twist", "gallbladder_poke_small", "gallbladder_poke_large", "liver_tip", "liver_tip_in_plane", "liver_mid",
     "liver_axial", "liver_stretched_tip", "liver_stretched_axial", "gallbladder_halved_tip_large", "gallbladder_halved_pull",
     "gallbladder_doubled_tip_large", "gallbladder_doubled_pull", "liver_torsion", "liver_poke_small", "liver_poke_large",
     "stomach_press", "kidney_tip"};

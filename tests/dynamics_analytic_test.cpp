@@ -254,6 +254,26 @@ TEST(Analytic, TheLowestModeSwingsAndDecaysAsAsked) {
   EXPECT_NEAR(decrement / std::numbers::pi, ratio, 0.1 * ratio);
 }
 
+// Rayleigh's damping of a bar's twisting, in which no sphere's centre moves: spins are damped, too.
+TEST(Analytic, TwistingDecaysAsMassAndStiffnessSay) {
+  constexpr int links = 6;
+  const BodyDescription body = bar(links, 0.3, LinkModel::springs);
+  BodyMechanics mechanics = bodyMechanics(body);
+  dampBody(body, mechanics, Integrator::explicitEuler);
+  World world(under(Vector3d::Zero()), {body});
+  for (int i = 1; i <= links; ++i)
+    turnBy(world.data(), i, 0.2 * std::sin(0.5 * std::numbers::pi * i / links) * Vector3d::UnitX());
+  runStage(world.data(), evaluateLinks);
+  const double start = world.energies().elastic, shear = kYoung / (2 * (1 + body.tissue.poisson));
+  settle(world, 1);
+  const double omega = 0.5 * std::numbers::pi / kLength * std::sqrt(shear / kDensity);
+  const double expected = mechanics.massDamping + mechanics.linkRelaxation * omega * omega;  // 1/s, of the energy
+  const double measured = std::log(start / (world.energies().elastic + world.energies().kinetic));
+  std::printf("[  reached ] twisting loses energy at %.3g / s, of which %.3g by stiffness; expected %.3g\n", measured,
+              mechanics.linkRelaxation * omega * omega, expected);
+  EXPECT_NEAR(measured, expected, 0.1 * expected);
+}
+
 TEST(Analytic, AFixedPointSwingsLikeAPendulum) {
   // Translation alone fixed: a stiff bar swings about its first sphere, T = 2 pi sqrt(I / m g l) for small angles.
   constexpr int links = 2;

@@ -6,7 +6,9 @@
 // of the step. Textbooks let it act against the world; here it acts against the body's own rigid motion, as far as what
 // is held or driven leaves it one: both momenta of a free body stay, a pendulum swings on, and what is carried along is
 // not dragged. Of what a sphere weighs its own mass alone counts:
-// alpha allows for what hangs on it (rest_modes.cpp), and must not do so twice where nodes are carried.
+// alpha allows for what hangs on it (rest_modes.cpp), and must not do so twice where nodes are carried. Spins are
+// damped likewise, or the twisting of a tube would hardly be: each as if its own moment of inertia were the least about
+// all axes, which spares turning the tensor and takes no less than nothing from any motion.
 namespace medulla {
 
 namespace {
@@ -21,35 +23,37 @@ struct RigidMotion {
 
 // Of spheres' centres about a point.
 struct Moments {
-  double mass = 0;
-  Lanes first = splat(0), momentum = splat(0), angularMomentum = splat(0);
-  Lanes squares = splat(0), products = splat(0);  // m x x and so on; m x y, m y z, m z x
+  double mass = 0, spinMoment = 0;
+  Lanes first = splat(0), momentum = splat(0), angularMomentum = splat(0);  // the last with the spins'
+  Lanes squares = splat(0), products = splat(0);                            // m x x and so on; m x y, m y z, m z x
 };
 
-Moments momentsAbout(const Lanes& reference, const Spheres& s, const std::vector<double>& ownShare,
-                     const BodyRange& r) {
+Moments momentsAbout(const Lanes& reference, const WorldData& d, const BodyRange& r) {
+  const Spheres& s = d.spheres;
   Moments out;
   for (const int i : spheresOf(r)) {
-    const double m = ownShare[i] * s.groups[i / 4].mass[i % 4];
+    const double m = d.surface.ownShare[i] * s.groups[i / 4].mass[i % 4], spinning = d.surface.ownMoment[i];
     const Lanes x = load(s.position[i]) - reference, mx = splat(m) * x, v = load(s.velocity[i]);
     out.mass += m;
+    out.spinMoment += spinning;
     out.first = out.first + mx;
     out.momentum = fma(splat(m), v, out.momentum);
-    out.angularMomentum = out.angularMomentum + crossProduct(mx, v);
+    out.angularMomentum = fma(splat(spinning), load(s.angularVelocity[i]), out.angularMomentum + crossProduct(mx, v));
     out.squares = fma(mx, x, out.squares);
     out.products = fma(mx, turnedLanes(x), out.products);
   }
   return out;
 }
 
-Matrix3d inertiaOf(const Lanes& squares, const Lanes& q) {
+Matrix3d inertiaOf(const Lanes& squares, const Lanes& q, double spinMoment) {
   const double trace = sumOfLanes(squares);
-  // Spheres in a line do not say how they turn about it, and need not: that turning moves none of their centres.
+  // Spheres in a line that do not turn do not say how they turn about it, and need not: that moves none of their
+  // centres.
   constexpr double kRegular = 1e-14;
   const double regular = kRegular * trace + std::numeric_limits<double>::min();
   Matrix3d inertia;
   inertia << trace - squares[0], -q[0], -q[2], -q[0], trace - squares[1], -q[1], -q[2], -q[1], trace - squares[2];
-  inertia.diagonal().array() += regular;
+  inertia.diagonal().array() += regular + spinMoment;
   return inertia;
 }
 
@@ -63,14 +67,15 @@ Vector3d vectorOf(const Lanes& v) {
 
 // The rigid motion with the spheres' linear and orbital angular momentum: sums about the body's first sphere, moved to
 // the centre of mass by Steiner's theorem.
-RigidMotion freeMotion(const Spheres& s, const std::vector<double>& ownShare, const BodyRange& r) {
-  const Lanes reference = load(s.position[r.firstSphere]);
-  const Moments m = momentsAbout(reference, s, ownShare, r);
+RigidMotion freeMotion(const WorldData& d, const BodyRange& r) {
+  const Lanes reference = load(d.spheres.position[r.firstSphere]);
+  const Moments m = momentsAbout(reference, d, r);
   RigidMotion motion;
   const Lanes centre = m.first / splat(m.mass);
   motion.centre = reference + centre;
   motion.linear = m.momentum / splat(m.mass);
-  const Matrix3d inertia = inertiaOf(fnma(m.first, centre, m.squares), fnma(m.first, turnedLanes(centre), m.products));
+  const Matrix3d inertia =
+      inertiaOf(fnma(m.first, centre, m.squares), fnma(m.first, turnedLanes(centre), m.products), m.spinMoment);
   const Lanes about = m.angularMomentum - crossProduct(centre, m.momentum);
   motion.angular = lanesOf(inertia.ldlt().solve(vectorOf(about)));
   return motion;
@@ -89,8 +94,8 @@ RigidMotion supportedMotion(const WorldData& d, const BodyRange& r) {
   RigidMotion motion{placeOf(point), zero, zero};
   if (point.sphere >= 0) motion.linear = load(s.velocity[r.firstSphere + point.sphere]);
   if (r.support.freedom == RigidFreedom::none) return motion;
-  const Moments m = momentsAbout(motion.centre, s, d.surface.ownShare, r);
-  const Matrix3d inertia = inertiaOf(m.squares, m.products);
+  const Moments m = momentsAbout(motion.centre, d, r);
+  const Matrix3d inertia = inertiaOf(m.squares, m.products, m.spinMoment);
   const Vector3d momentum = vectorOf(m.angularMomentum - crossProduct(m.first, motion.linear));
   if (r.support.freedom == RigidFreedom::aboutPoint) {
     motion.angular = lanesOf(inertia.ldlt().solve(momentum));
@@ -101,22 +106,33 @@ RigidMotion supportedMotion(const WorldData& d, const BodyRange& r) {
   return motion;
 }
 
+// Against a motion that does not turn, which most bodies are left, and one that does.
+template <bool turns>
+void dampAgainst(const RigidMotion& rigid, double lost, const BodyRange& r, WorldData& d) {
+  Spheres& s = d.spheres;
+  for (const int i : spheresOf(r)) {
+    const Lanes v = load(s.velocity[i]), spin = load(s.angularVelocity[i]);
+    Lanes beyond = v - rigid.linear, spinBeyond = spin;
+    if constexpr (turns) {
+      beyond = beyond - crossProduct(rigid.angular, load(s.position[i]) - rigid.centre);
+      spinBeyond = spin - rigid.angular;
+    }
+    store(s.velocity[i], fma(splat(-lost * d.surface.ownShare[i]), beyond, v));
+    store(s.angularMomentum[i], fma(splat(-lost * d.surface.ownMoment[i]), spinBeyond, load(s.angularMomentum[i])));
+  }
+}
+
 }  // namespace
 
-// Implicit, so that no alpha is too much for a step. Spins and nodes follow through links and attachments.
+// Implicit, so that no alpha is too much for a step. Nodes follow through attachments.
 void dampBodies(WorldData& d, const Batch& batch) {
-  Spheres& s = d.spheres;
-  const std::vector<double>& ownShare = d.surface.ownShare;
   for (const int b : batch.bodies) {
     const BodyRange& r = d.ranges[b];
     if (r.massDamping == 0) continue;
     const double lost = 1 - 1 / (1 + d.substep * r.massDamping);
-    const bool isFree = r.support.freedom == RigidFreedom::all;
-    const RigidMotion m = isFree ? freeMotion(s, ownShare, r) : supportedMotion(d, r);
-    for (const int i : spheresOf(r)) {
-      const Lanes v = load(s.velocity[i]), rigid = m.linear + crossProduct(m.angular, load(s.position[i]) - m.centre);
-      store(s.velocity[i], fma(splat(-lost * ownShare[i]), v - rigid, v));
-    }
+    const bool isFree = r.support.freedom == RigidFreedom::all, turns = r.support.freedom != RigidFreedom::none;
+    const RigidMotion rigid = isFree ? freeMotion(d, r) : supportedMotion(d, r);
+    turns ? dampAgainst<true>(rigid, lost, r, d) : dampAgainst<false>(rigid, lost, r, d);
   }
 }
 

@@ -7,6 +7,7 @@
 #include "physics/dynamics/stages.h"
 #include "physics/dynamics/still_nodes.h"
 #include "physics/dynamics/whole_motion.h"
+#include "physics/model/symmetric_eigen.h"
 #include "physics/sort_unique.h"
 
 // SurfaceMode::contact: a host's nodes move by themselves only where something acts on them or what acts has spread to
@@ -275,9 +276,14 @@ void layOutSurfaceParts(WorldData& d, const std::vector<BodyMechanics>& mechanic
   for (std::size_t k = 0; k < s.parts.size(); ++k) layOutPart(d, mechanics[rangeOf(d, k).body], k, s.parts[k]);
   s.spheres.resize(d.spheres.position.size());
   s.ownShare.resize(d.spheres.position.size(), 1);
-  for (std::size_t b = 0; b < mechanics.size(); ++b)
-    for (std::size_t i = 0; i < mechanics[b].sphereMass.size(); ++i)
-      s.spheres[d.ranges[b].firstSphere + i] = {mechanics[b].sphereMass[i], mechanics[b].sphereInertia[i]};
+  s.ownMoment.resize(d.spheres.position.size(), 0);
+  for (std::size_t b = 0; b < mechanics.size(); ++b) {
+    for (std::size_t i = 0; i < mechanics[b].sphereMass.size(); ++i) {
+      const std::size_t k = d.ranges[b].firstSphere + i;
+      s.spheres[k] = {mechanics[b].sphereMass[i], mechanics[b].sphereInertia[i]};
+      if (mechanics[b].turns[i]) s.ownMoment[k] = symmetricEigen(mechanics[b].sphereInertia[i]).values[0];
+    }
+  }
   listCarriedNodes(d, mechanics);
   for (std::size_t k = 0; k < s.parts.size(); ++k)
     if (!s.parts[k].moves) carry(d, k);

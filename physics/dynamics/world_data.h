@@ -269,7 +269,8 @@ struct SurfaceParts {
   std::vector<LinkLoads> weightOnLinks;  // of carried nodes
   std::vector<Quad> weight;              // N and N m, two per sphere: what these add for not hanging at its frame
   std::vector<BareSphere> spheres;
-  std::vector<double> ownShare;    // per sphere: of its mass now, without what carried nodes add
+  std::vector<double> ownShare;   // per sphere: of its mass now, without what carried nodes add
+  std::vector<double> ownMoment;  // kg m2, per sphere: the least moment of inertia of its own; 0 where it does not turn
   std::vector<CarriedNode> nodes;  // of parts that have the choice; by sphere
 };
 

@@ -141,6 +141,7 @@ def gallbladder():
     regions = {
         "root": lambda x, n: x @ axis < 24,
         "tip": beyond(axis, 89.5),
+        "fundus": beyond(axis, 75),
         "flank": within(body - 15 * side, 11),
         "bed": lambda x, n: (n @ front < -0.6) & (x @ axis > 40),
         "small": within(belly, 8),
@@ -152,6 +153,7 @@ def gallbladder():
         Case("mid", "root", Load("flank", tuple(30 * side)), 4),
         Case("axial", "root", Load("tip", tuple(700 * axis)), 4),
         Case("torsion", "root", Load("tip", turn=500, axis=tuple(axis)), 4),
+        Case("twist", "root", Load("fundus", turn=600, axis=tuple(axis)), 4),
         Case("poke_small", "bed", Load("small", tuple(-200 * front)), 3),
         Case("poke_large", "bed", Load("large", tuple(-500 * front)), 3),
     ]
