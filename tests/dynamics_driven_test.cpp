@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "tests/complaint.h"
 #include "tests/dynamics_states.h"
@@ -82,6 +83,28 @@ TEST(DrivenSphere, DragLeavesTheTerminalSpeed) {
     for (int frame = 0; frame < 25; ++frame) world.advance({});
     const double speed = (before - world.data().spheres.position[2].v[1]) / (world.time() - since);
     EXPECT_NEAR(speed, gravity / drag, 1e-4 * gravity / drag);
+  }
+}
+
+// Likewise what a load pulls, to F / (m drag).
+TEST(DrivenSphere, DragLeavesALoadItsTerminalSpeed) {
+  constexpr double drag = 100, force = 0.01;
+  for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+    WorldSettings settings;
+    settings.ambientDrag = drag;
+    settings.gravity.setZero();
+    BodyDescription body = tube(surface);
+    std::vector<int> all(body.model->restNodes.size());
+    std::iota(all.begin(), all.end(), 0);
+    body.deadLoads = spreadLoad(*body.model, all, {.force = {0, -force, 0}, .from = 0, .to = 0});
+    World world(settings, {body});
+    double mass = 0;
+    for (const FillingSphere& s : body.model->spheres) mass += body.tissue.density * s.volume;
+    for (int frame = 0; frame < 25; ++frame) world.advance({});
+    const double before = world.data().spheres.position[2].v[1], since = world.time();
+    for (int frame = 0; frame < 25; ++frame) world.advance({});
+    const double speed = (before - world.data().spheres.position[2].v[1]) / (world.time() - since);
+    EXPECT_NEAR(speed, force / (mass * drag), 1e-3 * force / (mass * drag));
   }
 }
 

@@ -49,8 +49,9 @@ void gatherSkinLoads(WorldData& d) {
 // N, N m, as quads.
 void push(WorldData& d, int sphere, Lanes force, Lanes torque) {
   const SphereGroup& g = d.spheres.groups[sphere / 4];
-  addTo(d.spheres.velocity[sphere], splat(d.substep * g.inverseMass[sphere % 4]) * force);
-  addTo(d.spheres.angularMomentum[sphere], splat(d.substep * g.freeToTurn[sphere % 4]) * torque);
+  const double time = d.keptByDrag * d.substep;
+  addTo(d.spheres.velocity[sphere], splat(time * g.inverseMass[sphere % 4]) * force);
+  addTo(d.spheres.angularMomentum[sphere], splat(time * g.freeToTurn[sphere % 4]) * torque);
 }
 
 void pushFrame(WorldData& d, int frame, Lanes force, Lanes torque) {
@@ -167,7 +168,7 @@ void applyDeadLoads(WorldData& d, double time) {
     if (!(share > 0)) continue;
     const int group = d.skinLoads.groupOfLoad[k], node = load.node;
     if (group < 0) {
-      const Vector3d impulse = d.substep * share * load.force;
+      const Vector3d impulse = d.keptByDrag * d.substep * share * load.force;
       setVector(d.nodes.velocity, node, vectorAt(d.nodes.velocity, node) + d.nodes.inverseMass[node] * impulse);
     } else {
       Lanes3& sum = d.skinLoads.groups[group].force;

@@ -35,7 +35,7 @@ void driveSpheres(WorldData& d, double time, double duration) {
 // then led back to its path.
 void dragVelocities(WorldData& d, const Batch& batch) {
   if (d.settings.ambientDrag == 0) return;
-  const Lanes kept = splat(1 / (1 + d.substep * d.settings.ambientDrag));
+  const Lanes kept = splat(d.keptByDrag);
   for (const int i : batch.spheres) {
     store(d.spheres.velocity[i], kept * load(d.spheres.velocity[i]));
     store(d.spheres.angularMomentum[i], kept * load(d.spheres.angularMomentum[i]));

@@ -46,7 +46,9 @@ Vector3d nodeVelocity(const WorldData& d, int node, const HostPoint& host) {
   return sum;
 }
 
-void addNodeImpulse(WorldData& d, int node, const HostPoint& host, const Vector3d& impulse) {
+// The drag, solved implicitly, takes its part of these forces, too.
+void addNodeImpulse(WorldData& d, int node, const HostPoint& host, const Vector3d& whole) {
+  const Vector3d impulse = d.keptByDrag * whole;
   if (host.count == 0)
     setVector(d.nodes.velocity, node, vectorAt(d.nodes.velocity, node) + d.nodes.inverseMass[node] * impulse);
   for (int k = 0; k < host.count; ++k)
@@ -86,7 +88,7 @@ void prepare(const WorldData& d, const PointSpring& p, SettlingSpring& out) {
     else
       ofMasses += w * w * m;
   }
-  out.mobility = ofMasses + rootOfSkin * rootOfSkin;
+  out.mobility = d.keptByDrag * (ofMasses + rootOfSkin * rootOfSkin);
 }
 
 void addImpulse(WorldData& d, const SettlingSpring& s, const Vector3d& impulse) {

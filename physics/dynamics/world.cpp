@@ -187,6 +187,7 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
     data_->substeps = std::max(
         1, static_cast<int>(std::ceil(settings.frameDuration / (implicit ? kImplicitStep : kStepSafety * stable))));
   data_->substep = settings.frameDuration / data_->substeps;
+  data_->keptByDrag = 1 / (1 + data_->substep * settings.ambientDrag);
   for (std::size_t b = 0; b < mechanics.size(); ++b)
     data_->nodeGive.push_back(medulla::nodeGive(data_->bodies[b], mechanics[b], {data_->substeps, data_->substep}));
   layOutDeadLoads(*data_);

@@ -368,6 +368,7 @@ struct WorldData {
   Quad gravity;
   int substeps = 1;
   double substep = 0;        // s
+  double keptByDrag = 1;     // of velocities, and of impulses, in an explicit substep under ambient drag
   double stableSubstep = 0;  // s
   std::int64_t frame = 0;    // dynamics frames done since time 0; time = frame * frameDuration
 };
