@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "app/commands/commands.h"
+#include "app/commands/rest_watch.h"
 #include "app/enum_names.h"
 #include "app/files/number_text.h"
 #include "app/files/output_file.h"
@@ -364,7 +365,7 @@ Verb addReplay(CLI::App& app) {
               "times of ticks, and which came late");
   c->add_flag(
       "--until-rest", a->untilRest,
-      "end when every surface node is slower than 1e-5 m/s and no load is still growing; exit code 4 where that "
+      "end when no body has moved for a swing of its slowest mode and no load is still growing; exit code 4 where that "
       "is not before the scene's duration");
   return {c, [a] {
             RunOptions options = runOptions(a->run);

@@ -58,7 +58,10 @@ TEST_F(IdentifiedScene, RunsHeldByItsPatch) {
   const SoftBodyModel& m = *loaded.scene.bodies[0].model;
   for (const int node : m.identified->patches[0].nodes)
     EXPECT_EQ(frame.bodies[0].nodes[node], m.restNodes[node]) << "node " << node;
-  EXPECT_GT(world.nodeSpeed(0), 0);
+  double farthest = 0;
+  for (std::size_t n = 0; n < m.restNodes.size(); ++n)
+    farthest = std::max(farthest, (frame.bodies[0].nodes[n] - m.restNodes[n]).norm());
+  EXPECT_GT(farthest, 0);
 }
 
 TEST_F(IdentifiedScene, WithoutItsNetworkPatchOrRatioItIsRefusedAndTheRightBuildNamed) {

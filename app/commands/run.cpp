@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "app/commands/rest_watch.h"
 #include "app/files/log_file.h"
 #include "app/files/output_file.h"
 #include "app/files/state_cache.h"
@@ -90,48 +91,6 @@ class SurfaceRecorder {
  private:
   std::vector<RecordedFrame> moments_;
   std::vector<std::string> paths_;  // one each
-};
-
-// Whether a scene has come to rest.
-class RestWatch {
- public:
-  explicit RestWatch(const LoadedScene& loaded) {
-    for (const SceneBody& body : loaded.scene.bodies)
-      for (const DeadLoad& load : body.deadLoads) busyUntil_ = std::max(busyUntil_, load.to);
-    for (const Trajectory& motion : loaded.trajectories) busyUntil_ = std::max(busyUntil_, motionEnd(motion));
-  }
-  void afterFrame(const Simulation& simulation) {
-    const World& world = simulation.world();
-    fastest_ = 0;
-    for (std::size_t b = 0; b < world.bodies().size(); ++b) {
-      const double speed = world.nodeSpeed(static_cast<int>(b));
-      if (speed <= fastest_) continue;
-      fastest_ = speed;
-      body_ = world.bodies()[b].name;
-    }
-    const double time = simulation.time();
-    // A recorded motion ends at a tick, which may lie a rounding past the frame that ends there.
-    if (!(fastest_ < kStill) || time < busyUntil_ - 1e-9) movedAt_ = time;
-    atRest_ = time - movedAt_ >= kStillFor - 1e-9;
-  }
-  bool atRest() const { return atRest_; }
-  [[noreturn]] void fail(double time) const {
-    if (!(fastest_ < kStill))
-      throw NotAtRest(
-          fmt::format("not at rest at {:.6g} s: a node of body '{}' moves at {:.3g} m/s, expected less than {:.0e} m/s",
-                      time, body_, fastest_, kStill));
-    if (busyUntil_ > time - kStillFor)
-      throw NotAtRest(fmt::format("not at rest: loads or tools act up to the end at {:.6g} s, or nearly", time));
-    throw NotAtRest(
-        fmt::format("not at rest: nodes moved up to {:.6g} s, expected {:g} s of rest before the end at {:.6g} s",
-                    movedAt_, kStillFor, time));
-  }
-
- private:
-  static constexpr double kStill = 1e-5, kStillFor = 0.1;  // m/s, s
-  double busyUntil_ = 0, movedAt_ = 0, fastest_ = 0;
-  std::string body_;
-  bool atRest_ = false;
 };
 
 class CacheRecorder {
@@ -350,7 +309,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   MotionRecorder motions(loaded, options);
   FrameTimesRecorder frameTimes(options);
   ForceComparison forces(loaded);
-  RestWatch rest(loaded);
+  RestWatch rest(loaded, simulation);
   printWarnings(loaded.scene, simulation.world());
   for (bool last = false; !last;) {
     checkInterrupt();

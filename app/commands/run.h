@@ -36,11 +36,6 @@ struct RunOptions {
   bool untilRest = false;  // ends when nothing moves any more; the scene's duration is the longest it may take
 };
 
-// The scene's duration is over and something still moves.
-struct NotAtRest : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
 // The state at a time, once a run has passed it.
 struct RecordedFrame {
   double time = 0;  // s
@@ -82,9 +77,8 @@ LoadedScene loadRun(const RunOptions& options);
 void printWarnings(const Scene& scene, const World& world);
 
 // Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` after the last, before
-// records, log and surfaces appear under their names: what fails there leaves those as they were. Until rest: until
-// every node has been slower than 1e-5 m/s for 0.1 s, so that the turning point of a swing does not count, and neither
-// a load nor a tool's recorded motion is still to come; surfaces asked for at a later time are those at rest. Returns
+// records, log and surfaces appear under their names: what fails there leaves those as they were. Until rest: as
+// RestWatch finds it; surfaces asked for at a later time are those at rest. Returns
 // results of their own: how the force of tools whose trajectory has a measured one compares with that. Throws
 // NotAtRest, and Interrupted after a signal. `advance` makes the next dynamics frame; empty: in logical time.
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,

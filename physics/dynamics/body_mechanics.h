@@ -41,6 +41,7 @@ struct BodyMechanics {
   // Set by dampBody. s, damping over stiffness, Rayleigh's beta of links and surface; 1/s, damping over mass, his
   // alpha.
   double linkRelaxation = 0, surfaceRelaxation = 0, massDamping = 0;
+  double lowestFrequency = 0;  // rad/s, of what deforms
 };
 
 // Throws std::runtime_error, without the body's name, where the description cannot be simulated.

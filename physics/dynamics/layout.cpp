@@ -324,6 +324,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.node.resize(m.restNodes.size());
     r.restVolume = enclosedVolume({m.restNodes, m.triangles});
     r.massDamping = mechanics[b].massDamping;
+    r.lowestFrequency = mechanics[b].lowestFrequency;
     r.support = rigidSupport(d.bodies[b]);
     d.ranges.push_back(r);
     addSpheres(d, d.bodies[b], mechanics[b]);

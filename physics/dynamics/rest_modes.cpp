@@ -219,6 +219,7 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
                surface = rest.largestEigenvalue(mechanics, 0, 1);
   double lowest = lowestFrequency(body, mechanics);
   if (!(lowest > 0)) lowest = std::sqrt(std::max(links, surface));
+  mechanics.lowestFrequency = lowest;
   const double asked = lowest > 0 ? 2 * body.tissue.damping / lowest : 0;
   mechanics.surfaceRelaxation = surface > 0 ? std::min(asked, 2 * kLargestSurfaceRatio / std::sqrt(surface)) : 0;
   const double shortest = stableStep(all, 0) / kLargestCost;

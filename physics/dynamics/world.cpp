@@ -283,11 +283,8 @@ double World::volumeRatio(int body) const {
   return volume / (6 * r.restVolume);
 }
 
-double World::nodeSpeed(int body) const {
-  double squared = 0;
-  for (int i : data_->ranges.at(body).node)
-    squared = std::max(squared, vectorAt(data_->nodes.velocity, i).squaredNorm());
-  return std::sqrt(squared);
+double World::lowestFrequency(int body) const {
+  return data_->ranges.at(body).lowestFrequency;
 }
 
 const std::vector<NodeGive>& World::nodeGive(int body) const {

@@ -128,8 +128,8 @@ class World {
 
   void readFrame(DynamicsFrame& out) const;  // resized once and reused
   Energies energies() const;
-  double volumeRatio(int body) const;  // enclosed by the nodes, over rest
-  double nodeSpeed(int body) const;    // m/s, of the fastest node
+  double volumeRatio(int body) const;                     // enclosed by the nodes, over rest
+  double lowestFrequency(int body) const;                 // rad/s, of what deforms at rest; 0: nothing does
   const std::vector<NodeGive>& nodeGive(int body) const;  // per node, within one dynamics frame
   int dynamicNodes(int body) const;  // that moved by themselves in the last frame: none on a skin or asleep
   // What contact has let through so far; who overlapped before anything moved, each pair of bodies once, in order.

@@ -206,12 +206,13 @@ struct Springs {
 struct BodyRange {
   int firstSphere = 0, sphereCount = 0;
   int firstLink = 0, linkCount = 0;
-  std::vector<int> node;   // index in Nodes of every model node
-  double restVolume = 0;   // m3, enclosed by the rest nodes
-  double massDamping = 0;  // 1/s, Rayleigh's alpha
-  int firstNodeGroup = 0;  // of its nodes, which lie together
-  RigidSupport support;    // damped is motion against the rigid motions that it leaves
-  int batch = 0;           // bodies of different batches share no group of spheres or links
+  std::vector<int> node;       // index in Nodes of every model node
+  double restVolume = 0;       // m3, enclosed by the rest nodes
+  double massDamping = 0;      // 1/s, Rayleigh's alpha
+  double lowestFrequency = 0;  // rad/s, BodyMechanics
+  int firstNodeGroup = 0;      // of its nodes, which lie together
+  RigidSupport support;        // damped is motion against the rigid motions that it leaves
+  int batch = 0;               // bodies of different batches share no group of spheres or links
 };
 // Its spheres' numbers, to loop over; std::views::iota is beyond clang++ 14.
 struct SphereNumbers {
