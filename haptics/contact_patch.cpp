@@ -7,7 +7,9 @@
 namespace medulla {
 
 void fadePatch(double factor, ContactPatch& patch) {
-  constexpr double least = 0.02;  // of the largest share: a spring that is not worth its time
+  // Of the largest share: a spring that is not worth its time, unless it has just begun: frames as short as a tick add
+  // less to it than that.
+  constexpr double least = 0.02;
   if (!patch.isTouched) patch.entries.clear();
   patch.isTouched = false;
   double largest = 0;
@@ -16,9 +18,12 @@ void fadePatch(double factor, ContactPatch& patch) {
     entry.share *= factor;
     largest = std::max(largest, entry.share);
   }
-  std::erase_if(patch.entries, [&](const ContactPatch::Entry& e) { return e.share < least * largest; });
+  std::erase_if(patch.entries, [&](const ContactPatch::Entry& e) { return !e.isTouched && e.share < least * largest; });
   patch.total = 0;
-  for (const ContactPatch::Entry& entry : patch.entries) patch.total += entry.share;
+  for (ContactPatch::Entry& entry : patch.entries) {
+    patch.total += entry.share;
+    entry.isTouched = false;
+  }
 }
 
 void addContacts(const Proxy& proxy, double push, ContactPatch& patch) {
@@ -35,12 +40,12 @@ void addContacts(const Proxy& proxy, double push, ContactPatch& patch) {
         patch.total -= least->share;
         patch.entries.erase(least);
       }
-      entry = patch.entries.insert(patch.entries.end(), {contact.triangle, Eigen::Vector3d::Zero(), 0});
+      entry = patch.entries.insert(patch.entries.end(), {contact.triangle, Eigen::Vector3d::Zero(), 0, false});
     }
     entry->weights += share * contact.weights;
     entry->share += share;
     patch.total += share;
-    patch.isTouched = true;
+    entry->isTouched = patch.isTouched = true;
   }
 }
 

@@ -16,6 +16,7 @@ struct ContactPatch {
     int triangle = -1;
     Eigen::Vector3d weights = Eigen::Vector3d::Zero();  // barycentric times share, summed over ticks
     double share = 0;                                   // summed over ticks
+    bool isTouched = false;                             // in this frame
   };
   std::vector<Entry> entries;  // in order of first touch; capacity is reserved, ticks allocate nothing
   double total = 0;            // of the shares

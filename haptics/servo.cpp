@@ -3,46 +3,20 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
 
 #include "haptics/buckets.h"
-#include "haptics/contact_patch.h"
 #include "haptics/force_bounds.h"
-#include "haptics/grab.h"
-#include "haptics/proxy.h"
+#include "haptics/hand_over.h"
+#include "haptics/servo_tool.h"
 #include "haptics/tissue_motion.h"
 #include "haptics/triple_buffer.h"
 
 namespace medulla {
 
 using Eigen::Vector3d;
-
-namespace {
-// A tool between two hand-overs.
-struct Tool {
-  ToolSample device, deviceAtFrameStart;
-  ToolSettings settings;
-  int index = 0;
-  Proxy proxy;
-  Grip grip;
-  Vector3d deviceSum = Vector3d::Zero();  // of positions over the frame's ticks
-  ContactPatch patch;
-  ProxyContact lastContact;              // while isLeaving: in contact, or not yet clear of it
-  Vector3d lastFelt = Vector3d::Zero();  // unit; along which it was felt
-  double largestPush = 0;                // N, of the coupling's spring during this contact
-  DeviceMotion motion;                   // in this contact or grip
-  // N, by how much the tissue's force changed over the frame up to the surface's `to`, and up to its `from`.
-  std::array<double, 2> change{};
-  std::optional<Vector3d> pathEnd;  // m, of the device's path as handed over since the frame began
-  double estimate = 0;              // N, of the force at the last tick, before it was kept to the tissue's
-  double springScale = 1;           // of the springs handed over: less than 1 beyond forceMax
-  int ticks = 0;                    // in this frame
-  bool isLeaving = false;
-};
-}  // namespace
 
 struct Servo::Data {
   TripleBuffer<Buckets> surfaces;
@@ -51,7 +25,7 @@ struct Servo::Data {
   std::array<std::vector<Vector3d>, 2> toolForce;
   double tickDuration;
   double alpha = 0;  // of the last tick
-  std::vector<Tool> tools;
+  std::vector<ServoTool> tools;
   std::vector<ToolState> states;
   std::vector<ProxyContact> contacts;  // scratch of handOver
 };
@@ -85,17 +59,17 @@ static void checkSettings(const ToolSettings& s, std::size_t tool) {
 // dynamics: the proxy's own, differenced over ticks, would jump at every edge. And the lead: the blended surface is one
 // frame late; uncorrected, a device that presses at speed v feels k v T too much, on soft tissue several times the
 // tissue's own force.
-static Vector3d motionForce(const Tool& tool, const TissueMotion& tissue) {
+static Vector3d motionForce(const ServoTool& tool, const TissueMotion& tissue) {
   return tool.settings.stiffness * tissue.lead + tool.settings.damping * (tissue.velocity - tool.motion.velocity);
 }
 
-static std::span<const ProxyContact> touchedContacts(const Tool& tool) {
+static std::span<const ProxyContact> touchedContacts(const ServoTool& tool) {
   const Proxy& proxy = tool.proxy;
   return proxy.inContact() ? std::span(proxy.contacts).first(proxy.contactCount) : std::span(&tool.lastContact, 1);
 }
 
 // N, on the tissue, as the dynamics had it; to be asked only where it is known.
-static Vector3d givenForce(const BlendedSurface& surface, double alpha, const Tool& tool) {
+static Vector3d givenForce(const BlendedSurface& surface, double alpha, const ServoTool& tool) {
   return blendPoint(surface.toolForce[1][tool.index], surface.toolForce[0][tool.index], alpha);
 }
 
@@ -103,7 +77,7 @@ static Vector3d givenForce(const BlendedSurface& surface, double alpha, const To
 // take what it can have changed since. Where a stiff tool meets limp tissue, a place that is off by a tenth of a
 // millimetre is several times the force.
 static double pushKeptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal,
-                               const TissueMotion& tissue, const Tool& tool) {
+                               const TissueMotion& tissue, const ServoTool& tool) {
   if (surface.toolForce[0].empty()) return tool.estimate;
   const double given = std::max(0.0, -givenForce(surface, alpha, tool).dot(normal));
   const double since = pushSince(surface, alpha, tissue, normal, tool.settings, tool.motion);
@@ -112,7 +86,7 @@ static double pushKeptToTissue(const BlendedSurface& surface, double alpha, cons
 
 // Likewise across it: a proxy on the late surface slips, or sticks, where the tissue itself does not.
 static Vector3d dragKeptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal,
-                                 const TissueMotion& tissue, const Tool& tool, const Vector3d& drag) {
+                                 const TissueMotion& tissue, const ServoTool& tool, const Vector3d& drag) {
   if (surface.toolForce[0].empty()) return drag;
   return keptNear(drag, tangential(-givenForce(surface, alpha, tool), normal),
                   dragSince(surface, alpha, tissue, normal, tool.settings, tool.motion));
@@ -123,7 +97,7 @@ static Vector3d dragKeptToTissue(const BlendedSurface& surface, double alpha, co
 // that the spring has been in this contact, so that force begins without a step on a surface that already moves.
 // Across, a slipping contact is dragged by friction alone, which the proxy's position already holds; one that sticks by
 // the coupling and the motion. Neither by more than friction carries.
-static Vector3d contactForce(const BlendedSurface& surface, double alpha, const Vector3d& way, Tool& tool) {
+static Vector3d contactForce(const BlendedSurface& surface, double alpha, const Vector3d& way, ServoTool& tool) {
   tool.estimate = 0;
   if (!tool.isLeaving) return Vector3d::Zero();
   const Proxy& proxy = tool.proxy;
@@ -152,7 +126,8 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
 }
 
 // The springs share the tool's stiffness equally.
-static Vector3d heldForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Tool& tool) {
+static Vector3d heldForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue,
+                          const ServoTool& tool) {
   const auto gap = [&](const HeldOffset& held) -> Vector3d {
     return surface.node(held.node, alpha) - heldTarget(tool.device, held);
   };
@@ -160,8 +135,8 @@ static Vector3d heldForce(const BlendedSurface& surface, double alpha, const Tis
 }
 
 // The same for what a grip feels, in all directions.
-static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Tool& tool,
-                             const Vector3d& force) {
+static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const TissueMotion& tissue,
+                             const ServoTool& tool, const Vector3d& force) {
   if (surface.toolForce[0].empty()) return force;
   const double change = (1 - alpha) * tool.change[1] + alpha * tool.change[0];
   const double since = heldSince(surface, alpha, tissue, change, tool.settings, tool.motion);
@@ -171,7 +146,7 @@ static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const 
 // In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
 // contact is therefore handed over until the tool is clear of the point by its radius: a spring that only pushes does
 // no harm where nothing is pushed, and without it the tissue would jump free and knock against the tool.
-static void followLeaving(const BlendedSurface& surface, double alphaBefore, double alpha, Tool& tool) {
+static void followLeaving(const BlendedSurface& surface, double alphaBefore, double alpha, ServoTool& tool) {
   if (tool.proxy.inContact()) {
     tool.lastContact = tool.proxy.mainContact();
     tool.lastFelt = tool.proxy.feltNormal();
@@ -186,7 +161,7 @@ static void followLeaving(const BlendedSurface& surface, double alphaBefore, dou
   }
 }
 
-static void record(const Vector3d& force, Tool& tool, ToolState& state) {
+static void record(const Vector3d& force, ServoTool& tool, ToolState& state) {
   const double size = force.norm();
   state.force = size > tool.settings.forceMax ? Vector3d(tool.settings.forceMax / size * force) : force;
   // By the estimate, for what the tissue gives has followed softer springs before.
@@ -204,7 +179,7 @@ static void record(const Vector3d& force, Tool& tool, ToolState& state) {
 
 // Opens or closes. The targets of what it takes hold of are measured where the nodes are by now, and then shifted so
 // that the springs, with what motion adds, start with the force `felt` so far (N): neither hand nor tissue is jerked.
-static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d& felt, Tool& tool) {
+static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d& felt, ServoTool& tool) {
   Grip& grip = tool.grip;
   const bool wasHolding = !grip.held.empty();
   updateGrip(surface, alpha, tool.proxy, tool.device, tool.settings.gripRadius, grip);
@@ -226,7 +201,8 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
 }
 
 // Whether the grip holds on, its force recorded.
-static bool feelGrip(const BlendedSurface& surface, double alpha, const Vector3d& way, Tool& tool, ToolState& state) {
+static bool feelGrip(const BlendedSurface& surface, double alpha, const Vector3d& way, ServoTool& tool,
+                     ToolState& state) {
   if (tool.grip.held.empty()) return false;
   tool.motion.way[0] += way;
   const TissueMotion tissue = heldMotion(surface, alpha, tool.grip, tool.motion);
@@ -244,7 +220,7 @@ static bool feelGrip(const BlendedSurface& surface, double alpha, const Vector3d
 }
 
 static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, double tickDuration,
-                     const ToolSample& input, Tool& tool, ToolState& state) {
+                     const ToolSample& input, ServoTool& tool, ToolState& state) {
   const BlendedSurface& surface = buckets.surface();
   const Vector3d way = input.position - tool.device.position;
   state.energy += state.force.dot(way);  // the device holds a tick's force until the next (Hannaford and Ryu 2002)
@@ -268,7 +244,7 @@ void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
   data_->alpha = alpha;
 }
 
-static void startFrame(const BlendedSurface& surface, double tickDuration, Tool& tool) {
+static void startFrame(const BlendedSurface& surface, double tickDuration, ServoTool& tool) {
   constexpr double memory = 0.05;  // s; half as long a force scatters by 16 % where this leaves 10
   tool.deviceAtFrameStart = tool.device;
   tool.deviceSum.setZero();
@@ -292,7 +268,7 @@ static void startFrame(const BlendedSurface& surface, double tickDuration, Tool&
 bool Servo::beginFrame() {
   if (!data_->surfaces.take()) return false;
   data_->alpha = 0;
-  for (Tool& tool : data_->tools) startFrame(data_->surfaces.reading().surface(), data_->tickDuration, tool);
+  for (ServoTool& tool : data_->tools) startFrame(data_->surfaces.reading().surface(), data_->tickDuration, tool);
   return true;
 }
 
@@ -318,125 +294,13 @@ void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to, const std
 
 // ---- Handing over ----------------------------------------------------------------------------------------
 
-namespace {
-// A straight path over the frame that ended with the last tick.
-struct Path {
-  Vector3d end, velocity;
-};
-}  // namespace
-
-// The device's path, with the frame's mean rather than its end kept: the dynamics then feels the same mean
-// pull that the hand felt, however the device moved within the frame. Ticks stand at dt, 2 dt .. T, their mean time is
-// T/2 + dt/2, so the path's end lies (T - dt)/2 later than their mean.
-static Path devicePath(const Tool& tool, double frameDuration, double tickDuration) {
-  if (tool.ticks == 0) return {tool.device.position, Vector3d::Zero()};
-  const Vector3d velocity = (tool.device.position - tool.deviceAtFrameStart.position) / (tool.ticks * tickDuration);
-  return {tool.deviceSum / tool.ticks + 0.5 * (frameDuration - tickDuration) * velocity, velocity};
-}
-
-// m: by how much the point has come off the proxy
-static double comeOff(const Proxy& proxy, const ProxyContact& contact) {
-  return (proxy.centre - contact.point).norm() - proxy.radius;
-}
-
-// A contact's spring, anchored so that stiffness (anchor - x) is the force of the coupling, k (device - proxy), when x
-// is the contact point: anchor = device + (contact point - proxy). Its tangential part is limited to what friction
-// carries; where the contact slips the spring slides. Beyond forceMax all springs are softer, so that the tissue feels
-// no more than the hand: nearer anchors would be as stiff against what the tissue moves within the frame.
-static void handOverContact(const BlendedSurface& surface, const Tool& tool, const Path& path,
-                            const ProxyContact& contact, double share, Loads& out) {
-  const ToolSettings& settings = tool.settings;
-  const Proxy& proxy = tool.proxy;
-  // Of the coupling along the normal; < 0: pushes.
-  const double stretch = contact.normal.dot(path.end - proxy.centre) + comeOff(proxy, contact);
-  Vector3d drag = tangential(path.end - proxy.centre - proxy.shading, contact.normal);
-  const double limit = settings.staticFriction * std::max(0.0, -stretch);
-  if (drag.norm() > limit) drag *= limit / drag.norm();
-  const auto& nodes = surface.triangles[contact.triangle];
-  const int body = surface.bodyOfNode[nodes[0]], first = surface.firstNode[body];
-  ToolSpring& spring = out.toolSprings.emplace_back();
-  spring.tool = tool.index;
-  spring.body = body;
-  spring.nodes = {nodes[0] - first, nodes[1] - first, nodes[2] - first};
-  spring.weights = {contact.weights.x(), contact.weights.y(), contact.weights.z()};
-  spring.anchor = contact.point + stretch * contact.normal + drag;
-  spring.anchorVelocity = path.velocity;
-  spring.outward = contact.normal;
-  spring.stiffness = tool.springScale * settings.stiffness * share;
-  spring.damping = tool.springScale * settings.damping * share;
-  spring.slides = proxy.slipping;
-  spring.friction = proxy.slipping ? settings.dynamicFriction : settings.staticFriction;
-}
-
-// What the tool has slid away from no longer pushes in full; the rest of the patch pushes so much more.
-static double makeUpFor(const Proxy& proxy, const Path& path, const std::vector<ProxyContact>& contacts) {
-  constexpr double kMost = 3, kTouching = 1e-7;  // m: the proxy stands 0.05 um off what it touches
-  double wanted = 0, left = 0;
-  for (const ProxyContact& contact : contacts) {
-    const double depth = contact.normal.dot(proxy.centre - path.end);
-    wanted += contact.share * std::max(0.0, depth);
-    left += contact.share * std::max(0.0, depth - std::max(0.0, comeOff(proxy, contact) - kTouching));
-  }
-  if (wanted > kMost * left) return kMost;
-  return wanted > left ? wanted / left : 1;
-}
-
-// Several contacts stand oblique to the direction p of their common push (a groove, a dimple). The force on the proxy
-// is the sum of lambda_i n_i with lambda_i in the ratio of the shares s_i, and must be k D p: lambda_i = k D s_i /
-// sum_j s_j c_j with c_i = n_i . p. Spring i is compressed by D c_i only, so its stiffness is k s_i / (c_i sum_j s_j
-// c_j); k s_i alone would lose cos^2 of the groove's angle. Bounded, so that a wedge does not ask for ever smaller
-// substeps.
-static void handOverContacts(const BlendedSurface& surface, double alpha, const Tool& tool, const Path& path,
-                             std::vector<ProxyContact>& contacts, Loads& out) {
-  patchContacts(surface, alpha, tool.proxy, tool.patch, contacts);
-  Vector3d push = Vector3d::Zero();
-  for (const ProxyContact& contact : contacts) push += contact.share * contact.normal;
-  push.normalize();
-  constexpr double leastCosine = 0.5;
-  const auto cosine = [&](const ProxyContact& contact) { return std::max(leastCosine, contact.normal.dot(push)); };
-  double meanCosine = 0;
-  for (const ProxyContact& contact : contacts) meanCosine += contact.share * cosine(contact);
-  const double stiffer = makeUpFor(tool.proxy, path, contacts);
-  for (const ProxyContact& contact : contacts)
-    handOverContact(surface, tool, path, contact, stiffer * contact.share / (cosine(contact) * meanCosine), out);
-  if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.lastContact, 1, out);
-}
-
-// Every held node pulled to where the tool wants it, by an equal share of the tool's stiffness: pulling is as stiff as
-// pushing.
-static void handOverGrip(const BlendedSurface& surface, const Tool& tool, const Path& path, double frameDuration,
-                         Loads& out) {
-  const double share = 1.0 / double(tool.grip.held.size());
-  const int body = surface.bodyOfNode[tool.grip.held.front().node];
-  ToolSample end = tool.device, start = tool.deviceAtFrameStart;
-  end.position = path.end;
-  start.position = path.end - frameDuration * path.velocity;
-  for (const HeldOffset& held : tool.grip.held) {
-    const Vector3d target = heldTarget(end, held);
-    HeldNode& node = out.heldNodes.emplace_back();
-    node.tool = tool.index;
-    node.body = body;
-    node.node = held.node - surface.firstNode[body];
-    node.anchor = target;
-    node.anchorVelocity = (target - heldTarget(start, held)) / frameDuration;
-    node.stiffness = tool.springScale * tool.settings.stiffness * share;
-    node.damping = tool.springScale * tool.settings.damping * share;
-  }
-}
-
 void Servo::handOver(double frameDuration, Loads& out) {
   assert(frameDuration > 0);
   out.toolSprings.clear();
   out.heldNodes.clear();
-  const BlendedSurface& surface = data_->surfaces.reading().surface();
-  for (Tool& tool : data_->tools) {
-    const Path path = devicePath(tool, frameDuration, data_->tickDuration);
-    tool.pathEnd = path.end;
-    if (!tool.grip.held.empty())
-      handOverGrip(surface, tool, path, frameDuration, out);
-    else
-      handOverContacts(surface, data_->alpha, tool, path, data_->contacts, out);
-  }
+  for (ServoTool& tool : data_->tools)
+    handOverTool(data_->surfaces.reading().surface(), data_->alpha, frameDuration, data_->tickDuration, tool,
+                 data_->contacts, out);
 }
 
 void Servo::makeRoom(Loads& out) const {
@@ -446,8 +310,8 @@ void Servo::makeRoom(Loads& out) const {
 
 // ---- Life ------------------------------------------------------------------------------------------------
 
-static Tool makeTool(const Buckets& buckets, const ToolSettings& settings, int index, const ToolSample& start) {
-  Tool tool;
+static ServoTool makeTool(const Buckets& buckets, const ToolSettings& settings, int index, const ToolSample& start) {
+  ServoTool tool;
   tool.index = index;
   tool.settings = settings;
   tool.device = start;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace medulla {
 
 static Proxy touching(int triangle) {
@@ -43,6 +45,18 @@ TEST(ContactPatch, FadesAndIsGoneAfterAFrameWithoutTouch) {
   fadePatch(0.5, patch);
   EXPECT_TRUE(patch.entries.empty());
   EXPECT_DOUBLE_EQ(patch.total, 0);
+}
+
+// A frame as short as a tick adds little to what a second of them has.
+TEST(ContactPatch, WhatBeginsGrowsToItsShareHoweverShortTheFrames) {
+  ContactPatch patch;
+  for (int frame = 0; frame < 1200; ++frame) {
+    fadePatch(std::exp(-1.0 / 60), patch);
+    addContacts(touching(1), 1, patch);
+    if (frame >= 600) addContacts(touching(2), 1, patch);
+  }
+  ASSERT_EQ(patch.entries.size(), 2U);
+  EXPECT_NEAR(patch.entries[1].share / patch.total, 0.5, 0.01);
 }
 
 }  // namespace medulla

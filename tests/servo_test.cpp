@@ -120,37 +120,45 @@ TEST(Servo, TwoToolsTouchTwoBodies) {
   }
 }
 
-// A groove of which one wall is one body's and the other another's.
+// A groove of which one wall is one body's and the other another's, from wide to a wedge. Each wall gets what the proxy
+// presses with, of which the whole is what the hand feels.
 TEST(Servo, OneToolTouchesTwoBodiesAtOnce) {
   const double h = 0.03;
-  const auto wall = [&](double side) {
-    return shapeOf({{-h, 0, 0}, {h, 0, 0}, {-h, side * h, h}, {h, side * h, h}}, {{0, 1, 3}, {0, 3, 2}});
-  };
-  const TouchShape left = wall(-1), right = wall(1);
-  DynamicsFrame frame = frameAt(*left, 0);
-  frame.bodies.push_back(frameAt(*right, 0).bodies[0]);
-  const ToolSettings tool = frictionless();
-  Servo servo({{left}, {right}}, {tool}, 1e-3, frame, {deviceAt({0, 0, 0.02})});
-  const double bottom = std::sqrt(2) * tool.radius, depth = 0.002;
-  for (int pass = 0; pass < 2; ++pass) {
-    for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt({0, 0, bottom - depth})});
-    DynamicsFrame next = frame;
-    next.time = 0.02;
-    if (pass == 0) nextFrame(servo, frame, next);
+  for (const double degrees : {45.0, 70.0, 85.0}) {
+    const double slope = std::tan(degrees / 180 * 3.14159265358979);
+    const auto wall = [&](double side) {
+      return shapeOf({{-h, 0, 0}, {h, 0, 0}, {-h, side * h / slope, h}, {h, side * h / slope, h}},
+                     {{0, 1, 3}, {0, 3, 2}});
+    };
+    const TouchShape left = wall(-1), right = wall(1);
+    DynamicsFrame frame = frameAt(*left, 0);
+    frame.bodies.push_back(frameAt(*right, 0).bodies[0]);
+    ToolSettings tool = frictionless();
+    tool.radius = 0.001;
+    Servo servo({{left}, {right}}, {tool}, 1e-3, frame, {deviceAt({0, 0, 0.02})});
+    const double bottom = std::hypot(1, slope) * tool.radius, depth = 0.002;
+    for (int pass = 0; pass < 2; ++pass) {
+      for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt({0, 0, bottom - depth})});
+      DynamicsFrame next = frame;
+      next.time = 0.02;
+      if (pass == 0) nextFrame(servo, frame, next);
+    }
+    EXPECT_LT((servo.tools()[0].proxy - Vector3d(0, 0, bottom)).norm(), 1e-6) << degrees;
+    EXPECT_LT((servo.tools()[0].force - tool.stiffness * depth * Vector3d::UnitZ()).norm(), 1e-3) << degrees;
+    Loads loads;
+    servo.handOver(0.02, loads);
+    Vector3d force[2] = {Vector3d::Zero(), Vector3d::Zero()};
+    for (const ToolSpring& spring : loads.toolSprings) {
+      const TouchShape& touched = spring.body == 0 ? left : right;
+      Vector3d x = Vector3d::Zero();
+      for (int k = 0; k < 3; ++k) x += spring.weights[k] * touched->restNodes[spring.nodes[k]];
+      force[spring.body] += spring.stiffness * (spring.anchor - x);
+      EXPECT_LE(spring.stiffness, 4 * tool.stiffness);  // however narrow
+    }
+    const double half = 0.5 * tool.stiffness * depth;
+    EXPECT_LT((force[0] - half * Vector3d(0, -slope, -1)).norm(), 1e-2 * half * slope) << degrees;
+    EXPECT_LT((force[1] - half * Vector3d(0, slope, -1)).norm(), 1e-2 * half * slope) << degrees;
   }
-  EXPECT_LT((servo.tools()[0].proxy - Vector3d(0, 0, bottom)).norm(), 1e-6);
-  EXPECT_LT((servo.tools()[0].force - tool.stiffness * depth * Vector3d::UnitZ()).norm(), 1e-3);
-  Loads loads;
-  servo.handOver(0.02, loads);
-  Vector3d force[2] = {Vector3d::Zero(), Vector3d::Zero()};
-  for (const ToolSpring& spring : loads.toolSprings) {
-    const TouchShape& touched = spring.body == 0 ? left : right;
-    Vector3d x = Vector3d::Zero();
-    for (int k = 0; k < 3; ++k) x += spring.weights[k] * touched->restNodes[spring.nodes[k]];
-    force[spring.body] += spring.stiffness * (spring.anchor - x);
-  }
-  EXPECT_LT((force[0] - 0.5 * tool.stiffness * depth * Vector3d(0, -1, -1)).norm(), 1e-2);
-  EXPECT_LT((force[1] - 0.5 * tool.stiffness * depth * Vector3d(0, 1, -1)).norm(), 1e-2);
 }
 
 // ---- Against a soft body ---------------------------------------------------------------------------------

@@ -1,0 +1,137 @@
+#include "haptics/hand_over.h"
+
+#include <algorithm>
+
+#include "haptics/force_bounds.h"
+
+namespace medulla {
+
+using Eigen::Vector3d;
+
+namespace {
+// A straight path over the frame that ended with the last tick.
+struct Path {
+  Vector3d end, velocity;
+};
+}  // namespace
+
+// The device's path, with the frame's mean rather than its end kept: the dynamics then feels the same mean
+// pull that the hand felt, however the device moved within the frame. Ticks stand at dt, 2 dt .. T, their mean time is
+// T/2 + dt/2, so the path's end lies (T - dt)/2 later than their mean.
+static Path devicePath(const ServoTool& tool, double frameDuration, double tickDuration) {
+  if (tool.ticks == 0) return {tool.device.position, Vector3d::Zero()};
+  const Vector3d velocity = (tool.device.position - tool.deviceAtFrameStart.position) / (tool.ticks * tickDuration);
+  return {tool.deviceSum / tool.ticks + 0.5 * (frameDuration - tickDuration) * velocity, velocity};
+}
+
+// m: by how much the point has come off the proxy
+static double comeOff(const Proxy& proxy, const ProxyContact& contact) {
+  return (proxy.centre - contact.point).norm() - proxy.radius;
+}
+
+// A contact's spring, anchored so that stiffness (anchor - x) is the force of the coupling, k (device - proxy), when x
+// is the contact point: anchor = device + (contact point - proxy). Its tangential part is limited to what friction
+// carries; where the contact slips the spring slides. Beyond forceMax all springs are softer, so that the tissue feels
+// no more than the hand: nearer anchors would be as stiff against what the tissue moves within the frame.
+static void handOverContact(const BlendedSurface& surface, const ServoTool& tool, const Path& path,
+                            const ProxyContact& contact, double share, double deeper, const Vector3d& across,
+                            Loads& out) {
+  const ToolSettings& settings = tool.settings;
+  const Proxy& proxy = tool.proxy;
+  // Of the coupling along the normal; < 0: pushes.
+  const double stretch = contact.normal.dot(path.end - proxy.centre) + comeOff(proxy, contact) - deeper;
+  Vector3d drag = tangential(across, contact.normal);
+  const double limit = settings.staticFriction * std::max(0.0, -stretch);
+  if (drag.norm() > limit) drag *= limit / drag.norm();
+  const auto& nodes = surface.triangles[contact.triangle];
+  const int body = surface.bodyOfNode[nodes[0]], first = surface.firstNode[body];
+  ToolSpring& spring = out.toolSprings.emplace_back();
+  spring.tool = tool.index;
+  spring.body = body;
+  spring.nodes = {nodes[0] - first, nodes[1] - first, nodes[2] - first};
+  spring.weights = {contact.weights.x(), contact.weights.y(), contact.weights.z()};
+  spring.anchor = contact.point + stretch * contact.normal + drag;
+  spring.anchorVelocity = path.velocity;
+  spring.outward = contact.normal;
+  spring.stiffness = tool.springScale * settings.stiffness * share;
+  spring.damping = tool.springScale * settings.damping * share;
+  spring.slides = proxy.slipping;
+  spring.friction = proxy.slipping ? settings.dynamicFriction : settings.staticFriction;
+}
+
+// What the tool has slid away from no longer pushes in full; the rest of the patch pushes so much more.
+static double makeUpFor(const Proxy& proxy, const Path& path, const std::vector<ProxyContact>& contacts) {
+  constexpr double kMost = 3, kTouching = 1e-7;  // m: the proxy stands 0.05 um off what it touches
+  double wanted = 0, left = 0;
+  for (const ProxyContact& contact : contacts) {
+    const double depth = contact.normal.dot(proxy.centre - path.end);
+    wanted += contact.share * std::max(0.0, depth);
+    left += contact.share * std::max(0.0, depth - std::max(0.0, comeOff(proxy, contact) - kTouching));
+  }
+  if (wanted > kMost * left) return kMost;
+  return wanted > left ? wanted / left : 1;
+}
+
+// Several contacts stand oblique to the direction p of their common push (a groove, a dimple). The force on the proxy
+// is the sum of lambda_i n_i with lambda_i in the ratio of the shares s_i, and must be k D p: lambda_i = k D s_i / C
+// with C = sum_j s_j c_j and c_i = n_i . p. Spring i is compressed by D c_i only, so its stiffness is k s_i / (c_i C);
+// k s_i alone would lose cos^2 of the groove's angle. In a narrow wedge that has no bound, and would ask for ever
+// smaller substeps: there a spring is as stiff as with cosines b_i = max(c_i, leastCosine), k s_i / (b_i B) with
+// B = sum_j s_j b_j, and its anchor lies lambda_i / k_i - D c_i = D (b_i B / C - c_i) deeper, so that it starts with
+// the same force. Softer springs alone gave the tissue a third of what the hand felt, at rest and at any rate.
+static void handOverContacts(const BlendedSurface& surface, double alpha, const ServoTool& tool, const Path& path,
+                             std::vector<ProxyContact>& contacts, Loads& out) {
+  patchContacts(surface, alpha, tool.proxy, tool.patch, contacts);
+  Vector3d push = Vector3d::Zero();
+  for (const ProxyContact& contact : contacts) push += contact.share * contact.normal;
+  constexpr double leastCosine = 0.5, leastSum = 0.05;  // opposite walls push with no more than 20 times the whole
+  const double sum = std::max(leastSum, push.norm());
+  push.normalize();
+  const auto cosine = [&](const ProxyContact& contact) { return std::max(leastCosine, contact.normal.dot(push)); };
+  double boundedSum = 0, whole = 0;
+  for (const ProxyContact& contact : contacts) boundedSum += contact.share * cosine(contact);
+  for (const ProxyContact& contact : contacts) whole += contact.share / (cosine(contact) * boundedSum);
+  const Vector3d pull = path.end - tool.proxy.centre - tool.proxy.shading, across = tangential(pull, push) / whole;
+  const double stiffer = makeUpFor(tool.proxy, path, contacts);
+  const double depth = std::max(0.0, push.dot(tool.proxy.centre - path.end));
+  for (const ProxyContact& contact : contacts) {
+    const double bounded = cosine(contact) * boundedSum;
+    handOverContact(surface, tool, path, contact, stiffer * contact.share / bounded,
+                    depth * (bounded / sum - contact.normal.dot(push)), across, out);
+  }
+  if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.lastContact, 1, 0, pull, out);
+}
+
+// Every held node pulled to where the tool wants it, by an equal share of the tool's stiffness: pulling is as stiff as
+// pushing.
+static void handOverGrip(const BlendedSurface& surface, const ServoTool& tool, const Path& path, double frameDuration,
+                         Loads& out) {
+  const double share = 1.0 / double(tool.grip.held.size());
+  const int body = surface.bodyOfNode[tool.grip.held.front().node];
+  ToolSample end = tool.device, start = tool.deviceAtFrameStart;
+  end.position = path.end;
+  start.position = path.end - frameDuration * path.velocity;
+  for (const HeldOffset& held : tool.grip.held) {
+    const Vector3d target = heldTarget(end, held);
+    HeldNode& node = out.heldNodes.emplace_back();
+    node.tool = tool.index;
+    node.body = body;
+    node.node = held.node - surface.firstNode[body];
+    node.anchor = target;
+    node.anchorVelocity = (target - heldTarget(start, held)) / frameDuration;
+    node.stiffness = tool.springScale * tool.settings.stiffness * share;
+    node.damping = tool.springScale * tool.settings.damping * share;
+  }
+}
+
+void handOverTool(const BlendedSurface& surface, double alpha, double frameDuration, double tickDuration,
+                  ServoTool& tool, std::vector<ProxyContact>& scratch, Loads& out) {
+  const Path path = devicePath(tool, frameDuration, tickDuration);
+  tool.pathEnd = path.end;
+  if (!tool.grip.held.empty())
+    handOverGrip(surface, tool, path, frameDuration, out);
+  else
+    handOverContacts(surface, alpha, tool, path, scratch, out);
+}
+
+}  // namespace medulla

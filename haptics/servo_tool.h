@@ -1,0 +1,37 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+#include "haptics/contact_patch.h"
+#include "haptics/grab.h"
+#include "haptics/proxy.h"
+#include "haptics/tissue_motion.h"
+#include "haptics/tool_input.h"
+
+namespace medulla {
+
+// One tool of a Servo, between two hand-overs.
+struct ServoTool {
+  ToolSample device, deviceAtFrameStart;
+  ToolSettings settings;
+  int index = 0;
+  Proxy proxy;
+  Grip grip;
+  Eigen::Vector3d deviceSum = Eigen::Vector3d::Zero();  // of positions over the frame's ticks
+  ContactPatch patch;
+  ProxyContact lastContact;                            // while isLeaving: in contact, or not yet clear of it
+  Eigen::Vector3d lastFelt = Eigen::Vector3d::Zero();  // unit; along which it was felt
+  double largestPush = 0;                              // N, of the coupling's spring during this contact
+  DeviceMotion motion;                                 // in this contact or grip
+  // N, by how much the tissue's force changed over the frame up to the surface's `to`, and up to its `from`.
+  std::array<double, 2> change{};
+  std::optional<Eigen::Vector3d> pathEnd;  // m, of the device's path as handed over since the frame began
+  double estimate = 0;                     // N, of the force at the last tick, before it was kept to the tissue's
+  double springScale = 1;                  // of the springs handed over: less than 1 beyond forceMax
+  int ticks = 0;                           // in this frame
+  bool isLeaving = false;
+};
+
+}  // namespace medulla
