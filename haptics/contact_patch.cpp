@@ -1,6 +1,7 @@
 #include "haptics/contact_patch.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "haptics/force_shading.h"
 
@@ -24,6 +25,22 @@ void fadePatch(double factor, ContactPatch& patch) {
     patch.total += entry.share;
     entry.isTouched = false;
   }
+}
+
+void fadePatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius, double way,
+               double duration, ContactPatch& patch) {
+  constexpr double kShort = 0.05, kLong = 1;          // s
+  constexpr double kWayPerRadius = 0.1, kOff = 0.02;  // of the tool's radius
+  const double shortest = duration / kShort,
+               fading = std::min(shortest, duration / kLong + way / (kWayPerRadius * toolRadius));
+  const double off = proxy.radius + kOff * toolRadius, rest = std::exp(fading - shortest);
+  for (ContactPatch::Entry& entry : patch.entries) {
+    const Eigen::Vector3d point = pointAt(surface.triangle(entry.triangle, alpha), entry.weights / entry.share);
+    if ((proxy.centre - point).norm() <= off) continue;
+    entry.weights *= rest;
+    entry.share *= rest;
+  }
+  fadePatch(std::exp(-fading), patch);
 }
 
 void addContacts(const Proxy& proxy, double push, ContactPatch& patch) {

@@ -245,7 +245,8 @@ void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
 }
 
 static void startFrame(const BlendedSurface& surface, double tickDuration, ServoTool& tool) {
-  constexpr double memory = 0.05;  // s; half as long a force scatters by 16 % where this leaves 10
+  const double way = (tool.device.position - tool.deviceAtFrameStart.position).norm();
+  fadePatch(surface, 0, tool.proxy, tool.settings.radius, way, tool.ticks * tickDuration, tool.patch);
   tool.deviceAtFrameStart = tool.device;
   tool.deviceSum.setZero();
   const bool holds = !tool.grip.held.empty();
@@ -261,7 +262,6 @@ static void startFrame(const BlendedSurface& surface, double tickDuration, Servo
                    tool.springScale < 1 ? 0 : std::abs(tool.lastFelt.dot(change)), tool.motion);
   tool.pathEnd.reset();
   tool.change = {change.norm(), tool.change[0]};
-  fadePatch(std::exp(-tool.ticks * tickDuration / memory), tool.patch);
   tool.ticks = 0;
 }
 

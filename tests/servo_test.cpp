@@ -293,6 +293,29 @@ TEST(Servo, ASteadyPressHasTheTissuesOwnForce) {
   EXPECT_LT((once + force).norm(), 0.005 * force.norm());
 }
 
+// Wide against the mesh: the dent has many triangles, of which the proxy presses on three.
+TEST(Servo, AStillToolDoesNotChatterHoweverWide) {
+  for (const double radius : {0.003, 0.02, 0.04}) {
+    for (const double stiffness : {400.0, 2000.0}) {
+      ToolRun run = pressing(0.05);
+      run.tool.radius = radius;
+      run.tool.stiffness = stiffness;
+      run.device = [=](double t) { return deviceAt({0.012, 0.004, 0.0555 + radius - 0.016 * ease(t, 0, 0.5)}); };
+      double sum = 0, squares = 0;
+      int ticks = 0;
+      run.run(2, [&](double t, const ToolState& tool) {
+        if (t < 1.5) return;
+        sum += tool.force.norm();
+        squares += tool.force.squaredNorm();
+        ++ticks;
+      });
+      const double mean = sum / ticks;
+      EXPECT_GT(mean, 0.1);
+      EXPECT_LT(std::sqrt(std::max(0.0, squares / ticks - mean * mean)), 0.01 * mean) << radius << " " << stiffness;
+    }
+  }
+}
+
 TEST(Servo, SlidingDragsTheTissueByFrictionOnly) {
   for (const double friction : {0.0, 0.3}) {
     ToolRun run = pressing(0.05);
