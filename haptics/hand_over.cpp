@@ -13,6 +13,12 @@ namespace {
 struct Path {
   Vector3d end, velocity;
 };
+// What one contact gets: of the tool's stiffness, of forceMax, how much deeper its anchor lies (m), and the coupling's
+// pull across the common push (m).
+struct Part {
+  double stiffness = 1, forceMax = 1, deeper = 0;
+  Vector3d across;
+};
 }  // namespace
 
 // The device's path, with the frame's mean rather than its end kept: the dynamics then feels the same mean
@@ -31,16 +37,14 @@ static double comeOff(const Proxy& proxy, const ProxyContact& contact) {
 
 // A contact's spring, anchored so that stiffness (anchor - x) is the force of the coupling, k (device - proxy), when x
 // is the contact point: anchor = device + (contact point - proxy). Its tangential part is limited to what friction
-// carries; where the contact slips the spring slides. Beyond forceMax all springs are softer, so that the tissue feels
-// no more than the hand: nearer anchors would be as stiff against what the tissue moves within the frame.
+// carries; where the contact slips the spring slides.
 static void handOverContact(const BlendedSurface& surface, const ServoTool& tool, const Path& path,
-                            const ProxyContact& contact, double share, double deeper, const Vector3d& across,
-                            Loads& out) {
+                            const ProxyContact& contact, const Part& part, Loads& out) {
   const ToolSettings& settings = tool.settings;
   const Proxy& proxy = tool.proxy;
   // Of the coupling along the normal; < 0: pushes.
-  const double stretch = contact.normal.dot(path.end - proxy.centre) + comeOff(proxy, contact) - deeper;
-  Vector3d drag = tangential(across, contact.normal);
+  const double stretch = contact.normal.dot(path.end - proxy.centre) + comeOff(proxy, contact) - part.deeper;
+  Vector3d drag = tangential(part.across, contact.normal);
   const double limit = settings.staticFriction * std::max(0.0, -stretch);
   if (drag.norm() > limit) drag *= limit / drag.norm();
   const auto& nodes = surface.triangles[contact.triangle];
@@ -53,9 +57,10 @@ static void handOverContact(const BlendedSurface& surface, const ServoTool& tool
   spring.anchor = contact.point + stretch * contact.normal + drag;
   spring.anchorVelocity = path.velocity;
   spring.outward = contact.normal;
-  spring.stiffness = tool.springScale * settings.stiffness * share;
-  spring.damping = tool.springScale * settings.damping * share;
+  spring.stiffness = settings.stiffness * part.stiffness;
+  spring.damping = settings.damping * part.stiffness;
   spring.slides = proxy.slipping;
+  spring.forceMax = settings.forceMax * part.forceMax;
   spring.friction = proxy.slipping ? settings.dynamicFriction : settings.staticFriction;
 }
 
@@ -79,6 +84,7 @@ static double makeUpFor(const Proxy& proxy, const Path& path, const std::vector<
 // smaller substeps: there a spring is as stiff as with cosines b_i = max(c_i, leastCosine), k s_i / (b_i B) with
 // B = sum_j s_j b_j, and its anchor lies lambda_i / k_i - D c_i = D (b_i B / C - c_i) deeper, so that it starts with
 // the same force. Softer springs alone gave the tissue a third of what the hand felt, at rest and at any rate.
+// Each is limited to its part of forceMax in the ratio of the pressures, s_i / C.
 static void handOverContacts(const BlendedSurface& surface, double alpha, const ServoTool& tool, const Path& path,
                              std::vector<ProxyContact>& contacts, Loads& out) {
   patchContacts(surface, alpha, tool.proxy, tool.patch, contacts);
@@ -96,14 +102,17 @@ static void handOverContacts(const BlendedSurface& surface, double alpha, const 
   const double depth = std::max(0.0, push.dot(tool.proxy.centre - path.end));
   for (const ProxyContact& contact : contacts) {
     const double bounded = cosine(contact) * boundedSum;
-    handOverContact(surface, tool, path, contact, stiffer * contact.share / bounded,
-                    depth * (bounded / sum - contact.normal.dot(push)), across, out);
+    handOverContact(surface, tool, path, contact,
+                    {stiffer * contact.share / bounded, contact.share / sum,
+                     depth * (bounded / sum - contact.normal.dot(push)), across},
+                    out);
   }
-  if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.lastContact, 1, 0, pull, out);
+  if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.lastContact, {.across = pull}, out);
 }
 
 // Every held node pulled to where the tool wants it, by an equal share of the tool's stiffness: pulling is as stiff as
-// pushing.
+// pushing. An equal share of forceMax, too: in the ratio of the late surface's forces, the limits would be springs that
+// answer a frame late, and let a patch held by a stiff tool ring.
 static void handOverGrip(const BlendedSurface& surface, const ServoTool& tool, const Path& path, double frameDuration,
                          Loads& out) {
   const double share = 1.0 / double(tool.grip.held.size());
@@ -119,8 +128,9 @@ static void handOverGrip(const BlendedSurface& surface, const ServoTool& tool, c
     node.node = held.node - surface.firstNode[body];
     node.anchor = target;
     node.anchorVelocity = (target - heldTarget(start, held)) / frameDuration;
-    node.stiffness = tool.springScale * tool.settings.stiffness * share;
-    node.damping = tool.springScale * tool.settings.damping * share;
+    node.stiffness = tool.settings.stiffness * share;
+    node.damping = tool.settings.damping * share;
+    node.forceMax = tool.settings.forceMax * share;
   }
 }
 

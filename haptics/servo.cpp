@@ -125,13 +125,27 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
                     tool.settings.staticFriction);
 }
 
-// The springs share the tool's stiffness equally.
+// N, `of` each held node the force of all, mean: the springs share the tool's stiffness equally.
+template <class Of>
+static Vector3d meanForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue,
+                          const ServoTool& tool, const Of& of) {
+  const Vector3d motion = motionForce(tool, tissue);
+  return meanOverHeld(tool.grip, [&](const HeldOffset& held) -> Vector3d {
+    return of(tool.settings.stiffness * (surface.node(held.node, alpha) - heldTarget(tool.device, held)) + motion);
+  });
+}
+
+// Without a limit.
 static Vector3d heldForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue,
                           const ServoTool& tool) {
-  const auto gap = [&](const HeldOffset& held) -> Vector3d {
-    return surface.node(held.node, alpha) - heldTarget(tool.device, held);
-  };
-  return tool.settings.stiffness * meanOverHeld(tool.grip, gap) + motionForce(tool, tissue);
+  return meanForce(surface, alpha, tissue, tool, [](const Vector3d& force) { return force; });
+}
+
+// Each limited to its share of forceMax, as in the dynamics.
+static Vector3d limitedForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue,
+                             const ServoTool& tool) {
+  return meanForce(surface, alpha, tissue, tool,
+                   [&](const Vector3d& force) { return keptNear(force, Vector3d::Zero(), tool.settings.forceMax); });
 }
 
 // The same for what a grip feels, in all directions.
@@ -164,10 +178,8 @@ static void followLeaving(const BlendedSurface& surface, double alphaBefore, dou
 static void record(const Vector3d& force, ServoTool& tool, ToolState& state) {
   const double size = force.norm();
   state.force = size > tool.settings.forceMax ? Vector3d(tool.settings.forceMax / size * force) : force;
-  // By the estimate, for what the tissue gives has followed softer springs before.
-  const double most = std::max(size, tool.estimate);
-  state.clamped = most > tool.settings.forceMax;
-  tool.springScale = state.clamped ? tool.settings.forceMax / most : 1;
+  // By the estimate, too: what the tissue gives is limited itself.
+  state.clamped = std::max(size, tool.estimate) > tool.settings.forceMax;
   state.device = tool.device.position;
   state.proxy = tool.proxy.centre;
   state.holding = !tool.grip.held.empty();
@@ -177,12 +189,24 @@ static void record(const Vector3d& force, ServoTool& tool, ToolState& state) {
   ++tool.ticks;
 }
 
+// m/s: of where the tool wants what it holds, the mean, since the last tick, when the device was at `before`. A tool
+// that turns takes its targets along by omega x lever, as it takes the tissue: against the device's own velocity that
+// would be felt as a damper that drags nothing.
+static Vector3d heldVelocity(const ServoTool& tool, const ToolSample& before, double tickDuration) {
+  const auto way = [&](const HeldOffset& held) -> Vector3d {
+    return heldTarget(tool.device, held) - heldTarget(before, held);
+  };
+  return meanOverHeld(tool.grip, way) / tickDuration;
+}
+
 // Opens or closes. The targets of what it takes hold of are measured where the nodes are by now, and then shifted so
 // that the springs, with what motion adds, start with the force `felt` so far (N): neither hand nor tissue is jerked.
-static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d& felt, ServoTool& tool) {
+static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d& felt, const ToolSample& before,
+                     double tickDuration, ServoTool& tool) {
   Grip& grip = tool.grip;
   const bool wasHolding = !grip.held.empty();
   updateGrip(surface, alpha, tool.proxy, tool.device, tool.settings.gripRadius, grip);
+  if (!grip.held.empty()) tool.motion.velocity = heldVelocity(tool, before, tickDuration);
   if (wasHolding == !grip.held.empty()) return;
   if (wasHolding) {
     tool.isLeaving = false;
@@ -201,14 +225,14 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
 }
 
 // Whether the grip holds on, its force recorded.
-static bool feelGrip(const BlendedSurface& surface, double alpha, const Vector3d& way, ServoTool& tool,
+static bool feelGrip(const BlendedSurface& surface, double alpha, double tickDuration, ServoTool& tool,
                      ToolState& state) {
   if (tool.grip.held.empty()) return false;
-  tool.motion.way[0] += way;
+  tool.motion.way[0] += tickDuration * tool.motion.velocity;
   const TissueMotion tissue = heldMotion(surface, alpha, tool.grip, tool.motion);
-  const Vector3d estimate = heldForce(surface, alpha, tissue, tool);
-  const Vector3d force = keptToTissue(surface, alpha, tissue, tool, estimate);
-  tool.estimate = estimate.norm();
+  const Vector3d limited = limitedForce(surface, alpha, tissue, tool);
+  const Vector3d force = keptToTissue(surface, alpha, tissue, tool, limited);
+  tool.estimate = heldForce(surface, alpha, tissue, tool).norm();
   if (std::min(force.norm(), tool.settings.forceMax) > tool.settings.gripForceMax) {
     letSlip(tool.grip);
     tool.isLeaving = false;
@@ -222,13 +246,15 @@ static bool feelGrip(const BlendedSurface& surface, double alpha, const Vector3d
 static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, double tickDuration,
                      const ToolSample& input, ServoTool& tool, ToolState& state) {
   const BlendedSurface& surface = buckets.surface();
-  const Vector3d way = input.position - tool.device.position;
+  const ToolSample before = tool.device;
+  const Vector3d way = input.position - before.position;
   state.energy += state.force.dot(way);  // the device holds a tick's force until the next (Hannaford and Ryu 2002)
   tool.device = input;
   tool.motion.velocity = way / tickDuration;
   followSurface(buckets, alphaBefore, alpha, tool.settings.radius, tool.proxy);
-  tickGrip(surface, alpha, state.force, tool);
-  if (feelGrip(surface, alpha, way, tool, state)) return;
+  tickGrip(surface, alpha, state.force, before, tickDuration, tool);
+  if (feelGrip(surface, alpha, tickDuration, tool, state)) return;
+  tool.motion.velocity = way / tickDuration;  // of what has slipped out it was another
   followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
   followLeaving(surface, alphaBefore, alpha, tool);
   record(contactForce(surface, alpha, way, tool), tool, state);
@@ -259,7 +285,7 @@ static void startFrame(const BlendedSurface& surface, double tickDuration, Servo
     learnFollowing(surface, tool.grip, tool.motion);
   else if (tool.isLeaving)
     learnFollowing(surface, touchedContacts(tool), tool.lastFelt, tool.settings.stiffness,
-                   tool.springScale < 1 ? 0 : std::abs(tool.lastFelt.dot(change)), tool.motion);
+                   tool.estimate > tool.settings.forceMax ? 0 : std::abs(tool.lastFelt.dot(change)), tool.motion);
   tool.pathEnd.reset();
   tool.change = {change.norm(), tool.change[0]};
   tool.ticks = 0;

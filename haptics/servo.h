@@ -30,7 +30,9 @@ struct ToolState {
   bool holding = false;
   bool clamped = false;  // forceMax was reached
   bool slipped = false;  // what the closed grip held has torn away
-  double energy = 0;     // J, handed to the user since the start: the force of each tick over the way to the next
+  // J, handed to the user since the start: the force of each tick over the device's way to the next. What a grip turns
+  // does work, too, but the hand gets no moment.
+  double energy = 0;
 };
 
 class Servo {

@@ -29,7 +29,6 @@ struct ServoTool {
   std::array<double, 2> change{};
   std::optional<Eigen::Vector3d> pathEnd;  // m, of the device's path as handed over since the frame began
   double estimate = 0;                     // N, of the force at the last tick, before it was kept to the tissue's
-  double springScale = 1;                  // of the springs handed over: less than 1 beyond forceMax
   int ticks = 0;                           // in this frame
   bool isLeaving = false;
 };

@@ -14,7 +14,7 @@
 // alone make a first touch on soft tissue twenty times too hard for two frames.
 namespace medulla {
 
-// Of one device while it touches or holds.
+// Of one device while it touches; while it holds, of the mean of where it wants what it holds, which turns with it.
 struct DeviceMotion {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s, over the last tick
   // m: the way that counts, in this dynamics frame so far and in the three before; in a grip from where the path that

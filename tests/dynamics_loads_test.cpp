@@ -299,6 +299,37 @@ TEST(Loads, TheAnchorMovesWithinTheFrame) {
   EXPECT_NEAR(vectorAt(world.data().nodes.velocity, world.data().ranges[0].node[held.node]).y(), 0.05, 0.005);
 }
 
+// However far the anchor is and whichever way the tissue moves within the frame.
+TEST(Loads, ALimitedLoadGivesItsLimitAndNoMore) {
+  constexpr double most = 0.05;  // N
+  for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit}) {
+    for (const bool holds : {false, true}) {
+      World world = tubeWorld(SurfaceMode::full, true, 0.3, integrator);
+      Loads loads;
+      ToolSpring push = pushAt(world, 80, 0.1);  // 40 N without a limit
+      push.forceMax = most;
+      push.friction = 0.3;
+      push.slides = true;
+      HeldNode held;
+      held.node = push.nodes[0];
+      held.anchor = restNode(world, held.node) + Vector3d(0, 0.1, 0.1);
+      held.stiffness = 400;
+      held.damping = 1;
+      held.forceMax = most;
+      if (holds)
+        loads.heldNodes = {held};
+      else
+        loads.toolSprings = {push};
+      double last = 0;
+      for (int i = 0; i < 50; ++i) {
+        last = world.advance(loads)[0].norm() / world.data().settings.frameDuration;
+        EXPECT_LE(last, most * (1 + 1e-9));
+      }
+      EXPECT_NEAR(last, most, 1e-6 * most);
+    }
+  }
+}
+
 TEST(Loads, AStiffToolDoesNotBoundTheStep) {
   World world = tubeWorld(SurfaceMode::full, true);
   Loads loads;

@@ -158,6 +158,37 @@ TEST(Grab, TwistingTheToolTwistsTheTissue) {
   EXPECT_LT(turn, 1);
 }
 
+// Tissue that turns along with its targets drags nothing, however strong the damper; against the device's own velocity
+// it would drag by omega x lever.
+TEST(Grab, ATurningToolIsNotDampedByItsOwnTurning) {
+  constexpr double kFrame = 0.02, kTick = 1e-3, start = 0.1, omega = 1;  // s, rad/s
+  const Vector3d place(0.001, 0.007, 0.002);
+  const auto turn = [&](double t) { return Eigen::AngleAxisd(omega * std::max(0.0, t - start), Vector3d::UnitX()); };
+  const SurfaceMotion motion = [&](const Vector3d& x, double t) { return Vector3d(place + turn(t) * (x - place)); };
+  const TouchShape shape = plate(10, 0.03, 0.01, 5);
+  ToolSettings tool;
+  tool.damping = 50;  // at a lever of 2 mm, 0.1 N
+  Servo servo({{shape}}, {tool}, kTick, frameAt(*shape, 0), {deviceAt({0.001, 0.02, 0.002})});
+  Vector3d before = Vector3d::Zero();
+  for (int frame = 0; frame < 20; ++frame) {
+    for (int k = 1; k <= 20; ++k) {
+      const double time = kFrame * frame + kTick * k;
+      ToolSample sample = deviceAt(place, frame > 0 ? 1 : 0);
+      sample.worldFromTool = turn(time);
+      servo.tick(k / 20.0, {sample});
+      if (time <= start) before = servo.tools()[0].force;
+      if (time < start + 4 * kFrame) continue;
+      ASSERT_TRUE(servo.tools()[0].holding);
+      // The spring is stretched and turns, too, which its damper feels.
+      const Vector3d spring = turn(time) * before, damper = omega * Vector3d::UnitX().cross(spring) / tool.stiffness;
+      ASSERT_LT((servo.tools()[0].force - spring - tool.damping * damper).norm(), 0.01);
+    }
+    const double end = kFrame * (frame + 1);
+    servo.commit(frameAt(*shape, end - kFrame, motion), frameAt(*shape, end, motion), servo.tools());
+    ASSERT_TRUE(servo.beginFrame());
+  }
+}
+
 TEST(Grab, PullBeyondForceMaxIsClampedForHandAndTissue) {
   ToolRun run = grabbing();
   run.tool.forceMax = 0.5;

@@ -76,9 +76,13 @@ TEST(Servo, ForceIsClampedAndSoIsWhatIsHandedOver) {
   EXPECT_NEAR(servo.tools()[0].force.norm(), 1, 1e-12);
   Loads loads;
   servo.handOver(0.02, loads);
-  double force = 0;
-  for (const ToolSpring& spring : loads.toolSprings) force += spring.stiffness * (top - spring.anchor.y());
+  double force = 0, stiffness = 0;
+  for (const ToolSpring& spring : loads.toolSprings) {
+    force += std::min(spring.forceMax, spring.stiffness * (top - spring.anchor.y()));
+    stiffness += spring.stiffness;
+  }
   EXPECT_NEAR(force, 1, 1e-3);
+  EXPECT_NEAR(stiffness, tool.stiffness, 1e-9);
 }
 
 TEST(Servo, BadInputIsRefusedByName) {

@@ -41,6 +41,10 @@ struct SpringBody {
     }
   }
 
+  static Eigen::Vector3d atMost(double most, const Eigen::Vector3d& f) {
+    return f.norm() > most ? Eigen::Vector3d(most / f.norm() * f) : f;
+  }
+
   // `left` s before the end of the frame. Returns the sum of the tools' forces.
   Eigen::Vector3d addToolForces(const Loads& loads, double left) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -58,12 +62,14 @@ struct SpringBody {
         const Eigen::Vector3d across = slip - slip.dot(spring.outward) * spring.outward;
         f = push + spring.friction * push.norm() / std::max(1e-3, across.norm()) * across;
       }
+      f = atMost(spring.forceMax, f);
       for (int k = 0; k < 3; ++k) force[spring.nodes[k]] += spring.weights[k] * f;
       sum += f;
     }
     for (const HeldNode& held : loads.heldNodes) {
-      const Eigen::Vector3d f = held.stiffness * (held.anchor - left * held.anchorVelocity - position[held.node]) +
-                                held.damping * (held.anchorVelocity - velocity[held.node]);
+      const Eigen::Vector3d f =
+          atMost(held.forceMax, held.stiffness * (held.anchor - left * held.anchorVelocity - position[held.node]) +
+                                    held.damping * (held.anchorVelocity - velocity[held.node]));
       force[held.node] += f;
       sum += f;
     }

@@ -119,22 +119,28 @@ void settleTool(WorldData& d, const ImplicitData& s, const PointLoad& load, cons
   const Vector3d rate = ratesOf(s, rows);
   constexpr double kSticking = 1e-5;  // m/s: slower slip is dragged by less than Coulomb's friction, and sticks soon
   const double h = s.duration, spring = h * (h * p.stiffness + p.damping);
-  const auto act = [&](int a, double weight, double along) {
-    rows[a].weight = weight;
-    rows[a].impulse = h * along;
-    d.loadForces[load.index] += along * load.axes[a];
+  Vector3d pull, slip, force = Vector3d::Zero(), weight = Vector3d::Zero();  // along the axes
+  const auto act = [&](int a, double w, double along) {
+    weight[a] = w;
+    force[a] = along;
   };
-  Vector3d pull, slip;  // along the axes
   for (int a = 0; a < 3; ++a) {
     slip[a] = load.axes[a].dot(p.anchorVelocity) - rate[a];
     pull[a] = p.stiffness * load.axes[a].dot(p.anchor - x) + p.damping * slip[a];
   }
-  d.loadForces[load.index].setZero();
   if (p.outward == nullptr || pull[0] <= 0) act(0, spring, pull[0]);
   const double most = pull[0] < 0 ? p.friction * -pull[0] : 0,
                drag = most / std::max(kSticking, std::hypot(slip[1], slip[2]));
   const double whole = std::hypot(pull[1], pull[2]), share = p.outward != nullptr && whole > most ? most / whole : 1;
   for (int a = 1; a < 3; ++a) p.slides ? act(a, h * drag, drag * slip[a]) : act(a, share * spring, share * pull[a]);
+  // Beyond its limit a load is to the system the softer spring that gives as much now, as friction that slips is.
+  const double limited = force.norm() > p.forceMax ? p.forceMax / force.norm() : 1;
+  d.loadForces[load.index].setZero();
+  for (int a = 0; a < 3; ++a) {
+    rows[a].weight = limited * weight[a];
+    rows[a].impulse = h * limited * force[a];
+    d.loadForces[load.index] += limited * force[a] * load.axes[a];
+  }
 }
 
 void addDeadLoads(const WorldData& d, ImplicitData& s, double time) {

@@ -123,6 +123,8 @@ double settle(WorldData& d, const SettlingSpring& s, Vector3d& force) {
     const double along = next.dot(n), push = std::max(0.0, -along);
     next = dragOf(s, v, force, next, push, h) - push * n;
   }
+  // Exact for one load alone: what the limit takes away changes the velocity, and so `wanted`, along the same line.
+  if (const double size = next.norm(); size > p.forceMax) next *= p.forceMax / size;
   const Vector3d change = next - force;
   addImpulse(d, s, h * change);
   force = next;
@@ -146,6 +148,7 @@ PointSpring pointSpring(const WorldData& d, const Loads& loads, std::size_t k, d
     p.damping = t.damping;
     p.slides = t.slides;
     p.friction = t.friction;
+    p.forceMax = t.forceMax;
   } else {
     const HeldNode& held = loads.heldNodes[k - loads.toolSprings.size()];
     p.count = 1;
@@ -156,6 +159,7 @@ PointSpring pointSpring(const WorldData& d, const Loads& loads, std::size_t k, d
     p.anchorVelocity = held.anchorVelocity;
     p.stiffness = held.stiffness;
     p.damping = held.damping;
+    p.forceMax = held.forceMax;
   }
   return p;
 }

@@ -18,6 +18,10 @@ struct SoftBodyModel;
 // across it holds by no more than friction times the push. One that slides is such a spring along `outward` alone, and
 // across it Coulomb's friction against the anchor's velocity: a spring would hold the tissue where it was touched at
 // the frame's start, as a drag of stiffness times the frame's duration, 8 N s/m at 50 Hz.
+// Of spring and damper together no more than `forceMax` is given, in the direction of the whole: what is limited pulls
+// with a constant force however far its anchor is, as a potential does that is quadratic first and a cone beyond
+// (Huber's), so that it gives back no more than it took. A softer spring instead, by what it gave lately, is a feedback
+// that is late by frames, and oscillates.
 struct ToolSpring {
   int tool = 0;  // whose reaction this is
   int body = 0;
@@ -30,6 +34,7 @@ struct ToolSpring {
   double damping = 0;                                        // N s/m
   bool slides = false;
   double friction = std::numeric_limits<double>::infinity();  // Coulomb's, >= 0: dynamic where it slides, else static
+  double forceMax = std::numeric_limits<double>::infinity();  // N
 };
 
 // A grabbed node: the same spring on one node, pulling and pushing.
@@ -41,6 +46,7 @@ struct HeldNode {
   Eigen::Vector3d anchorVelocity = Eigen::Vector3d::Zero();
   double stiffness = 0;
   double damping = 0;
+  double forceMax = std::numeric_limits<double>::infinity();  // N
 };
 
 // A force that belongs to the scene rather than to a tool: constant in the world's frame, whichever way the body turns

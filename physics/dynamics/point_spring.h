@@ -27,6 +27,7 @@ struct PointSpring {
   double stiffness, damping;
   bool slides;      // across `outward`: no spring, but Coulomb's friction
   double friction;  // times the push: the most across `outward`
+  double forceMax;  // N
 };
 
 // One of them while the velocities of a substep settle, with all that stays meanwhile.
