@@ -7,8 +7,8 @@ usage() {
 usage: make_references.sh [BODY[_CASE]...]
 
 Makes the FEM references of tests/accuracy/results/ with CalculiX, on one processor: all of them, or those of the bodies
-(cylinder, gallbladder, liver, stomach) or cases (gallbladder_axial, liver_modes, ...) named. A file is replaced when its case is
-solved. Prints a row per case for the README's table.
+(cylinder, gallbladder, gallbladder_halved, gallbladder_doubled, liver, liver_stretched, stomach, kidney) or cases
+(gallbladder_axial, liver_modes, ...) named. A file is replaced when its case is solved. Prints a row per case for the README's table.
 END
 }
 
