@@ -30,7 +30,8 @@ static std::string resolveTarget(const std::string& path) {
   if (path.empty() || path.back() == '/') throw std::runtime_error(path + ": expected the name of a file to write");
   std::string target = behindLink(path);
   struct stat status {};
-  if (::stat(target.c_str(), &status) == 0) {
+  // Asked by the name that was given: the link behind /dev/stdout says "pipe:[8]", which is the name of no file.
+  if (::stat(path.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) throw std::runtime_error(path + ": is a folder, expected the name of a file to write");
     if (!S_ISREG(status.st_mode)) throw std::runtime_error(path + ": is not a regular file");
     if (::access(target.c_str(), W_OK) != 0) throw unwritable(path);

@@ -1,8 +1,10 @@
 #include "app/files/output_file.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <csignal>
 
@@ -98,6 +100,12 @@ TEST(OutputFile, TargetsThatCannotBeWrittenAreRefusedAtOnce) {
   EXPECT_EQ(complaint(""), ": expected the name of a file to write");
   // Renaming onto a device would replace it for the whole machine.
   EXPECT_EQ(complaint("/dev/null"), "/dev/null: is not a regular file");
+  // As /dev/stdout: a link whose text, "pipe:[8]", is no path.
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  const std::string pipe = fmt::format("/proc/self/fd/{}", ends[1]);
+  EXPECT_EQ(complaint(pipe), pipe + ": is not a regular file");
+  for (const int end : ends) ::close(end);
   EXPECT_EQ(folder.contents().size(), 1u);
   if (::geteuid() == 0) return;  // nothing is forbidden to root
   ::chmod(folder.path().c_str(), 0500);
@@ -126,6 +134,20 @@ TEST(OutputFile, AFullDiskIsReportedAndLeavesNothing) {
   EXPECT_EQ(message, folder / "a.csv: cannot be written: File too large");
   EXPECT_EQ(readTextFile(folder / "a.csv"), "earlier");
   EXPECT_EQ(folder.contents().size(), 1u);
+}
+
+// Nothing is there yet that the file system could say of two names that they are one.
+TEST(OutputFile, OneNewFileBySeveralNamesIsRefusedForTwoOutputs) {
+  const TemporaryFolder folder;
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path());
+  for (const std::string& other : {std::string("a.csv"), std::string("./a.csv"), std::string("none/../a.csv"),
+                                   std::filesystem::current_path().string() + "/a.csv"}) {
+    EXPECT_EQ(complaintOf([&] { requireDistinctFiles({"a.csv", other}, {}); }), other + ": named for two outputs");
+    EXPECT_EQ(complaintOf([&] { requireDistinctFiles({"a.csv"}, {other}); }), "a.csv: would be written over an input");
+  }
+  EXPECT_EQ(complaintOf([&] { requireDistinctFiles({"a.csv", "./b.csv"}, {"c.csv"}); }), "");
+  std::filesystem::current_path(before);
 }
 
 TEST(OutputFolder, ALinkThatLeadsNowhereStays) {

@@ -69,9 +69,12 @@ void writeTextFile(const std::string& path, const std::string& text) {
 }
 
 void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
+  // Absolute first: of a path that starts with nothing that exists, weakly_canonical() leaves "a.csv" and "./a.csv"
+  // two.
   const auto place = [](const std::string& path) {
     std::error_code error;
-    const std::filesystem::path canonical = std::filesystem::weakly_canonical(path, error);
+    const std::filesystem::path absolute = std::filesystem::absolute(path, error);
+    const std::filesystem::path canonical = std::filesystem::weakly_canonical(absolute, error);
     return error ? std::filesystem::path(path) : canonical;
   };
   for (std::size_t k = 0; k < outputs.size(); ++k) {
