@@ -47,6 +47,8 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   servo_ = std::make_unique<Servo>(bodies, tools, tickDuration_, current_, inputs_, embree);
 
   totals_.touched.resize(tools.size());
+  totals_.held.resize(tools.size());
+  totals_.closings.resize(tools.size());
   record_.duration = frameDuration_;
   record_.from = record_.to = current_;
   record_.inputs.assign(ticksPerFrame_ + 1, inputs_);
@@ -115,6 +117,9 @@ void Simulation::accountTicks() {
       totals_.forceMax = std::max(totals_.forceMax, tool.force.norm());
       totals_.clampedTicks += tool.clamped;
       if (tool.inContact || tool.holding) totals_.touched[k] = true;
+      if (tool.holding) totals_.held[k] = true;
+      totals_.closings[k] +=
+          record_.inputs[tick][k].grip > kGripCloses && record_.inputs[tick - 1][k].grip <= kGripCloses;
       totals_.gripSlips += tool.slipped && !record_.tools[tick - 1][k].slipped;
       totals_.userEnergyMax = std::max(totals_.userEnergyMax, tool.energy);
     }

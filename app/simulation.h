@@ -65,7 +65,8 @@ struct RunTotals {
   double forceMax = 0;                            // N, of any tool
   double volumeRatioMin = 1, volumeRatioMax = 1;  // of any body
   long clampedTicks = 0, gripSlips = 0;           // of all tools
-  std::vector<bool> touched;                      // has tool k been in contact or held anything
+  std::vector<bool> touched, held;                // has tool k been in contact or held anything; has it held anything
+  std::vector<int> closings;                      // how often tool k's grip has closed
   double userEnergyMax = 0;                       // J, the most that any tool had handed to the user
   double toolImpulse = 0, impulseDifference = 0;  // N s, sums over frames and tools of lengths
   double impulseMismatch() const { return toolImpulse > 0 ? 100 * impulseDifference / toolImpulse : 0; }  // %

@@ -53,6 +53,24 @@ TEST(StarterScene, IsCheckedAndItsToolPressesAndHoldsTheBody) {
   EXPECT_GT(holding, 100);
 }
 
+// Hung on one sphere, the body swung out of the tool's way at the first touch; nothing was held.
+TEST(StarterScene, ItsToolHoldsBodiesOfFewSpheres) {
+  const TemporaryFolder folder;
+  for (const auto& [organ, spheres] : {std::pair("dolphin", "3"), {"dolphin", "7"}, {"stomach", "5"}}) {
+    const std::string mesh = fmt::format("{0}/assets/{1}/{1}.obj", MEDULLA_SOURCE_DIR, organ);
+    const std::string made = folder / (std::string(organ) + spheres), log = folder / "log.csv";
+    ASSERT_EQ(runProgram({"new", mesh, "-o", made, "--spheres", spheres}).exitCode, 0);
+    const ProgramResult run = runProgram({"replay", fmt::format("{}/{}.xml", made, organ), "--log", log});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_EQ(complaints(run).size(), 0) << organ << ", " << spheres << " spheres: " << run.err;
+    const LogTable table = readLog(log);
+    const auto held = std::find(table.columns.begin(), table.columns.end(), "grasper.held") - table.columns.begin();
+    EXPECT_GT(std::count_if(table.value.begin(), table.value.end(), [&](const auto& row) { return row[held] != 0; }),
+              100)
+        << organ << ", " << spheres << " spheres";
+  }
+}
+
 // The tool is twenty times as stiff as a patch of the tissue: what it pushes gives way and a neighbour stands out, and
 // where the push jumps from one to the other it rattled by 4.9 N about 12.5 N.
 TEST(StarterScene, AToolThatHoldsStillFeelsAForceThatDoes) {

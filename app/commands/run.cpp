@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <optional>
+#include <set>
 
 #include "app/commands/rest_watch.h"
 #include "app/files/log_file.h"
@@ -284,15 +285,25 @@ void printWarnings(const Scene& scene, const World& world) {
   for (const BodyOverlap& o : world.startOverlaps())
     fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n", scene.bodies[o.body0].name,
                scene.bodies[o.body1].name, 1e3 * o.depth);
+  for (const SceneBody& body : scene.bodies)
+    if (std::set<int>(body.fixedNodes.begin(), body.fixedNodes.end()).size() == body.model->restNodes.size())
+      fmt::print(stderr, "note: every node of body '{}' is held\n", body.name);
   if (scene.dynamics.sleepAfter > 0 && scene.dynamics.integrator == Integrator::implicit)
     fmt::print(stderr, "warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
 }
 
 // What a run came to that was hardly meant. A run that ends before a tool's motion does says nothing of the tool.
 static void printNotes(const LoadedScene& loaded, const RunTotals& totals) {
-  for (std::size_t k = 0; k < loaded.trajectories.size(); ++k)
-    if (!totals.touched[k] && motionEnd(loaded.trajectories[k]) <= totals.simulated + 1e-9)
-      fmt::print(stderr, "note: tool '{}' touched nothing in its whole motion\n", loaded.scene.tools[k].name);
+  for (std::size_t k = 0; k < loaded.trajectories.size(); ++k) {
+    if (motionEnd(loaded.trajectories[k]) > totals.simulated + 1e-9) continue;
+    const std::string& name = loaded.scene.tools[k].name;
+    const int closings = totals.closings[k];
+    if (!totals.touched[k])
+      fmt::print(stderr, "note: tool '{}' touched nothing in its whole motion\n", name);
+    else if (closings > 0 && !totals.held[k])
+      fmt::print(stderr, "note: tool '{}' closed {} and held nothing\n", name,
+                 closings == 1 ? "once" : fmt::format("{} times", closings));
+  }
   if (totals.volumeRatioMin <= 0)
     fmt::print(stderr,
                "note: a body was turned inside out (volume_ratio_min {:.3g}): its model is too coarse, its tissue too "
