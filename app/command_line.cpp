@@ -51,6 +51,7 @@ std::map<std::string, std::string> filesByTool(const std::string& option, const 
   for (const std::string& word : words) {
     const std::size_t equals = word.find('=');
     const bool named = equals != std::string::npos;
+    if (equals == word.size() - 1) usageError(option, word, "a file behind the =");
     const bool isFirst =
         out.try_emplace(named ? word.substr(0, equals) : "", named ? word.substr(equals + 1) : word).second;
     if (!isFirst) usageError(option, word, "one file per tool");
@@ -120,7 +121,7 @@ EmbreeSettings embreeSettings(const std::string& text) {
 }  // namespace
 
 void usageError(const std::string& option, const std::string& value, const std::string& expected) {
-  throw CLI::ValidationError(option + " " + value, "expected " + expected);
+  throw CLI::ValidationError(value.empty() ? option : option + " " + value, "expected " + expected);
 }
 
 template <typename T>

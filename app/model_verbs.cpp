@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 
 #include "app/commands/commands.h"
 #include "app/enum_names.h"
 #include "app/files/mesh_file.h"
+#include "app/files/number_text.h"
 #include "app/verbs.h"
 
 // The verbs that make models.
@@ -65,6 +67,14 @@ void addCoverOptions(CLI::App& c, BuildArguments& a) {
   a.ofCover = {spheres, gap, overshoot};
 }
 
+CLI::Validator compressible() {
+  const auto check = [](const std::string& word) {
+    const std::optional<double> value = parseNumber<double>(word);
+    return value && *value >= 0 && *value < 0.5 ? "" : word + ": expected a number from 0 to less than 0.5";
+  };
+  return CLI::Validator(check, "in [0 - 0.5)");
+}
+
 void addIdentification(CLI::App& c, BuildArguments& a) {
   CLI::Option* identify = c.add_flag(
       "--identify", a.options.identify,
@@ -78,7 +88,7 @@ void addIdentification(CLI::App& c, BuildArguments& a) {
       ->allow_extra_args(false)
       ->needs(identify);
   c.add_option("--poisson", a.options.identification.poisson, "Poisson's ratio of the tissue, 0 to less than 0.5")
-      ->check(numberFrom(0, 0.5))
+      ->check(compressible())
       ->needs(identify)
       ->capture_default_str();
   c.add_option("--link-form", a.linkForm,

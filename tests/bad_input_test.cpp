@@ -141,6 +141,8 @@ TEST_F(BadInput, FoldersMadeForAFailedCommandGoAgain) {
 TEST_F(BadInput, EmptyWordsAreWrongUsage) {
   expectRefused(run({"replay", "own/organ.xml", "--log", ""}), "--log ''", 2);
   expectRefused(run({"replay", "own/organ.xml", "--log="}), "--log=", 2);
+  for (const char* option : {"--record", "--trajectory"})
+    expectRefused(run({"replay", "own/organ.xml", option, "probe="}), "probe=: expected a file behind the =", 2);
   expectRefused(run({"render", "own/organ.xml", "-o", ""}), "-o ''", 2);
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"own"});
 }
@@ -149,7 +151,9 @@ TEST_F(BadInput, NumbersOfABuildThatAreNoneAreWrongUsage) {
   const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
   for (const char* option : {"--gap", "--overshoot", "--surface-mass"})
     expectRefused(run({"build", mesh, "-o", "m.xml", option, "nan"}), option, 2);
-  expectRefused(run({"build", mesh, "-o", "m.xml", "--identify", "--poisson", "nan"}), "--poisson", 2);
+  for (const char* poisson : {"nan", "0.5", "-0.1"})
+    expectRefused(run({"build", mesh, "-o", "m.xml", "--identify", "--poisson", poisson}),
+                  std::string(poisson) + ": expected a number from 0 to less than 0.5", 2);
   expectRefused(run({"build", mesh, "-o", "m.xml", "--identify", "--spheres", "301"}), "at most 300", 2);
 }
 

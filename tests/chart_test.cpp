@@ -278,7 +278,7 @@ TEST_F(ChartCommand, BadInputIsRefusedInOneLineAndLeavesNoFolder) {
   refused(chart({"--models", std::string(MEDULLA_SOURCE_DIR) + "/assets/stomach/stomach.model.xml"}), 1,
           "is of another mesh");
   refused(chart({"--set", "body.pear.reference=none.txt"}), 1, "reference \"");
-  refused(chart({"--models", "apple=" + (folder / "case.xml")}), 1, "body.apple.model");
+  refused(chart({"--models", "apple=" + (folder / "case.xml")}), 1, "case.xml: the scene has no body \"apple\"");
   refused(chart({"--set", "body.pear.fix.plane=0 -1 0 1", "--steps", "1"}), 1, "nothing moves");
   refused(chart({"--steps", "40"}), 1, "the reference run with substeps of 10 ms is not finite at ");
 }

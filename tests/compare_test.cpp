@@ -74,6 +74,7 @@ TEST_F(Compare, WhatIsNoLogIsRefused) {
   refused(compare(edited("-2,", ""), kLog), 1, "a.csv:3: 2 columns in this row, expected 3 as in the header");
   refused(compare(kLog, ""), 1, "b.csv: no header");
   refused(compare(kLog, "vertex,fx\n1,2\n"), 1, "b.csv:1: this is no log");
+  refused(compare(kLog, "t;x\n1;2\n"), 1, "b.csv:1: columns are separated by semicolons, expected commas");
   refused(runProgram({"compare", folder / "a.csv", folder / "none.csv"}), 1, "none.csv");
   refused(runProgram({"compare", folder / "a.csv"}), 2, "B");
   refused(compare(kLog, kLog, {"--tolerance", "-1"}), 2, "--tolerance");

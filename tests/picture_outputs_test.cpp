@@ -285,7 +285,7 @@ TEST_F(Outputs, AFolderThatCannotTakeEveryPictureIsRefusedBeforeTheFilm) {
 }
 
 TEST_F(Outputs, WhatCannotBeResumedIsWrongUsage) {
-  expectRefused(render({"--resume"}), "--resume", 2);
+  expectRefused(render({"--resume"}), "medulla: --resume: expected -o DIR", 2);
   expectRefused(render({"--resume", "-o", "a.mp4"}), "a.mp4", 2);
   expectRefused(render({"--still", "0", "--frames", "0:1"}), "--still", 2);
   folder.write("a.txt", "");

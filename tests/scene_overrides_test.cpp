@@ -48,6 +48,9 @@ TEST_F(SceneOverrides, MistakesInOverridesNameTheOverride) {
             "--set dynamics.gravty: the scene has nothing of this name; did you mean dynamics.gravity?");
   EXPECT_EQ(set("body.gallbladder", "x"),
             "--set body.gallbladder: the scene has nothing of this name; did you mean body.gallbladder.name?");
+  EXPECT_EQ(set("camera.keys.fov", "50"),
+            "--set camera.keys.fov: the scene has nothing of this name, and several elements answer to camera.key.fov, "
+            "which reaches none");
   EXPECT_EQ(set("camera.key.fov", "50"), "--set camera.key.fov: several elements answer to this, expected one");
   EXPECT_EQ(
       set("body.gallbladder.surface", "thin"),

@@ -90,6 +90,9 @@ TEST(TrajectoryFile, EveryMistakeIsNamedWithItsLine) {
   expectComplaint("t[s],\x1b[31m,y[m],x[m],z[m],qw,qx,qy,qz,grip\n" + good, "file.csv:1: ", "column 2 is '?[31m'");
   expectComplaint("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,colour\n" + good, "file.csv:1: ", "'colour'");
   expectComplaint("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,fx[N]\n" + good, "file.csv:1: ", "10 columns");
+  expectComplaint("t[s];x[m];y[m];z[m];qw;qx;qy;qz;grip\n",
+                  "file.csv:1: ", "columns are separated by semicolons, expected commas");
+  expectComplaint("t[s]\tx[m]\ty[m]\tz[m]\tqw\tqx\tqy\tqz\tgrip\n", "file.csv:1: ", "separated by tabs");
   expectComplaint("0,0,0,0,1,0,0,0,0\n" + good, "file.csv:1: ", "column t[s] is missing");
   expectComplaint(header + "0,0,0,0,1,0,0,0\n", "file.csv:2: ", "8 columns");
   expectComplaint(header + good + "1,0,nan,0,1,0,0,0,0\n", "file.csv:3: ", "column y[m] is 'nan'");

@@ -85,6 +85,8 @@ SceneOverride modelOverride(const std::string& model, const Scene& scene) {
     throw std::runtime_error(
         fmt::format("--models {}: the scene has {} bodies, write BODY=FILE", model, scene.bodies.size()));
   const std::string body = equals == std::string::npos ? scene.bodies[0].name : model.substr(0, equals);
+  if (std::none_of(scene.bodies.begin(), scene.bodies.end(), [&](const SceneBody& b) { return b.name == body; }))
+    throw std::runtime_error(fmt::format("--models {}: the scene has no body \"{}\"", model, body));
   const std::string path = modelPathOf(model);
   if (!fs::exists(path)) throw std::runtime_error(fmt::format("--models {}: {} does not exist", model, path));
   return {fmt::format("body.{}.model", body), fs::absolute(path).string()};

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
 #include "app/files/text.h"
@@ -61,6 +63,13 @@ int CsvRows::index(std::size_t cell, std::string_view column, std::size_t count)
     fail(fmt::format("column {} is {}, expected a whole number from 0 to {}", column, inQuotes(cells_[cell]),
                      count - 1));
   return static_cast<int>(*value);
+}
+
+void CsvRows::requireCommas() const {
+  if (cells_.size() != 1) return;
+  for (const auto& [separator, name] : {std::pair(';', "semicolons"), {'\t', "tabs"}})
+    if (cells_[0].find(separator) != std::string_view::npos)
+      fail(fmt::format("columns are separated by {}, expected commas", name));
 }
 
 void CsvRows::requireCells(std::size_t count, const std::string& expected) const {

@@ -28,6 +28,8 @@ class CsvRows {
   double number(std::size_t cell, std::string_view column) const;
   int index(std::size_t cell, std::string_view column, std::size_t count) const;
 
+  // Of a header: refuses one that another separator divides, which would be one cell of all its names.
+  void requireCommas() const;
   // `expected`: how errors say the count.
   void requireCells(std::size_t count, const std::string& expected) const;
   // Throws "NAME:LINE: message".

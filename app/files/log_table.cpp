@@ -14,6 +14,7 @@ LogTable readLog(const std::string& path) {
   table.path = path;
   CsvRows rows(text, path);
   if (!rows.next()) throw inputError(path, 0, "no header, expected the names of a log's columns");
+  rows.requireCommas();
   table.columns.assign(rows.cells().begin(), rows.cells().end());
   if (table.columns[0] != "t") rows.fail("this is no log: expected a header that begins with the column t");
   const std::string expected = fmt::format("{} as in the header", table.columns.size());

@@ -59,8 +59,11 @@ OverriddenAttribute applyOverride(XmlElement& root, const SceneOverride& overrid
     std::vector<std::string> known;
     known.reserve(targets.size());
     for (const Target& t : targets) known.push_back(t.path);
-    throw std::runtime_error(where + ": the scene has nothing of this name; did you mean " +
-                             nearestName(override.path, known) + "?");
+    const std::string nearest = nearestName(override.path, known), nothing = ": the scene has nothing of this name";
+    if (std::count(known.begin(), known.end(), nearest) > 1)
+      throw std::runtime_error(where + nothing + ", and several elements answer to " + nearest +
+                               ", which reaches none");
+    throw std::runtime_error(where + nothing + "; did you mean " + nearest + "?");
   }
   if (std::count_if(targets.begin(), targets.end(), matches) > 1)
     throw std::runtime_error(where + ": several elements answer to this, expected one");

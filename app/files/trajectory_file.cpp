@@ -75,6 +75,7 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name) {
   Trajectory trajectory;
   CsvRows rows(text, name);
   if (!rows.next()) throw inputError(name, 0, fmt::format("no header, expected {}", requiredHeader()));
+  rows.requireCommas();
   checkHeader(rows.cells(), name, rows.line());
   const std::size_t columns = rows.cells().size();
   const std::string expected = fmt::format("{} as in the header", columns);

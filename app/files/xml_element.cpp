@@ -174,8 +174,9 @@ std::vector<T> readList(const XmlElement& element, const std::string& attribute,
   if (!a) return {};
   const std::vector<std::string> texts = words(a->value);
   const std::string kind = std::is_integral_v<T> ? "integer" : "number";
-  const std::string expected = "expected " + (count == 0 ? "one or more" : std::to_string(count)) + " " + kind +
-                               (count == 1 ? "" : "s") + describe(range);
+  const std::string expected =
+      "expected " + (count == 0 ? "one or more" : std::to_string(count)) + " " + kind + (count == 1 ? "" : "s") +
+      describe(range) + (count != 1 && a->value.find_first_of(",;") < a->value.size() ? ", separated by blanks" : "");
   if (count == 0 ? texts.empty() : texts.size() != static_cast<std::size_t>(count))
     refuse(element, attribute, expected);
   std::vector<T> values;
