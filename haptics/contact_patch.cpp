@@ -29,8 +29,10 @@ void fadePatch(double factor, ContactPatch& patch) {
 
 void fadePatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius, double way,
                double duration, ContactPatch& patch) {
-  constexpr double kShort = 0.05, kLong = 1;          // s
-  constexpr double kWayPerRadius = 0.1, kOff = 0.02;  // of the tool's radius
+  constexpr double kShort = 0.05, kLong = 1;  // s
+  constexpr double
+      kWayPerRadius = 0.1,
+      kOff = 0.06;  // of the tool's radius; at 0.02 gaps of the chatter itself, at 20 Hz, are taken for slides
   const double shortest = duration / kShort,
                fading = std::min(shortest, duration / kLong + way / (kWayPerRadius * toolRadius));
   const double off = proxy.radius + kOff * toolRadius, rest = std::exp(fading - shortest);
