@@ -5,9 +5,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <numeric>
 
+#include "physics/dynamics/rest_modes.h"
 #include "physics/model/rotation_between.h"
 #include "physics/model/surface_queries.h"
 
@@ -97,7 +99,7 @@ Layout layOutScene(const SoftBodyModel& m) {
 // The spheres in the outer quarter of the held end, or the two outermost: of a body that hangs on a single sphere, by
 // links that are thin there, the rest swings so slowly (0.03 to 0.2 Hz) that one touch knocks it out of the tool's way.
 // One sphere stays free.
-std::string heldSpheres(const SoftBodyModel& m, const Layout& l) {
+std::vector<int> heldSpheres(const SoftBodyModel& m, const Layout& l) {
   const int count = static_cast<int>(m.spheres.size());
   std::vector<int> order(count);
   std::iota(order.begin(), order.end(), 0);
@@ -106,9 +108,25 @@ std::string heldSpheres(const SoftBodyModel& m, const Layout& l) {
   const auto outer = std::count_if(order.begin(), order.end(), [&](int i) { return place(i) > kOuterQuarter; });
   order.resize(std::max(static_cast<int>(outer), std::clamp(count - 1, 1, 2)));
   std::sort(order.begin(), order.end());
+  return order;
+}
+
+std::string numbersText(const std::vector<int>& numbers) {
   std::string out;
-  for (const int i : order) out += fmt::format("{}{}", out.empty() ? "" : " ", i);
+  for (const int i : numbers) out += fmt::format("{}{}", out.empty() ? "" : " ", i);
   return out;
+}
+
+// How many times stiffer the tissue has to be for what hangs on these spheres to swing back between a press and a grab:
+// stiffness grows with the square of the frequency. 1 where nothing swings; a thread stays a limp one.
+double stiffening(const SoftBodyModel& m, const std::vector<int>& held, const Tissue& tissue) {
+  constexpr double kSlowest = 0.25, kMost = 10;  // Hz; at 0.13 Hz bodies were still away when the tool came back
+  BodyDescription body;
+  body.model = std::shared_ptr<const SoftBodyModel>(std::shared_ptr<const SoftBodyModel>(), &m);
+  body.tissue = tissue;
+  for (const int sphere : held) body.fixed.push_back({sphere});
+  const double frequency = lowestFrequency(body, bodyMechanics(body)) / (2 * std::numbers::pi);
+  return frequency > 0 ? std::clamp(std::pow(kSlowest / frequency, 2), 1.0, kMost) : 1;
 }
 
 std::string vectorText(const Vector3d& v) {
@@ -118,7 +136,11 @@ std::string vectorText(const Vector3d& v) {
 std::string sceneText(const std::string& name, const SoftBodyModel& model, const Layout& l) {
   // A body ten times as long of the same tissue would hang limp: stiffness grows with size, as in structures of one
   // shape that sag alike. Couplings and force limit follow.
-  const double scale = l.size / 0.1, young = 5e3 * scale;
+  const double scale = l.size / 0.1;
+  const std::vector<int> held = heldSpheres(model, l);
+  Tissue tissue{.young = 5e3 * scale, .poisson = 0.45, .density = 1040, .damping = 0.4};
+  const double stiffer = stiffening(model, held, tissue);
+  tissue.young *= stiffer;
   constexpr double fov = 42, aspect = 16.0 / 9;
   const Vector3d half = 0.5 * l.box.sizes(), centre = l.box.center();
   const double halfHeight = 1.2 * std::max(half.y(), half.x() / aspect);
@@ -129,11 +151,15 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
   out += "  <clock servo=\"1200\" dynamics=\"50\" duration=\"9\"/>\n";
   out += "  <!-- the mesh is taken as the shape under weight; for free fall: gravity=\"0 -9.81 0\" -->\n";
   out += "  <dynamics gravity=\"0 0 0\"/>\n";
-  out += fmt::format("  <tissue name=\"soft\" young=\"{:.3g}\" poisson=\"0.45\" density=\"1040\" damping=\"0.4\"/>\n",
-                     young);
+  if (stiffer > 1)
+    out += fmt::format(
+        "  <!-- {:.2g} times as stiff as its size asks for: so little holds the body that it swung too slowly -->\n",
+        stiffer);
+  out += fmt::format("  <tissue name=\"soft\" young=\"{:.3g}\" poisson=\"{}\" density=\"{}\" damping=\"{}\"/>\n",
+                     tissue.young, tissue.poisson, tissue.density, tissue.damping);
   out += fmt::format("  <body name=\"{0}\" model=\"{0}.model.xml\" tissue=\"soft\" look=\"stomach\">\n", name);
   out += "    <!-- numbers of filling spheres; the model view shows the held ones grey -->\n";
-  out += fmt::format("    <fix spheres=\"{}\"/>\n  </body>\n", heldSpheres(model, l));
+  out += fmt::format("    <fix spheres=\"{}\"/>\n  </body>\n", numbersText(held));
   out += "  <!-- what it lies before; a mesh of yours is shape=\"mesh\" mesh=\"FILE\" -->\n";
   out += fmt::format("  <static shape=\"plane\" position=\"{}\" normal=\"0 0 1\" look=\"wall\" contact=\"false\"/>\n",
                      vectorText({centre.x(), centre.y(), l.box.min().z() - 0.15 * l.size}));
@@ -141,8 +167,9 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
       "  <tool name=\"{}\" trajectory=\"{}.csv\" radius=\"{:.3g}\" stiffness=\"{:.3g}\" damping=\"{:.3g}\" "
       "friction=\"0.3 0.2\"\n        force_max=\"{:.3g}\" grip_force_max=\"{:.3g}\" "
       "grip_radius=\"{:.3g}\"/>\n",
-      name == "grasper" ? "tool" : "grasper", name, 0.03 * l.grain, 0.6 * young * l.size, std::pow(scale, 2.5),
-      8 * std::pow(scale, 3), 8 * std::pow(scale, 3), 0.08 * l.grain);
+      name == "grasper" ? "tool" : "grasper", name, 0.03 * l.grain, 0.6 * tissue.young * l.size,
+      std::sqrt(stiffer) * std::pow(scale, 2.5), stiffer * 8 * std::pow(scale, 3), stiffer * 8 * std::pow(scale, 3),
+      0.08 * l.grain);
   out += fmt::format("  <camera position=\"{}\" target=\"{}\" fov=\"{}\"/>\n",
                      vectorText(centre + distance * Vector3d::UnitZ()), vectorText(centre), fov);
   out += fmt::format("  <light offset=\"{}\" reference_distance=\"{:.3g}\"/>\n",
