@@ -167,6 +167,9 @@ TEST_F(LoadCase, MistakesNameFileAndLine) {
   EXPECT_EQ(refusal("<load file='none.csv'/>"), "case.xml:4: file of forces \"none.csv\" does not exist");
   EXPECT_EQ(refusal("<load file='nan.csv'/>"), "nan.csv:2: column fy[N] is 'nan', expected a finite number");
   EXPECT_EQ(refusal("<load file='far.csv'/>"), "far.csv:1: 1 columns in this row, expected vertex,fx[N],fy[N],fz[N]");
+  folder.write("semicolons.csv", "vertex;fx[N];fy[N];fz[N]\n1;0;0;1\n");
+  EXPECT_EQ(refusal("<load file='semicolons.csv'/>"),
+            "semicolons.csv:1: columns are separated by semicolons, expected commas");
 }
 
 std::vector<Eigen::Vector3d> verticesOf(const std::string& obj) {

@@ -219,8 +219,8 @@ TEST(Program, IdentifiesTheSameNetworkEachTime) {
     expectRefusal(build("c.xml", more), exitCode, says);
     EXPECT_FALSE(std::filesystem::exists(folder / "c.xml"));
   };
-  refused({"--identify", "--poisson", "0.5"}, 1, {"0.5", "less than 0.5"});
-  refused({"--identify", "--poisson", "-0.1"}, 2, {"-0.1", "from 0 to 0.5"});
+  refused({"--identify", "--poisson", "0.5"}, 2, {"0.5", "less than 0.5"});
+  refused({"--identify", "--poisson", "-0.1"}, 2, {"-0.1", "from 0 to less than 0.5"});
   refused({"--fix", "plane=1,0,0,0.001"}, 2, {"--identify"});
 }
 

@@ -36,6 +36,7 @@ void forEachVertex(std::string_view text, const std::string& name, const SoftBod
   const std::string expected = joined(columns, ",");
   bool first = true, any = false;
   for (; rows.next(); first = false) {
+    if (first) rows.requireCommas();
     if (first && isHeader(rows.cells(), columns)) continue;
     rows.requireCells(columns.size(), expected);
     const int vertex = rows.index(0, columns[0], model.nodeOfInputVertex.size());
