@@ -82,9 +82,23 @@ Error errorAtRest(const Result& result, const BodyDescription& loaded, double se
   BodyDescription body = loaded;
   body.tissue.damping = 1;
   World world = worldOf(body);
-  while (world.time() < seconds) world.advance({});
-  DynamicsFrame frame;
-  world.readFrame(frame);
+  // A body that begins to give way swings more slowly than at rest: on to where the last half moved nothing by three
+  // ten-thousandths of the way.
+  DynamicsFrame frame, before;
+  const auto moves = [&] {
+    double way = 0, size = 0;
+    for (std::size_t n = 0; n < body.model->restNodes.size(); ++n) {
+      way = std::max(way, (frame.bodies[0].nodes[n] - before.bodies[0].nodes[n]).norm());
+      size = std::max(size, (frame.bodies[0].nodes[n] - body.model->restNodes[n]).norm());
+    }
+    return way > 3e-4 * size;
+  };
+  const double half = 0.5 * seconds;
+  for (double until = half; until < 1.1 * seconds || (moves() && until < 10 * seconds); until += half) {
+    while (world.time() < until) world.advance({});
+    before = frame;
+    world.readFrame(frame);
+  }
   const std::vector<Vector3d> expected = result.vectors(result.number("unit"));
   double largest = 0, worst = 0, sum = 0;
   for (std::size_t v = 0; v < expected.size(); ++v) {
@@ -191,7 +205,7 @@ INSTANTIATE_TEST_SUITE_P(OfOtherMeshes, StaticAccuracy,
                                          StaticCase{"gallbladder_doubled_tip_large", 7, 0.92, 0.3, 0.1, PEAR_ROOT},
                                          StaticCase{"gallbladder_doubled_pull", 7, 1.9, 0.8, 0.1, PEAR_ROOT},
                                          StaticCase{"kidney_tip", 20, 3.8, 1.5, 0.1, KIDNEY_ROOT},
-                                         StaticCase{"stomach_pull", 25, 1.46, 0.8, 0.1, STOMACH_ROOT}),
+                                         StaticCase{"stomach_pull", 25, 2.27, 1.18, 0.1, STOMACH_ROOT}),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 // Bending in both planes, torsion, second bending in both planes; then stretch. The surface swings along.
