@@ -100,7 +100,9 @@ static TouchedTriangle touchedTriangle(double give) {
 }
 
 TEST(TissueMotion, AtFirstTouchTissueFollowsByThePartThatItsGiveTells) {
-  const auto [surface, contact] = touchedTriangle(0.01);
+  const TouchedTriangle touched = touchedTriangle(0.01);
+  const BlendedSurface& surface = touched.surface;
+  const ProxyContact& contact = touched.contact;
   DeviceMotion device;
   beginContact(surface, 0.5, contact, Vector3d::UnitY(), 400, device);
   device.velocity = {0.03, -0.05, 0};
@@ -114,6 +116,18 @@ TEST(TissueMotion, AtFirstTouchTissueFollowsByThePartThatItsGiveTells) {
   const Vector3d end = lead(1);
   startFrame(Vector3d::Zero(), surface.duration, device);
   EXPECT_LT((lead(1e-9) - end).norm(), 1e-11);  // no step from frame to frame
+}
+
+// A push on the middle of a triangle is shared by three nodes, each of which gives a ninth of its own; what carries them
+// all goes along with the whole push.
+TEST(TissueMotion, WhatCarriesNodesGivesByTheWholePush) {
+  TouchedTriangle touched = touchedTriangle(0);
+  touched.surface.give.assign(3, {0.009, 0.002});
+  touched.contact.weights.setConstant(1.0 / 3);
+  DeviceMotion device;
+  beginContact(touched.surface, 1, touched.contact, Vector3d::UnitY(), 400, device);
+  const double give = 0.003 + 0.002;
+  EXPECT_NEAR(device.followsAtOnce, 400 * give / (1 + 400 * give), 1e-12);
 }
 
 // A device that goes on as it did, and tissue that follows by its part: whenever the contact began, the steps are the
