@@ -71,7 +71,8 @@ static Pull pullBall(double stiffness, double give, int dynamicsRate) {
   tool.stiffness = stiffness;
   tool.forceMax = tool.gripForceMax = 100;
   DynamicsFrame last = ball.frame(), now = last;
-  Servo servo({{ball.shape, std::vector<NodeGive>(ball.position.size(), NodeGive{give})}}, {tool}, kTick, now, {pulling(0)});
+  Servo servo({{ball.shape, std::vector<NodeGive>(ball.position.size(), NodeGive{give})}}, {tool}, kTick, now,
+              {pulling(0)});
   Pull pull;
   Loads loads;
   for (int frame = 0; frame < 2 * dynamicsRate; ++frame) {

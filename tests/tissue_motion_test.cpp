@@ -118,8 +118,8 @@ TEST(TissueMotion, AtFirstTouchTissueFollowsByThePartThatItsGiveTells) {
   EXPECT_LT((lead(1e-9) - end).norm(), 1e-11);  // no step from frame to frame
 }
 
-// A push on the middle of a triangle is shared by three nodes, each of which gives a ninth of its own; what carries them
-// all goes along with the whole push.
+// A push on the middle of a triangle is shared by three nodes, each of which gives a ninth of its own; what carries
+// them all goes along with the whole push.
 TEST(TissueMotion, WhatCarriesNodesGivesByTheWholePush) {
   TouchedTriangle touched = touchedTriangle(0);
   touched.surface.give.assign(3, {0.009, 0.002});

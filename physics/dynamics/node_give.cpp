@@ -60,8 +60,8 @@ RestRates massOfNodes(const BodyMechanics& mechanics) {
 // the mode along, within T, by the part k / (k + K) (1 - sin z / z) of the way, z^2 = (k + K) T^2 / m, or, without
 // mass, by (1 - (1 - exp(-z)) / z), z = (k + K) T / c. z^2 / (z^2 + 6) and z / (z + 2) are the same for short times and
 // less for all others that matter: as if the mode were stiffer by 6 m / T^2 and 2 c / T. Damping over mass is small
-// against the former where modes are slow, and knows no rigid motion. In n substeps, of which each moves by the velocity
-// at its end, a mass goes (1 + 1 / n) (1 + 2 / n) times as far.
+// against the former where modes are slow, and knows no rigid motion. In n substeps, of which each moves by the
+// velocity at its end, a mass goes (1 + 1 / n) (1 + 2 / n) times as far.
 RestRates stiffnessWithin(const FrameSteps& steps, const BodyDescription& body, const BodyMechanics& mechanics,
                           const RestRates& nodes) {
   const RestRates links = linkRates(*body.model, mechanics);
