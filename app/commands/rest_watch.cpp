@@ -41,10 +41,9 @@ void RestWatch::afterFrame(const Simulation& simulation) {
   for (std::size_t k = 0; k < bodies_.size(); ++k) {
     Body& body = bodies_[k];
     const std::vector<Vector3d>& now = simulation.current().bodies[k].nodes;
-    body.most = std::max(kOfWay * farthest(body.start, now), kOfSize * body.size);
-    body.moved = farthest(body.last, now);
+    const double none = std::max(kOfWay * farthest(body.start, now), kOfSize * body.size);
     // A recorded motion ends at a tick, which may lie a rounding past the frame that ends there.
-    if (body.moved <= body.most && time_ >= busyUntil_ - 1e-9) continue;
+    if (farthest(body.last, now) <= none && time_ >= busyUntil_ - 1e-9) continue;
     body.last = now;
     body.movedAt = time_;
   }

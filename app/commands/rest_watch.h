@@ -29,7 +29,7 @@ class RestWatch {
     std::string name;
     std::vector<Eigen::Vector3d> start, last;  // m, nodes: at the scene's start, and where it last was found elsewhere
     double size = 0, period = 0;               // m, s
-    double movedAt = 0, moved = 0, most = 0;   // s; m, since then; m, that counts as none
+    double movedAt = 0;                        // s
   };
   double busyUntil_ = 0, time_ = 0;  // s
   std::vector<Body> bodies_;

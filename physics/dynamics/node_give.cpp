@@ -9,52 +9,7 @@ namespace medulla {
 
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
 using Eigen::VectorXd;
-using Triplets = std::vector<Eigen::Triplet<double>>;
-
-void addBlock(Eigen::Index row, Eigen::Index column, const Matrix3d& block, Triplets& out) {
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) out.emplace_back(static_cast<int>(row + r), static_cast<int>(column + c), block(r, c));
-}
-
-// 3 nodes x 6 spheres: how the spheres carry the nodes' anchors.
-RestRates nodeRates(const BodyDescription& body, const BodyMechanics& mechanics) {
-  Triplets entries;
-  const int nodes = static_cast<int>(mechanics.attachments.size());
-  for (int n = 0; n < nodes; ++n) {
-    for (const HostRate& rate : anchorRates(body, mechanics, n)) {
-      addBlock(3 * n, 6 * rate.sphere, rate.linear, entries);
-      addBlock(3 * n, 6 * rate.sphere + 3, rate.angular, entries);
-    }
-  }
-  RestRates out(3 * nodes, 6 * static_cast<int>(mechanics.sphereMass.size()));
-  out.setFromTriplets(entries.begin(), entries.end());
-  return out;
-}
-
-RestRates massOfSpheres(const BodyMechanics& mechanics) {
-  Triplets entries;
-  const int spheres = static_cast<int>(mechanics.sphereMass.size());
-  for (int i = 0; i < spheres; ++i) {
-    addBlock(6 * i, 6 * i, mechanics.sphereMass[i] * Matrix3d::Identity(), entries);
-    addBlock(6 * i + 3, 6 * i + 3, mechanics.sphereInertia[i], entries);
-  }
-  RestRates out(6 * spheres, 6 * spheres);
-  out.setFromTriplets(entries.begin(), entries.end());
-  return out;
-}
-
-RestRates massOfNodes(const BodyMechanics& mechanics) {
-  Triplets entries;
-  for (std::size_t n = 0; n < mechanics.nodeMass.size(); ++n)
-    addBlock(3 * n, 3 * n, (mechanics.nodeMoves[n] ? mechanics.nodeMass[n] : 0) * Matrix3d::Identity(), entries);
-  const int size = 3 * static_cast<int>(mechanics.nodeMass.size());
-  RestRates out(size, size);
-  out.setFromTriplets(entries.begin(), entries.end());
-  return out;
-}
 
 // A spring k between a mode (mass m, stiffness K, damping c) at rest and a device that sets out at an even speed takes
 // the mode along, within T, by the part k / (k + K) (1 - sin z / z) of the way, z^2 = (k + K) T^2 / m, or, without
@@ -70,7 +25,7 @@ RestRates stiffnessWithin(const FrameSteps& steps, const BodyDescription& body, 
   const double inert = 6 / (duration * duration * (1 + 1 / n) * (1 + 2 / n));
   RestRates out =
       damped * RestRates(links.transpose() * links) +
-      inert * RestRates(massOfSpheres(mechanics) + RestRates(nodes.transpose() * (massOfNodes(mechanics) * nodes)));
+      inert * RestRates(sphereMasses(mechanics) + RestRates(nodes.transpose() * (nodeMasses(mechanics) * nodes)));
   if (holdsByNodes(body)) {
     const RestRates held = heldAttachmentRates(body, mechanics);
     out += RestRates(held.transpose() * held);
@@ -90,7 +45,7 @@ VectorXd onFree(const BodyMechanics& mechanics, VectorXd forces) {
 
 void setCarried(const BodyDescription& body, const BodyMechanics& mechanics, const FrameSteps& steps,
                 std::vector<NodeGive>& out) {
-  const RestRates nodes = nodeRates(body, mechanics);
+  const RestRates nodes = anchorRates(body, mechanics);
   Eigen::SparseMatrix<double> stiffness = stiffnessWithin(steps, body, mechanics, nodes);
   const VectorXd free = onFree(mechanics, VectorXd::Ones(stiffness.rows()));
   stiffness = Eigen::SparseMatrix<double>(free.asDiagonal() * stiffness * free.asDiagonal()) +

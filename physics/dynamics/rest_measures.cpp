@@ -146,6 +146,36 @@ std::vector<HostRate> anchorRates(const BodyDescription& body, const BodyMechani
   return out;
 }
 
+RestRates anchorRates(const BodyDescription& body, const BodyMechanics& mechanics) {
+  Entries out;
+  const std::size_t nodes = mechanics.attachments.size();
+  for (std::size_t n = 0; n < nodes; ++n) {
+    for (const HostRate& rate : anchorRates(body, mechanics, static_cast<int>(n))) {
+      out.addBlock(3 * n, 6 * rate.sphere, rate.linear);
+      out.addBlock(3 * n, 6 * rate.sphere + 3, rate.angular);
+    }
+  }
+  return out.matrix(3 * nodes, 6 * body.model->spheres.size());
+}
+
+RestRates sphereMasses(const BodyMechanics& mechanics) {
+  Entries out;
+  const std::size_t spheres = mechanics.sphereMass.size();
+  for (std::size_t i = 0; i < spheres; ++i) {
+    out.addBlock(6 * i, 6 * i, mechanics.sphereMass[i] * Matrix3d::Identity());
+    out.addBlock(6 * i + 3, 6 * i + 3, mechanics.sphereInertia[i]);
+  }
+  return out.matrix(6 * spheres, 6 * spheres);
+}
+
+RestRates nodeMasses(const BodyMechanics& mechanics) {
+  Entries out;
+  const std::size_t nodes = mechanics.nodeMass.size();
+  for (std::size_t n = 0; n < nodes; ++n)
+    if (mechanics.nodeMoves[n]) out.addBlock(3 * n, 3 * n, mechanics.nodeMass[n] * Matrix3d::Identity());
+  return out.matrix(3 * nodes, 3 * nodes);
+}
+
 RestRates heldAttachmentRates(const BodyDescription& body, const BodyMechanics& mechanics) {
   Entries out;
   std::size_t rows = 0;

@@ -22,6 +22,13 @@ struct HostRate {
 };
 std::vector<HostRate> anchorRates(const BodyDescription& body, const BodyMechanics& mechanics, int node);
 
+// 3 nodes x 6 spheres: of all nodes.
+RestRates anchorRates(const BodyDescription& body, const BodyMechanics& mechanics);
+
+// kg and kg m2, square: of the spheres' freedoms; kg, of the nodes', 0 of fixed ones.
+RestRates sphereMasses(const BodyMechanics& mechanics);
+RestRates nodeMasses(const BodyMechanics& mechanics);
+
 // R likewise, of held nodes' attachments: three rows each.
 RestRates heldAttachmentRates(const BodyDescription& body, const BodyMechanics& mechanics);
 
