@@ -189,6 +189,27 @@ TEST_P(ImplicitLinks, RestsWhereTheExplicitStepRests) {
   }
 }
 
+// A body is solved as if it were alone, however light it is beside another.
+TEST(Implicit, AnIdleHeavyBodyLeavesALightOneAlone) {
+  BodyDescription light = tube(SurfaceMode::full, true, 1), heavy = synthetic::ball("heavy", 0.1, {1, 0, 0});
+  heavy.tissue.density = 1e4;
+  light.deadLoads = {{static_cast<int>(light.model->restNodes.size()) - 1, {0, 1e-5, 0}, 0, 0.1}};
+  for (const int order : {1, 2}) {
+    World alone(implicitly(0.02, order), {light}), beside(implicitly(0.02, order), {light, heavy});
+    for (World* world : {&alone, &beside}) run(*world, 3);
+    DynamicsFrame a, b;
+    alone.readFrame(a);
+    beside.readFrame(b);
+    double way = 0, apart = 0;
+    for (std::size_t i = 0; i < a.bodies[0].nodes.size(); ++i) {
+      way = std::max(way, (a.bodies[0].nodes[i] - light.model->restNodes[i]).norm());
+      apart = std::max(apart, (a.bodies[0].nodes[i] - b.bodies[0].nodes[i]).norm());
+    }
+    EXPECT_GT(way, 1e-6);
+    EXPECT_LT(apart, 1e-3 * way) << "order " << order;
+  }
+}
+
 // A bending tube, let go: errors against a far finer run shrink as the step and as its square. It falls fast enough for
 // these to be far above what the iteration leaves, 1e-5 m/s2 or a tenth of a micrometre by then.
 TEST_P(ImplicitLinks, ConvergesWithItsOrder) {

@@ -95,8 +95,12 @@ struct ImplicitData {
   std::vector<PointLoad> loads;
   std::vector<Holding> held;  // per contact
 
-  StageStart before, start;        // of the step, of its present stage
-  double totalMass = 0;            // kg
+  StageStart before, start;      // of the step, of its present stage
+  std::vector<double> bodyMass;  // kg, per body
+  double totalMass = 0;          // kg
+  // J, per body: twice the energy of the motion that its residual would give its free masses, and what is little
+  // enough.
+  std::vector<double> left, enough;
   double workOfPaths = 0;          // J, that led spheres give in this stage
   std::vector<WholeMotion> whole;  // per body, at the stage's end
   Motion balance, kept;            // the residual without loads; the motion while a derivative is taken

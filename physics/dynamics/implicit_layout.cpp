@@ -24,14 +24,10 @@ void layOutNodes(const WorldData& d, ImplicitData& s) {
   pullOf(n.onLinks);
   pullOf(n.onSpheres);
   for (int i = 0; i < n.dynamicEnd; ++i) {
-    const double m = n.mass[i];
+    const double m = n.mass[i], block = m + s.pull[i] + h2 * n.groups[i / 4].edges[i % 4];
     const bool free = n.inverseMass[i] > 0;
-    s.carriedMass.push_back(free ? s.pull[i] * m / (m + s.pull[i]) : s.pull[i]);
-    s.nodeMobility.push_back(free ? m + s.pull[i] : 0);
-  }
-  for (int i = 0; i < n.dynamicEnd; ++i) {
-    double& mobility = s.nodeMobility[i];
-    mobility = mobility > 0 ? 1 / (mobility + h2 * n.groups[i / 4].edges[i % 4]) : 0;
+    s.nodeMobility.push_back(free ? 1 / block : 0);
+    s.carriedMass.push_back(free ? m * (1 - m / block) : s.pull[i]);
   }
 }
 
@@ -48,9 +44,8 @@ void layOutNormals(const WorldData& d, ImplicitData& s) {
       const double excess = s.duration * (s.duration + r.relaxation) * area *
                             d.identified.skin[d.identified.ofNodeGroup[i / 4]].normalExcess[i % 4];
       if (excess == 0) continue;
-      const double stiff = s.pull[i] + excess;
       s.normalMobility[i] = excess * s.nodeMobility[i] * s.nodeMobility[i] / (1 + excess * s.nodeMobility[i]) / area;
-      s.carriedNormal[i] = ((n.inverseMass[i] > 0 ? stiff * mass / (mass + stiff) : stiff) - s.carriedMass[i]) / area;
+      s.carriedNormal[i] = n.inverseMass[i] > 0 ? mass * mass * s.normalMobility[i] : excess / area;
     }
   }
 }
@@ -70,8 +65,12 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) s.freedom.push_back(all(d.nodes.inverseMass[i] > 0));
   layOutNodes(d, s);
   layOutNormals(d, s);
-  for (int i = 0; i < d.spheres.count; ++i) s.totalMass += d.spheres.groups[i / 4].mass[i % 4];
-  for (const double m : d.nodes.mass) s.totalMass += m;
+  for (const BodyRange& r : d.ranges) {
+    double& mass = s.bodyMass.emplace_back();
+    for (const int i : spheresOf(r)) mass += d.spheres.groups[i / 4].mass[i % 4];
+    for (const int i : r.node) mass += d.nodes.mass[i];
+    s.totalMass += mass;
+  }
   for (int k = 0; k < d.links.count; ++k) {
     const LinkGroup& g = d.links.groups[k / 4];
     s.pairs.push_back({static_cast<int>(g.sphere0[k % 4]), static_cast<int>(g.sphere1[k % 4])});

@@ -88,12 +88,26 @@ double workAcross(const ImplicitData& s, const LoadRow* rows) {
   return rows[1].impulse * rateOf(s, rows[1]) + rows[2].impulse * rateOf(s, rows[2]);
 }
 
+// Turns the tangents, and the rows along them, by the angle of this cosine and sine.
+void turnTangents(ImplicitData& s, PointLoad& load, const LoadRow* rows, double cosine, double sine) {
+  const Vector3d first = load.axes[1], second = load.axes[2];
+  load.axes[1] = cosine * first + sine * second;
+  load.axes[2] = cosine * second - sine * first;
+  for (int k = 0; k < rows[1].end - rows[1].first; ++k) {
+    Quad &a = s.rowCoefficient[rows[1].first + k], &b = s.rowCoefficient[rows[2].first + k];
+    const Lanes along = medulla::load(a), across = medulla::load(b);
+    store(a, fma(splat(sine), across, splat(cosine) * along));
+    store(b, fnma(splat(sine), along, splat(cosine) * across));
+  }
+}
+
 // Friction that holds goes on from what it held with, l0, less what stops the rest of the sliding, s v: what bears a
 // weight on a slope does so without creeping. With the energy l^2 / (2 s) l = c (l0 - s v), where c <= 1 is Coulomb's
 // limit, is passive: its work is l.v = (l0 - l / c).l / s <= (l0^2 - l^2) / (2 s). Between steps of different durations
 // the force stays, not the impulse, and s may change as well: a ledger says what has really been taken in, and
-// workOfLoads() lets no more than that come back.
-void settleContact(const WorldData& d, const ImplicitData& s, const PointLoad& load, LoadRow* rows) {
+// workOfLoads() lets no more than that come back. At the limit more motion along the drag drags no more: to the system
+// only motion across it is resisted.
+void settleContact(const WorldData& d, ImplicitData& s, PointLoad& load, LoadRow* rows) {
   const Contact& c = d.contact.contacts[load.index];
   const ContactLaw law = contactLaw(d, c, s.duration);
   const Vector3d rate = ratesOf(s, rows);
@@ -102,14 +116,16 @@ void settleContact(const WorldData& d, const ImplicitData& s, const PointLoad& l
   rows[0].impulse = wanted;
   rows[0].weight = 1 / law.softness;
   const double sticking = 1 / law.softness;
-  double drag[3];
-  for (int a = 1; a < 3; ++a) drag[a] = load.axes[a].dot(s.held[load.index].impulse) - sticking * rate[a];
-  const double most = c.friction * wanted, whole = std::hypot(drag[1], drag[2]);
-  const double share = whole > most ? most / whole : 1;
-  for (int a = 1; a < 3; ++a) {
-    rows[a].weight = share * sticking;
-    rows[a].impulse = share * drag[a];
+  const Vector3d held = s.held[load.index].impulse;
+  const double drag[2] = {load.axes[1].dot(held) - sticking * rate[1], load.axes[2].dot(held) - sticking * rate[2]};
+  const double most = c.friction * wanted, whole = std::hypot(drag[0], drag[1]);
+  if (whole <= most) {
+    for (int a = 0; a < 2; ++a) rows[1 + a].impulse = drag[a], rows[1 + a].weight = sticking;
+    return;
   }
+  turnTangents(s, load, rows, drag[0] / whole, drag[1] / whole);
+  rows[1].impulse = most;
+  rows[2].weight = most / whole * sticking;
 }
 
 void settleTool(WorldData& d, const ImplicitData& s, const PointLoad& load, const StageLoads& stage, LoadRow* rows) {

@@ -128,9 +128,31 @@ void balanceForces(WorldData& d, const ImplicitData& s, Motion& out) {
   }
 }
 
-// The whole residual. Returns its size, sqrt(J): the square is twice the energy of the motion that it would give the
-// free masses.
-double evaluateResidual(WorldData& d, ImplicitData& s, const StageLoads& stage) {
+// J: twice the energy of the motion that the residual would give each body's free masses.
+void measureLeft(const WorldData& d, ImplicitData& s) {
+  s.left.assign(d.ranges.size(), 0);
+  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
+    for (const int i : spheresOf(d.ranges[b])) {
+      const SphereGroup& g = d.spheres.groups[i / 4];
+      const Lanes* e = g.inverseInertia;
+      s.left[b] += g.inverseMass[i % 4] * vectorOf(s.residual[2 * i]).squaredNorm() +
+                   (e[0][i % 4] + e[1][i % 4] + e[2][i % 4]) / 3 * vectorOf(s.residual[2 * i + 1]).squaredNorm();
+    }
+    for (const int i : d.ranges[b].node)
+      if (i < d.nodes.dynamicEnd)
+        s.left[b] += d.nodes.inverseMass[i] * vectorOf(s.residual[2 * d.spheres.count + i]).squaredNorm();
+  }
+}
+
+// 1 where the bodies' residuals together are small enough, each against its own measure: a light body beside a heavy
+// one is solved as if it were alone.
+double sizeOfResidual(const ImplicitData& s) {
+  double squared = 0;
+  for (std::size_t b = 0; b < s.left.size(); ++b) squared += s.left[b] / s.enough[b];
+  return std::sqrt(squared);
+}
+
+void evaluateResidual(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   balanceForces(d, s, s.balance);
   s.residual = s.balance;
   evaluateLoads(d, s, stage);
@@ -138,16 +160,7 @@ double evaluateResidual(WorldData& d, ImplicitData& s, const StageLoads& stage) 
   for (const SphereDrive& drive : d.drives)
     s.workOfPaths += dotProduct(load(s.residual[2 * drive.sphere]), load(s.motion[2 * drive.sphere]));
   hold(s.freedom, s.residual);
-  double squared = 0;
-  for (int i = 0; i < d.spheres.count; ++i) {
-    const SphereGroup& g = d.spheres.groups[i / 4];
-    const Lanes* e = g.inverseInertia;
-    squared += g.inverseMass[i % 4] * vectorOf(s.residual[2 * i]).squaredNorm() +
-               (e[0][i % 4] + e[1][i % 4] + e[2][i % 4]) / 3 * vectorOf(s.residual[2 * i + 1]).squaredNorm();
-  }
-  for (int i = 0; i < d.nodes.dynamicEnd; ++i)
-    squared += d.nodes.inverseMass[i] * vectorOf(s.residual[2 * d.spheres.count + i]).squaredNorm();
-  return std::sqrt(squared);
+  measureLeft(d, s);
 }
 
 // y = derivative of the residual along x, by a difference of the forces themselves: 10 nm of motion in centimetres
@@ -175,7 +188,7 @@ void leadDriven(WorldData& d, ImplicitData& s, double end) {
   for (const SphereDrive& drive : d.drives) s.motion[2 * drive.sphere] = d.spheres.velocity[drive.sphere];
 }
 
-// Goes along s.change as far as it makes the residual smaller. Returns the residual's size there.
+// Goes along s.change as far as it makes the residual smaller. Returns its size there.
 double search(WorldData& d, ImplicitData& s, const StageLoads& stage, double before) {
   constexpr int kHalvings = 12;
   double share = 1, gone = 0, left = 0;
@@ -183,7 +196,8 @@ double search(WorldData& d, ImplicitData& s, const StageLoads& stage, double bef
     addScaled(share - gone, s.change, s.motion);
     gone = share;
     place(d, s, s.duration);
-    left = evaluateResidual(d, s, stage);
+    evaluateResidual(d, s, stage);
+    left = sizeOfResidual(s);
     if (left < (1 - 1e-4 * share) * before) break;
   }
   return left;
@@ -192,16 +206,25 @@ double search(WorldData& d, ImplicitData& s, const StageLoads& stage, double bef
 // Rounding stops some iterations of very stiff bodies just short of what is enough: within this.
 constexpr double kSettled = 10;
 
-// sqrt(J): the residual that accelerations of no account leave.
+// sqrt(J / kg): the residual per mass that accelerations of no account leave.
 double leastResidual(const ImplicitData& s) {
-  constexpr double kLeastAcceleration = 1e-5;  // m/s2, of all masses
-  return s.duration * kLeastAcceleration * std::sqrt(s.totalMass);
+  constexpr double kLeastAcceleration = 1e-5;  // m/s2
+  return s.duration * kLeastAcceleration;
 }
 
 // J, below which motion is what the iteration leaves open.
 double restEnergy(const ImplicitData& s) {
   const double least = kSettled * leastResidual(s);
-  return 0.5 * least * least;
+  return 0.5 * s.totalMass * least * least;
+}
+
+// From the bodies' residuals where the stage begins: `share` of them.
+void setEnough(ImplicitData& s, double share) {
+  s.enough.resize(s.left.size());
+  for (std::size_t b = 0; b < s.left.size(); ++b) {
+    const double enough = share * std::sqrt(s.left[b]) + leastResidual(s) * std::sqrt(s.bodyMass[b]);
+    s.enough[b] = enough * enough;
+  }
 }
 
 // From the present state, which `s.start` holds, with its momenta there. False where the iteration does not settle.
@@ -216,10 +239,11 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   s.motion = s.start.motion;
   leadDriven(d, s, stage.time.end);
   place(d, s, s.duration);
-  double left = evaluateResidual(d, s, stage);
-  const double enough = share * left + leastResidual(s);
+  evaluateResidual(d, s, stage);
+  setEnough(s, share);
+  double left = sizeOfResidual(s);
   Operator derivative = differentiate;
-  for (int i = 0; i < kIterations && left > enough; ++i) {
+  for (int i = 0; i < kIterations && left > 1; ++i) {
     const double before = left;
     assembleSystem(d, s);
     s.iterations += solveSystem(d, s, kSolved, derivative);
@@ -231,7 +255,7 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
       derivative = applySystem;
     }
   }
-  return left <= kSettled * enough;
+  return left <= kSettled;
 }
 
 // Steps of half of the one before at each halving down to kDeepest; in one stage, whatever the order, or as the order

@@ -112,14 +112,15 @@ void loadFactor(const WorldData& d, ImplicitData& s, const std::vector<Block6>& 
   }
 }
 
-// The velocities that `impulses` give to nodes whose neighbours stay, and whose hosts stay, on top of `before`, which
-// may be null: 0.
-void moveNodes(const WorldData& d, const ImplicitData& s, const Quad* impulses, const Quad* before, Quad* out) {
+bool isHeldNode(const ImplicitData& s, int node) {
+  return s.nodeMobility[node] == 0;
+}
+
+// D^-1: the velocities that `impulses` give to nodes whose neighbours and hosts stay.
+void moveNodes(const WorldData& d, const ImplicitData& s, const Quad* impulses, Quad* out) {
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
     const Lanes3 impulse = gatherFour(impulses, 4 * g);
-    Lanes3 v = zeroVectors();
-    if (before != nullptr) v = gatherFour(before, 4 * g);
-    v = fma(loadFour(s.nodeMobility, 4 * g), impulse, v);
+    Lanes3 v = loadFour(s.nodeMobility, 4 * g) * impulse;
     if (!s.normalMobility.empty()) {
       const Lanes3& area = d.nodes.area[g];
       v = fnma(loadFour(s.normalMobility, 4 * g) * dot(area, impulse), area, v);
@@ -132,21 +133,22 @@ void precondition(WorldData& d, ImplicitData& s, const Motion& r, Motion& z) {
   const std::size_t first = 2 * static_cast<std::size_t>(d.spheres.count);
   z = r;
   if (d.nodes.dynamicEnd > 0) {
-    // Spheres: r_s + J^T G (M + G)^-1 r_n
-    moveNodes(d, s, r.data() + first, nullptr, z.data() + first);
-    std::fill(s.carried.begin(), s.carried.end(), Quad{});
-    applySurface(d, s, z.data() + first);
+    // Spheres: r_s + J^T F r_n
+    moveNodes(d, s, r.data() + first, s.given.data());
+    for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+      store(s.given[i], isHeldNode(s, i) ? splat(0) : fnma(splat(d.nodes.mass[i]), load(s.given[i]), load(r[first + i])));
     returnImpulses(d, s.given, z);
   }
   for (std::size_t i = 0; i < s.blocks.size(); ++i) s.blocks[i] = blockOf(z, i).cwiseProduct(blockOf(s.freedom, i));
   s.spheres.solve(s.blocks);
   for (std::size_t i = 0; i < s.blocks.size(); ++i) putBlock(s.blocks[i], z, i);
   if (d.nodes.dynamicEnd > 0) {
-    // Nodes: z_n + (M + G)^-1 G J z_s
+    // Nodes: D^-1 r_n + F J z_s = J z_s + D^-1 (r_n - M J z_s)
     carryMotion(d, z, s.carried);
-    applySurface(d, s, nullptr);
-    negate(s.given);
-    moveNodes(d, s, s.given.data(), z.data() + first, z.data() + first);
+    for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+      store(s.given[i], fnma(splat(d.nodes.mass[i]), load(s.carried[i]), load(r[first + i])));
+    moveNodes(d, s, s.given.data(), z.data() + first);
+    for (int i = 0; i < d.nodes.dynamicEnd; ++i) addTo(z[first + i], load(s.carried[i]));
   }
   hold(s.freedom, z);
 }
