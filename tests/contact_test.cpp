@@ -128,6 +128,19 @@ TEST(Contact, ABallRollsOrSlidesDownAnIncline) {
   }
 }
 
+// Heavy bodies' momenta are large numbers, and no sign of a step that diverges.
+TEST(Contact, ABallOfTenMetresRollsOn) {
+  const double radius = 5, angle = 0.1, duration = 1;
+  const Vector3d normal(std::sin(angle), std::cos(angle), 0), down(std::cos(angle), -std::sin(angle), 0);
+  World world(settings(ContactMode::balls, 0.002, {0, -kGravity, 0}), {ball("a", radius, radius * normal, 0.5)},
+              {plane(normal, 0.5)});
+  advance(world, 500);
+  const double speed = 5.0 / 7 * kGravity * std::sin(angle) * duration;
+  EXPECT_NEAR(velocityOf(world, 0).dot(down), speed, 2e-3 * speed);
+  EXPECT_GT(world.data().spheres.angularMomentum[0].v[2], -1e9);
+  EXPECT_LT(world.data().spheres.angularMomentum[0].v[2], -1e5);
+}
+
 // A body on three balls cannot roll.
 TEST(Contact, ATripodSticksBelowTheFrictionAngleAndSlidesAbove) {
   const double friction = 0.4, step = 0.0005, duration = 0.5;

@@ -104,8 +104,8 @@ bool isFinite(const WorldData& d, const BodyRange& r) {
   for (const int i : spheresOf(r)) {
     add(d.spheres.position[i]);
     add(d.spheres.velocity[i]);
-    add(d.spheres.orientation[i]);
-    add(d.spheres.angularMomentum[i]);
+    // Of any size: heavy bodies have large ones.
+    sum = sum + splat(0) * (load(d.spheres.orientation[i]) + load(d.spheres.angularMomentum[i]));
   }
   for (int i : r.node) {
     add(quadOf(vectorAt(d.nodes.position, i)));
