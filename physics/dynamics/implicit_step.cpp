@@ -243,14 +243,16 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   setEnough(s, share);
   double left = sizeOfResidual(s);
   Operator derivative = differentiate;
+  bool hasMoved = true;  // so far that the matrix of before is no longer near
   for (int i = 0; i < kIterations && left > 1; ++i) {
     const double before = left;
-    assembleSystem(d, s);
+    if (hasMoved) assembleSystem(d, s);
     s.iterations += solveSystem(d, s, kSolved, derivative);
     ++s.solves;
     left = search(d, s, stage, before);
     // Far from the solution the true derivative is not definite, and a way down is worth more than the tangent.
-    if (left > kNear * before) {
+    hasMoved = left > kNear * before;
+    if (hasMoved) {
       if (derivative == applySystem && !(left < before)) break;
       derivative = applySystem;
     }
