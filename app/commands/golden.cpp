@@ -6,7 +6,7 @@
 #include <fstream>
 #include <set>
 
-#include "app/commands/commands.h"
+#include "app/commands/golden_images.h"
 #include "app/files/golden_report.h"
 #include "app/files/output_file.h"
 #include "app/files/text.h"
@@ -20,10 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What a golden image says of itself: its scene, relative to its folder; what it was rendered with, which decides the
-// tier of the gate; and hashes of the state, of the bodies and behind a blank of the tools as they are shown, which
-// tell drift of physics and haptics from drift of the pixels. Older images have the first alone.
-constexpr const char* kSceneKey = "medulla:scene";
+// What a golden image says of itself besides its scene: what it was rendered with, which decides the tier of the gate;
+// and hashes of the state, of the bodies and behind a blank of the tools as they are shown, which tell drift of physics
+// and haptics from drift of the pixels. Older images have the scene alone.
 constexpr const char* kRendererKey = "medulla:renderer";
 constexpr const char* kProcessorKey = "medulla:processor";
 constexpr const char* kStateKey = "medulla:state";
@@ -59,83 +58,11 @@ std::string stateChange(const std::string& stored, const Moment& moment) {
   return "";
 }
 
-std::string textOf(const std::vector<PngText>& texts, const std::string& key) {
-  for (const PngText& t : texts)
-    if (t.keyword == key) return t.text;
-  return {};
-}
-
-std::string stemOf(const std::string& path) {
-  return fs::path(path).stem().string();
-}
-
 std::string processorName() {
   std::ifstream file("/proc/cpuinfo");
   for (std::string line; std::getline(file, line);)
     if (line.starts_with("model name")) return line.substr(std::min(line.find(": ") + 2, line.size()));
   return "unknown processor";
-}
-
-std::vector<std::string> filesOf(const fs::path& folder, const std::string& extension) {
-  std::vector<std::string> paths;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error))
-    if (entry.path().extension() == extension) paths.push_back(entry.path().string());
-  std::sort(paths.begin(), paths.end());
-  return paths;
-}
-
-// A folder of golden images knows its scenes; without one they are those of the current folder's scenes/.
-std::vector<std::string> scenesOf(const GoldenOptions& options) {
-  if (!options.scenes.empty()) return options.scenes;
-  std::vector<std::string> paths;
-  for (const std::string& name : options.update)
-    if (fs::path(name).extension() == ".xml") paths.push_back(name);
-  const bool all = !paths.empty() && paths.size() == options.update.size();
-  std::set<fs::path> taken;  // said twice, it is asked for once
-  std::erase_if(paths,
-                [&](const std::string& path) { return !taken.insert(fs::absolute(path).lexically_normal()).second; });
-  if (all) return paths;
-  if (options.folder.empty()) {
-    paths = filesOf("scenes", ".xml");
-    if (paths.empty()) throw std::runtime_error("no scene named and none found: expected scenes/*.xml in this folder");
-    return paths;
-  }
-  std::set<std::string> known;
-  for (const std::string& image : filesOf(options.folder, ".png")) {
-    std::vector<PngText> texts;
-    readPng(image, &texts);
-    const std::string scene = textOf(texts, kSceneKey);
-    if (!scene.empty()) known.insert((fs::path(options.folder) / scene).lexically_normal().string());
-  }
-  if (known.empty())
-    throw std::runtime_error(
-        options.folder + ": no golden image here names its scene: expected a SCENE, or --update SCENE to make them");
-  return {known.begin(), known.end()};
-}
-
-std::string folderOf(const std::string& scene, const GoldenOptions& options) {
-  if (!options.folder.empty()) return options.folder;
-  return (fs::absolute(scene).parent_path().parent_path() / "golden_images").lexically_normal().string();
-}
-
-// Two scenes of one name would share their images.
-void requireDistinctNames(const std::vector<std::string>& scenes, const GoldenOptions& options) {
-  std::set<std::string> taken;
-  for (const std::string& scene : scenes)
-    if (!taken.insert((fs::path(folderOf(scene, options)) / stemOf(scene)).string()).second)
-      throw std::runtime_error(
-          fmt::format("{}: two scenes of the name {} for one folder of golden images", scene, stemOf(scene)));
-}
-
-// NAME of --update: a scene by file or name, or one of its moments.
-bool namesScene(const std::string& name, const std::string& scene) {
-  return name == stemOf(scene) || fs::path(name).lexically_normal() == fs::path(scene).lexically_normal();
-}
-bool namesMomentOf(const std::string& name, const std::string& scene) {
-  const std::string prefix = stemOf(scene) + "_";
-  return name.starts_with(prefix) && name.size() > prefix.size() &&
-         name.find_first_not_of("0123456789", prefix.size()) == std::string::npos;
 }
 
 std::vector<Moment> momentsOf(const Scene& scene) {
@@ -151,7 +78,7 @@ std::vector<Moment> momentsOf(const Scene& scene) {
   return moments;
 }
 
-std::vector<Moment> renderMoments(const std::string& path, const std::string& context, std::string& renderedWith) {
+std::vector<Moment> renderMoments(const std::string& path, const std::string& context) {
   RunOptions run;
   run.scene = path;
   const LoadedScene loaded = loadRun(run);
@@ -159,7 +86,6 @@ std::vector<Moment> renderMoments(const std::string& path, const std::string& co
   std::vector<Moment> moments = momentsOf(scene);
   Simulation simulation(loaded);
   Renderer renderer(rendererSettings(scene.width, scene.height, context, Quality::standard));
-  renderedWith = renderer.description();
   const SceneView view(loaded, simulation.current(), renderer);
   std::vector<double> times;
   times.reserve(moments.size());
@@ -180,6 +106,17 @@ std::vector<Moment> renderMoments(const std::string& path, const std::string& co
   return moments;
 }
 
+// Without OpenGL nothing can be compared, whatever the scene.
+std::string drawnWith(const GoldenOptions& options) {
+  return Renderer(rendererSettings(kPictureSideMin, kPictureSideMin, options.context, Quality::draft)).description();
+}
+
+std::vector<std::string> namesOf(const std::vector<Moment>& moments) {
+  std::vector<std::string> names;
+  for (const Moment& m : moments) names.push_back(m.name);
+  return names;
+}
+
 GoldenResult compare(const Moment& moment, const std::string& goldenPath, const std::string& renderedWith) {
   GoldenResult r;
   r.name = moment.name;
@@ -188,7 +125,13 @@ GoldenResult compare(const Moment& moment, const std::string& goldenPath, const 
     return r;
   }
   std::vector<PngText> texts;
-  Image golden = readPng(goldenPath, &texts);
+  Image golden;
+  try {
+    golden = readPng(goldenPath, &texts);
+  } catch (const std::runtime_error& error) {
+    r.verdict = error.what();
+    return r;
+  }
   r.stored = {textOf(texts, kRendererKey), textOf(texts, kProcessorKey)};
   if (golden.width != moment.image.width || golden.height != moment.image.height) {
     r.verdict =
@@ -220,78 +163,167 @@ std::string repeatingCommand(const std::string& path, const GoldenOptions& optio
   return command + " --failures " + shellWord(options.failures);
 }
 
-void updateScene(const std::string& path, const GoldenOptions& options) {
-  std::string renderedWith;
-  const std::string folder = folderOf(path, options);
-  const OutputFolder made(folder);
-  const std::string scene = fs::proximate(fs::absolute(path), fs::absolute(folder)).string();
+// ---- Storing anew ----------------------------------------------------------------------------------------
+
+// What an update does to a folder.
+struct Update {
+  std::string folder;
+  std::vector<std::pair<std::string, std::string>> written;  // path, bytes
+  std::vector<std::string> removed;                          // paths
+};
+
+Update updateOf(const std::string& path, const GoldenOptions& options, const std::string& renderedWith) {
+  Update update;
+  update.folder = goldenFolderOf(path, options);
+  const std::string scene = fs::proximate(fs::absolute(path), fs::absolute(update.folder)).string();
   const bool whole = std::any_of(options.update.begin(), options.update.end(),
                                  [&](const std::string& name) { return namesScene(name, path); });
-  for (const Moment& m : renderMoments(path, options.context, renderedWith)) {
+  const std::vector<Moment> moments = renderMoments(path, options.context);
+  for (const Moment& m : moments) {
     if (!whole && std::find(options.update.begin(), options.update.end(), m.name) == options.update.end()) continue;
-    const std::string image = fmt::format("{}/{}.png", folder, m.name);
-    writePng(
-        image, m.image,
+    const std::vector<std::uint8_t> bytes = encodePng(
+        m.image,
         {{kSceneKey, scene}, {kRendererKey, renderedWith}, {kProcessorKey, processorName()}, {kStateKey, m.state()}});
-    fmt::print("{} written\n", image);
+    update.written.emplace_back(fmt::format("{}/{}.png", update.folder, m.name),
+                                std::string(bytes.begin(), bytes.end()));
+  }
+  if (!whole) return update;
+  for (const StrayImage& image : formerMoments(path, update.folder, namesOf(moments)))
+    if (image.fault.empty()) update.removed.push_back(image.path);
+  return update;
+}
+
+void apply(const Update& update) {
+  const OutputFolder made(update.folder);
+  for (const auto& [path, bytes] : update.written) {
+    writeTextFile(path, bytes);
+    fmt::print("{} written\n", path);
+  }
+  for (const std::string& path : update.removed) {
+    std::error_code error;
+    if (!fs::remove(path, error) && error) throw std::runtime_error(path + ": cannot be removed: " + error.message());
+    fmt::print("{} removed: no moment of its scene\n", path);
   }
 }
 
-int update(const std::vector<std::string>& scenes, const GoldenOptions& options) {
+// All scenes are drawn before anything is stored: one that cannot be drawn leaves the folder as it was.
+int updateImages(const std::vector<std::string>& scenes, const GoldenOptions& options) {
   std::set<std::string> chosen;
   for (const std::string& name : options.update) {
     const auto scene = std::find_if(scenes.begin(), scenes.end(), [&](const std::string& path) {
       return namesScene(name, path) || namesMomentOf(name, path);
     });
     if (scene == scenes.end()) throw std::runtime_error("--update " + name + ": no such scene and no moment of one");
-    const std::vector<Moment> moments = momentsOf(readScene(*scene));
-    const bool known = namesScene(name, *scene) ||
-                       std::any_of(moments.begin(), moments.end(), [&](const Moment& m) { return m.name == name; });
-    if (!known) throw std::runtime_error(fmt::format("--update {}: {} has no such moment", name, *scene));
+    const std::vector<std::string> known = namesOf(momentsOf(readScene(*scene)));
+    if (!namesScene(name, *scene) && std::find(known.begin(), known.end(), name) == known.end())
+      throw std::runtime_error(fmt::format("--update {}: {} has no such moment", name, *scene));
     chosen.insert(*scene);
   }
-  for (const std::string& path : chosen) updateScene(path, options);
+  const std::string renderedWith = drawnWith(options);
+  std::vector<Update> updates;
+  for (const std::string& path : chosen) updates.push_back(updateOf(path, options, renderedWith));
+  for (const Update& update : updates) apply(update);
   return 0;
 }
 
-// Says on standard output how each moment compares; true when all pass.
-bool compareScene(const std::string& path, const GoldenOptions& options, std::vector<GoldenResult>& results,
-                  std::string& renderedWith) {
-  bool allPass = true;
-  for (const Moment& m : renderMoments(path, options.context, renderedWith)) {
-    GoldenResult r = compare(m, fmt::format("{}/{}.png", folderOf(path, options), m.name), renderedWith);
-    r.scene = path;
-    fmt::print("{} {}: {}\n", r.name, r.passed ? "ok" : "failed", r.verdict);
-    const std::string stem = options.failures + "/" + m.name, actual = stem + "_actual.png",
-                      difference = stem + "_difference.png";
-    std::error_code missing;
-    for (const std::string& earlier : {actual, difference}) fs::remove(earlier, missing);  // of a run that failed
-    if (!r.passed && !m.image.pixels.empty()) {
-      writePng(actual, m.image);
-      if (!r.expected.pixels.empty()) writePng(difference, amplifiedDifference(r.actual, r.expected));
-    }
-    allPass = allPass && r.passed;
-    results.push_back(std::move(r));
+// ---- Comparing -------------------------------------------------------------------------------------------
+
+struct Comparison {
+  std::string renderedWith;
+  std::vector<GoldenResult> results;
+};
+
+void add(GoldenResult result, Comparison& comparison) {
+  fmt::print("{} {}: {}\n", result.name, result.passed ? "ok" : "failed", result.verdict);
+  comparison.results.push_back(std::move(result));
+}
+
+void addFailure(const std::string& name, const std::string& scene, const std::string& verdict, Comparison& comparison) {
+  GoldenResult result;
+  result.name = name;
+  result.scene = scene;
+  result.verdict = verdict;
+  add(std::move(result), comparison);
+}
+
+// In the folder of failures; those of a former run go.
+void writeFailure(const GoldenResult& r, const Image& drawn, const std::string& folder) {
+  const std::string stem = folder + "/" + r.name, actual = stem + "_actual.png", difference = stem + "_difference.png";
+  std::error_code missing;
+  for (const std::string& earlier : {actual, difference}) fs::remove(earlier, missing);
+  if (r.passed || drawn.pixels.empty()) return;
+  writePng(actual, drawn);
+  if (!r.expected.pixels.empty()) writePng(difference, amplifiedDifference(r.actual, r.expected));
+}
+
+void compareScene(const std::string& path, const GoldenOptions& options, Comparison& comparison) {
+  std::vector<Moment> moments;
+  try {
+    moments = renderMoments(path, options.context);
+  } catch (const std::runtime_error& error) {
+    addFailure(stemOf(path), path, error.what(), comparison);
+    return;
   }
-  if (!allPass) fmt::print(stderr, "repeat with: {}\n", repeatingCommand(path, options));
-  return allPass;
+  const std::string folder = goldenFolderOf(path, options);
+  for (const Moment& m : moments) {
+    GoldenResult r = compare(m, fmt::format("{}/{}.png", folder, m.name), comparison.renderedWith);
+    r.scene = path;
+    writeFailure(r, m.image, options.failures);
+    add(std::move(r), comparison);
+  }
+  for (const StrayImage& image : formerMoments(path, folder, namesOf(moments))) {
+    const std::string former = fmt::format("no moment of {}: --update {} removes it", path, stemOf(path));
+    addFailure(image.name, path, image.fault.empty() ? former : image.fault, comparison);
+    writeFailure(comparison.results.back(), {}, options.failures);
+  }
+}
+
+// What else lies in a folder that is compared as a whole: an image that cannot be read may be any scene's.
+void compareRest(const std::vector<std::string>& scenes, const GoldenOptions& options, Comparison& comparison) {
+  std::vector<std::string> known;
+  for (const GoldenResult& r : comparison.results) known.push_back(r.name);
+  std::set<std::string> folders;
+  for (const std::string& path : scenes) folders.insert(goldenFolderOf(path, options));
+  for (const std::string& folder : folders)
+    for (const StrayImage& image : strayImages(folder, known)) {
+      const bool isCompared = std::any_of(scenes.begin(), scenes.end(), [&](const std::string& path) {
+        return sameFile(path, image.scene) && namesMomentOf(image.name, path);
+      });
+      if (!image.fault.empty())
+        addFailure(image.name, "", image.fault, comparison);
+      else if (!image.scene.empty() && !fs::exists(image.scene) && !isCompared)
+        addFailure(image.name, image.scene, fmt::format("its scene {} does not exist", image.scene), comparison);
+      else if (!isCompared)
+        fmt::print(stderr, "note: {} is compared with nothing: {}\n", image.path,
+                   image.scene.empty() ? "it names no scene" : "it is called as no moment of a scene here");
+    }
+}
+
+int compareScenes(const std::vector<std::string>& scenes, const GoldenOptions& options) {
+  Comparison comparison{drawnWith(options), {}};
+  const auto failures = [&] {
+    return std::count_if(comparison.results.begin(), comparison.results.end(),
+                         [](const GoldenResult& r) { return !r.passed; });
+  };
+  for (const std::string& path : scenes) {
+    const auto before = failures();
+    compareScene(path, options, comparison);
+    if (failures() > before) fmt::print(stderr, "repeat with: {}\n", repeatingCommand(path, options));
+  }
+  if (options.scenes.empty()) compareRest(scenes, options, comparison);
+  const std::string report = options.failures + "/report.html";
+  writeGoldenReport(report, comparison.results, {comparison.renderedWith, processorName()});
+  fmt::print("report {}\n", report);
+  return failures() > 0 ? 3 : 0;
 }
 
 }  // namespace
 
 int runGolden(const GoldenOptions& options) {
-  const std::vector<std::string> scenes = scenesOf(options);
-  requireDistinctNames(scenes, options);
-  if (!options.update.empty()) return update(scenes, options);
+  const std::vector<std::string> scenes = goldenScenes(options);
+  if (!options.update.empty()) return updateImages(scenes, options);
   const OutputFolder made(options.failures);
-  bool allPass = true;
-  std::string renderedWith;
-  std::vector<GoldenResult> results;
-  for (const std::string& path : scenes) allPass = compareScene(path, options, results, renderedWith) && allPass;
-  const std::string report = options.failures + "/report.html";
-  writeGoldenReport(report, results, {renderedWith, processorName()});
-  fmt::print("report {}\n", report);
-  return allPass ? 0 : 3;
+  return compareScenes(scenes, options);
 }
 
 }  // namespace medulla

@@ -12,9 +12,9 @@ struct DrawnWith {
   std::string renderer, processor;  // GL_RENDERER and GL_VERSION; model name
 };
 
-// One moment of a scene held against its golden image.
+// One moment of a scene held against its golden image; or a scene that cannot be drawn, or an image without a moment.
 struct GoldenResult {
-  std::string name, scene;  // <scene>_<frame>; the scene's file
+  std::string name, scene;  // <scene>_<frame>, or <scene>; the scene's file
   bool passed = false;
   std::string verdict;     // one line: figures, or why there are none
   DrawnWith stored;        // of the golden image; empty where that says nothing

@@ -1,0 +1,138 @@
+#include <algorithm>
+
+#include "render/image.h"
+#include "tests/own_scene.h"
+
+// What a folder of golden images holds besides those that compare: images that cannot be read, scenes that cannot be
+// drawn, moments that are no more. Each is told, and keeps no other from being compared.
+namespace medulla {
+namespace {
+
+class GoldenFolder : public OwnScene {
+ protected:
+  void SetUp() override {
+    OwnScene::SetUp();
+    folder.write("own/other.xml", replaced(read("own/organ.xml"), "golden=\"0.32 0.4\"", "golden=\"0.04\""));
+    const ProgramResult made = golden({"--update", "own/organ.xml", "--update", "own/other.xml"});
+    ASSERT_EQ(made.exitCode, 0) << made.err;
+  }
+  static std::string replaced(std::string text, const std::string& from, const std::string& to) {
+    return text.replace(text.find(from), from.size(), to);
+  }
+  ProgramResult golden(std::vector<std::string> words) const {
+    words.insert(words.begin(), {"golden", "--dir", "pictures"});
+    return run(words);
+  }
+  // The comparison goes to its end: of both scenes what is said here, and a report of this run.
+  void expectCompared(const std::vector<std::string>& lines, const std::string& heading) const {
+    std::filesystem::create_directories(folder / "out/golden");
+    folder.write("out/golden/report.html", "of a former run");
+    const ProgramResult r = golden({});
+    EXPECT_EQ(r.exitCode, 3) << r.err;
+    for (const std::string& line : lines)
+      EXPECT_NE(("\n" + r.out).find("\n" + line), std::string::npos) << "no \"" << line << "\" in " << r.out;
+    EXPECT_EQ(std::count(r.out.begin(), r.out.end(), '\n'), std::ptrdiff_t(lines.size()) + 1) << r.out;
+    EXPECT_NE(read("out/golden/report.html").find(heading), std::string::npos);
+  }
+  std::vector<std::string> images() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "pictures"))
+      names.push_back(entry.path().filename().string());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+};
+
+using Names = std::vector<std::string>;
+
+TEST_F(GoldenFolder, AnImageThatCannotBeReadFailsAlone) {
+  std::filesystem::resize_file(folder / "pictures/organ_8.png", 600);
+  expectCompared({"organ_8 failed: pictures/organ_8.png: broken PNG", "organ_10 ok: equal", "other_1 ok: equal"},
+                 "1 of 3 golden images failed");
+  EXPECT_TRUE(std::filesystem::exists(folder / "out/golden/organ_8_actual.png"));
+  EXPECT_EQ(golden({"--update", "organ_8"}).out, "pictures/organ_8.png written\n");
+  EXPECT_EQ(golden({}).exitCode, 0);
+  // No scene has it as a moment; whose it was cannot be read.
+  folder.write("pictures/former_3.png", "half of a picture");
+  expectCompared({"organ_8 ok", "organ_10 ok", "other_1 ok", "former_3 failed: pictures/former_3.png: is no PNG file"},
+                 "1 of 4 golden images failed");
+}
+
+TEST_F(GoldenFolder, ASceneThatCannotBeDrawnFailsAlone) {
+  const std::string scene = read("own/organ.xml");
+  const auto withOther = [](const std::string& line) { return Names{line, "other_1 ok: equal"}; };
+  write({.young = "soft"});
+  expectCompared(withOther("organ failed: own/organ.xml:2: <tissue> young=\"soft\""), "1 of 2 golden images failed");
+  folder.write("own/organ.xml", replaced(scene, " golden=\"0.32 0.4\"", ""));
+  expectCompared(withOther("organ failed: own/organ.xml: names no golden moments"), "1 of 2");
+  std::filesystem::remove(folder / "own/organ.xml");
+  expectCompared(withOther("organ failed: own/organ.xml"), "1 of 2");
+  expectRefused(golden({"own/organ.xml"}), "own/organ.xml: does not exist");
+  folder.write("own/organ.xml", scene);
+  folder.write("own/organ.csv", "t[s]\n0\n");
+  expectCompared({"organ failed: own/organ.csv:1: ", "other failed: own/organ.csv:1: "}, "2 of 2");
+}
+
+TEST_F(GoldenFolder, NothingIsStoredWhereOneOfTheScenesCannotBeDrawn) {
+  write({.cameraTarget = -0.03});
+  const std::string before = read("pictures/organ_8.png");
+  const std::string other = read("own/other.xml");
+  // Found when it is read, when its trajectory is, and while it runs.
+  const std::string stiff = replaced(replaced(other, "5e3", "1e9"), "<dynamics ", "<dynamics substeps=\"1\" ");
+  for (const std::string& bad : {replaced(other, "5e3", "soft"), replaced(other, "organ.csv", "none.csv"),
+                                 replaced(stiff, "golden=\"0.04\"", "golden=\"0.4\"")}) {
+    folder.write("own/other.xml", bad);
+    const ProgramResult r = golden({"--update", "own/organ.xml", "--update", "own/other.xml"});
+    EXPECT_EQ(r.exitCode, 1) << r.out;
+    EXPECT_EQ(r.out, "");
+    EXPECT_TRUE(read("pictures/organ_8.png") == before);
+  }
+}
+
+TEST_F(GoldenFolder, AnImageThatNoMomentNamesFailsUntilAnUpdateRemovesIt) {
+  write({.golden = "0.04 0.4"});
+  const std::string former = "organ_8 failed: no moment of own/organ.xml: --update organ removes it";
+  expectCompared({"organ_1 failed: pictures/organ_1.png does not exist", "organ_10 ok: equal", former, "other_1 ok"},
+                 "2 of 4 golden images failed");
+  EXPECT_EQ(golden({"own/other.xml"}).exitCode, 0);  // another scene's
+  EXPECT_EQ(golden({"--update", "organ_1"}).out, "pictures/organ_1.png written\n");
+  const ProgramResult named = golden({"own/organ.xml"});
+  EXPECT_EQ(named.exitCode, 3);
+  EXPECT_NE(named.out.find(former), std::string::npos) << named.out;
+  EXPECT_EQ(images(), (Names{"organ_1.png", "organ_10.png", "organ_8.png", "other_1.png"}));
+  EXPECT_EQ(golden({"--update", "organ"}).out,
+            "pictures/organ_1.png written\npictures/organ_10.png written\n"
+            "pictures/organ_8.png removed: no moment of its scene\n");
+  EXPECT_EQ(images(), (Names{"organ_1.png", "organ_10.png", "other_1.png"}));
+  EXPECT_EQ(golden({}).exitCode, 0);
+}
+
+TEST_F(GoldenFolder, PicturesOfOthersAreNotedAndKept) {
+  std::filesystem::copy(folder / "pictures/organ_8.png", folder / "pictures/organ copy.png");
+  Image square = blackImage(8, 8);
+  for (const char* name : {"logo", "organ_99"}) writePng(folder / ("pictures/" + std::string(name) + ".png"), square);
+  const ProgramResult r = golden({});
+  EXPECT_EQ(r.exitCode, 0) << r.out;
+  EXPECT_EQ(complaints(r), (Names{"note: pictures/logo.png is compared with nothing: it names no scene",
+                                  "note: pictures/organ copy.png is compared with nothing: it is called as no moment "
+                                  "of a scene here",
+                                  "note: pictures/organ_99.png is compared with nothing: it names no scene"}));
+  EXPECT_EQ(golden({"--update", "own/organ.xml"}).exitCode, 0);
+  EXPECT_EQ(images(),
+            (Names{"logo.png", "organ copy.png", "organ_10.png", "organ_8.png", "organ_99.png", "other_1.png"}));
+}
+
+TEST_F(GoldenFolder, ImagesOfAMissingSceneFailWhereScenesAreThoseOfTheCurrentFolder) {
+  std::filesystem::create_directory(folder / "scenes");
+  const std::string scene = replaced(read("own/organ.xml"), "organ.csv", "../own/organ.csv");
+  for (const char* name : {"scenes/a.xml", "scenes/b.xml"}) folder.write(name, scene);
+  ASSERT_EQ(run({"golden", "--update", "a", "--update", "b"}).exitCode, 0);
+  std::filesystem::remove(folder / "scenes/b.xml");
+  const ProgramResult r = run({"golden"});
+  EXPECT_EQ(r.exitCode, 3);
+  EXPECT_NE(r.out.find("b_8 failed: its scene "), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("scenes/b.xml does not exist\n"), std::string::npos) << r.out;
+}
+
+}  // namespace
+}  // namespace medulla
