@@ -22,7 +22,7 @@ struct Felt {
 };
 }  // namespace
 
-constexpr double kRadius = 0.01;  // m, of the rod along x
+constexpr double kRodRadius = 0.01;  // m, of the rod along x
 
 namespace {
 struct Rod {  // of 8 cm, clamped at one end or free
@@ -43,7 +43,7 @@ static Felt touchRod(const Rod& rod, const std::function<ToolSample(double)>& de
                      const ToolSettings& tool = stiffTool()) {
   constexpr int kTicks = 24;
   constexpr double kTick = 1.0 / 1200;
-  const auto model = synthetic::chainModel(synthetic::straightTube(5, 0.08, kRadius, 16, 12));
+  const auto model = synthetic::chainModel(synthetic::straightTube(5, 0.08, kRodRadius, 16, 12));
   BodyDescription body = synthetic::body(model, rod.young);
   body.surface = rod.surface;
   if (rod.isClamped) body.fixed = {{0, FixedFreedom::all}};
@@ -96,7 +96,7 @@ static Felt touchRod(const Rod& rod, const std::function<ToolSample(double)>& de
 
 // Pressed smoothly by 8 mm within a second and held.
 TEST(LimpTissue, APressedRodFeelsAsSoftAsItIs) {
-  const double top = kRadius + ToolSettings{}.radius;
+  const double top = kRodRadius + ToolSettings{}.radius;
   const Felt felt = touchRod(
       {true},
       [=](double t) {
@@ -111,7 +111,7 @@ TEST(LimpTissue, APressedRodFeelsAsSoftAsItIs) {
 
 // Poked at 0.1 m/s.
 TEST(LimpTissue, AFreeRodIsNotHeavierThanItIs) {
-  const double top = kRadius + ToolSettings{}.radius;
+  const double top = kRodRadius + ToolSettings{}.radius;
   for (const double young : {1e4, 1e5, 1e6}) {
     for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
       const Felt felt = touchRod(
@@ -128,7 +128,7 @@ TEST(LimpTissue, AFreeRodIsNotHeavierThanItIs) {
 
 // What limits the springs must not be what the tissue gave some frames ago: a still tool would swing it about.
 TEST(LimpTissue, APullBeyondForceMaxHoldsStill) {
-  const double top = kRadius + ToolSettings{}.radius;
+  const double top = kRodRadius + ToolSettings{}.radius;
   for (const double most : {0.2, 0.3}) {
     ToolSettings tool;
     tool.forceMax = most;
