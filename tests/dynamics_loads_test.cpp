@@ -161,6 +161,25 @@ TEST(DeadLoads, ASkinGivesEachOfThemToItsSpheres) {
   }
 }
 
+TEST(DeadLoads, ThoseOfOneCourseInTimeOnANodeAreOne) {
+  BodyDescription b = synthetic::body(synthetic::shortTube(), 6e3);
+  const std::vector<DeadLoad> loads = someDeadLoads(*b.model, {0.01, -0.02, 0.005});
+  for (int k = 0; k < 100; ++k) b.deadLoads.insert(b.deadLoads.end(), loads.begin(), loads.end());
+  for (DeadLoad later : loads) {
+    later.to = 0.04;
+    b.deadLoads.push_back(later);
+  }
+  World world(WorldSettings{}, {b, b});
+  const std::vector<NodeForce>& laid = world.data().deadLoads;
+  ASSERT_EQ(laid.size(), 4 * loads.size());  // of two bodies, at once and growing
+  for (std::size_t k = 0; k < laid.size(); ++k) {
+    const std::size_t load = k % loads.size();
+    const bool grows = k / loads.size() % 2 == 1;
+    EXPECT_EQ(laid[k].to, grows ? 0.04 : 0);
+    EXPECT_LT((laid[k].force - (grows ? 1 : 100) * loads[load].force).norm(), 1e-13 * laid[k].force.norm());
+  }
+}
+
 TEST(DeadLoads, TheyGrowLinearlyAndKeepTheirDirectionWhateverTheBodyDoes) {
   for (SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
     World world = loadedWorld(surface, 0.1, 0.3, 50);

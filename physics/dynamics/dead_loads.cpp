@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <stdexcept>
+#include <tuple>
 
 #include "physics/dynamics/anchor_row.h"
 #include "physics/dynamics/loads.h"
@@ -133,7 +134,10 @@ std::vector<DeadLoad> spreadLoad(const SoftBodyModel& model, const std::vector<i
   return out;
 }
 
+// Loads of one course in time on one node are one: each takes its time in every substep, and a scene may have a
+// thousand over each other.
 void layOutDeadLoads(WorldData& d) {
+  std::map<std::tuple<int, double, double>, std::size_t> known;  // node, from, to
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     const std::vector<int>& node = d.ranges[b].node;
     for (const DeadLoad& load : d.bodies[b].deadLoads) {
@@ -147,7 +151,11 @@ void layOutDeadLoads(WorldData& d) {
       require(std::isfinite(load.from) && std::isfinite(load.to) && load.from <= load.to,
               fmt::format("the load on its node {} grows from {} s to {} s: expected the earlier time first", load.node,
                           load.from, load.to));
-      d.deadLoads.push_back({node[load.node], load.force, load.from, load.to});
+      const auto [place, isNew] = known.try_emplace({node[load.node], load.from, load.to}, d.deadLoads.size());
+      if (isNew)
+        d.deadLoads.push_back({node[load.node], load.force, load.from, load.to});
+      else
+        d.deadLoads[place->second].force += load.force;
     }
   }
   gatherSkinLoads(d);

@@ -315,7 +315,7 @@ struct SphereDrive {
   double frequency = 0, phase = 0;
 };
 
-// A dead load; DeadLoad on an index in Nodes.
+// All dead loads of one course in time on a node, by its index in Nodes.
 struct NodeForce {
   int node = 0;
   Eigen::Vector3d force = Eigen::Vector3d::Zero();  // N, whole
@@ -356,7 +356,7 @@ struct WorldData {
   std::vector<StillPlace> stillPlace;           // per sphere; state
   Awake awake;
   std::vector<SphereDrive> drives;
-  std::vector<NodeForce> deadLoads;  // body after body, as described
+  std::vector<NodeForce> deadLoads;  // body after body, in the order described
   SkinLoads skinLoads;
   ContactData contact;
   std::vector<std::shared_ptr<ImplicitData>> implicit;  // per halving of the step; made when it is first needed
