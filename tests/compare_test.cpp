@@ -63,6 +63,25 @@ TEST_F(Compare, LogsOfOtherShapeDiffer) {
   EXPECT_EQ(rows.out, "equal no\nrows_a 3\nrows_b 2\n");
 }
 
+TEST_F(Compare, OfALogThatIsCutTheWholeRowsAreCompared) {
+  const std::string log = kLog;
+  const std::size_t whole = log.find("0.06");
+  for (const std::size_t left :
+       {std::string("0.0").size(), std::string("0.06,").size(), std::string("0.06,1,2e-").size()}) {
+    const ProgramResult r = compare(kLog, log.substr(0, whole + left));
+    EXPECT_EQ(r.exitCode, 3) << left;
+    EXPECT_EQ(r.out, "equal no\nrows_a 3\nrows_b 2\n") << left;
+    EXPECT_EQ(complaints(r), (std::vector<std::string>{"note: " + folder / "b.csv" +
+                                                       " ends in the midst of row 3: only the rows before it are "
+                                                       "compared"}));
+  }
+  const std::string cut = log.substr(0, whole + 4);
+  EXPECT_EQ(compare(cut, cut).exitCode, 3);
+  EXPECT_NE(compare(cut, edited("0.5", "0.51")).out.find("row 1\n"), std::string::npos);
+  EXPECT_EQ(compare(kLog, log.substr(0, log.size() - 1)).exitCode, 0);  // whole but for its line end
+  EXPECT_EQ(compare(kLog, cut + "\n").exitCode, 1);                     // a row that somebody has ended
+}
+
 TEST_F(Compare, WhatIsNoLogIsRefused) {
   const auto refused = [&](const ProgramResult& r, int exitCode, const std::string& words) {
     EXPECT_EQ(r.exitCode, exitCode);

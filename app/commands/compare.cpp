@@ -156,8 +156,16 @@ int compareCaches(const CompareOptions& options) {
   return 0;
 }
 
+void noteCut(const LogTable& log) {
+  if (log.isCut)
+    fmt::print(stderr, "note: {} ends in the midst of row {}: only the rows before it are compared\n", log.path,
+               log.value.size() + 1);
+}
+
 int compareLogs(const CompareOptions& options) {
-  const LogTable a = readLog(options.a), b = readLog(options.b);
+  const LogTable a = readLog(options.a, true), b = readLog(options.b, true);
+  noteCut(a);
+  noteCut(b);
   const auto [inA, inB] = std::mismatch(a.columns.begin(), a.columns.end(), b.columns.begin(), b.columns.end());
   if (inA != a.columns.end() || inB != b.columns.end())
     return differing({{"column", fmt::format("{}", inA - a.columns.begin() + 1), ""},
@@ -173,7 +181,7 @@ int compareLogs(const CompareOptions& options) {
                       {"line_a", fmt::format("{}", a.lines[row]), ""},
                       {"line_b", fmt::format("{}", b.lines[row]), ""}});
   }
-  if (a.value.size() != b.value.size())
+  if (a.value.size() != b.value.size() || a.isCut || b.isCut)
     return differing(
         {{"rows_a", fmt::format("{}", a.value.size()), ""}, {"rows_b", fmt::format("{}", b.value.size()), ""}});
   printResults({{"equal", "yes", ""}, {"rows", fmt::format("{}", a.value.size()), ""}});

@@ -2,13 +2,23 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "app/files/csv_rows.h"
 #include "app/files/input_error.h"
+#include "app/files/number_text.h"
 #include "app/files/text_file.h"
 
 namespace medulla {
 
-LogTable readLog(const std::string& path) {
+// Whether the file can have ended within the row: no line end, and a number or more is missing. A whole last row may
+// have lost its line end in an editor.
+static bool endsWithin(const CsvRows& rows, const std::string& text, std::size_t columns) {
+  if (text.ends_with('\n') || rows.line() != std::count(text.begin(), text.end(), '\n') + 1) return false;
+  return rows.cells().size() < columns || (rows.cells().size() == columns && !parseNumber<double>(rows.cells().back()));
+}
+
+LogTable readLog(const std::string& path, bool mayBeCut) {
   const std::string text = readTextFile(path);
   LogTable table;
   table.path = path;
@@ -19,6 +29,8 @@ LogTable readLog(const std::string& path) {
   if (table.columns[0] != "t") rows.fail("this is no log: expected a header that begins with the column t");
   const std::string expected = fmt::format("{} as in the header", table.columns.size());
   while (rows.next()) {
+    table.isCut = mayBeCut && endsWithin(rows, text, table.columns.size());
+    if (table.isCut) break;
     rows.requireCells(table.columns.size(), expected);
     std::vector<double>& value = table.value.emplace_back();
     for (std::size_t k = 0; k < table.columns.size(); ++k) value.push_back(rows.number(k, table.columns[k]));

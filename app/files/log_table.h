@@ -12,10 +12,12 @@ struct LogTable {
   std::vector<int> lines;                      // of each row in the file
   std::vector<std::vector<std::string>> text;  // [row][column]
   std::vector<std::vector<double>> value;      // the same as numbers
+  bool isCut = false;                          // the file ends in the midst of one more row
 };
 
 // Throws std::runtime_error "FILE:LINE: ..." where it is missing or has no header, and on rows that have not as many
-// cells as the header or a cell that is no finite number.
-LogTable readLog(const std::string& path);
+// cells as the header or a cell that is no finite number. With `mayBeCut` a last row without its end, as a full disk or
+// a killed copy leaves it, is no fault.
+LogTable readLog(const std::string& path, bool mayBeCut = false);
 
 }  // namespace medulla
