@@ -239,6 +239,13 @@ TEST_F(LoadCase, ARunThatFindsNoRestSaysSoAndKeepsNothing) {
   EXPECT_EQ(moving.out, "");
   EXPECT_TRUE(moving.err.starts_with("medulla: not at rest: body 'pear' moved up to 0.3 s, expected ")) << moving.err;
   EXPECT_EQ(complaints(moving).size(), 1) << moving.err;
+  const std::string dropped = "; no file is written, without --until-rest they all are\n";
+  EXPECT_TRUE(moving.err.ends_with(dropped)) << moving.err;
+  const ProgramResult shape =
+      runProgram({"replay", scene(load, "0.3"), "--until-rest", "--surface-at", "end", folder / "end.obj"});
+  EXPECT_EQ(shape.exitCode, 4);
+  EXPECT_TRUE(shape.err.ends_with(dropped)) << shape.err;
+  EXPECT_TRUE(runProgram({"replay", scene(load, "0.3"), "--until-rest"}).err.ends_with("the end at 0.3 s\n"));
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"case.xml"});
   // Still, but with a load to come.
   const std::string later = fmt::format("{}<load plane='0 1 0 -0.06' force='0 0 1e-2' from='1' to='2'/>", kHeld);

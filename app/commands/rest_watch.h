@@ -22,7 +22,8 @@ class RestWatch {
   RestWatch(const LoadedScene& loaded, const Simulation& simulation);
   void afterFrame(const Simulation& simulation);
   bool atRest() const;
-  [[noreturn]] void fail(double time) const;  // throws NotAtRest
+  // Throws NotAtRest, which says so where the run had files to write.
+  [[noreturn]] void fail(double time, bool hasFiles) const;
 
  private:
   struct Body {

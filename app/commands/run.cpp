@@ -236,14 +236,18 @@ static std::vector<std::string> inputFiles(const Scene& scene) {
   return inputs;
 }
 
+static std::vector<std::string> outputFiles(const RunOptions& options) {
+  std::vector<std::string> outputs{options.logPath, options.cacheToWrite, options.frameTimesPath};
+  for (const auto& [tool, path] : options.records) outputs.push_back(path);
+  for (const SurfaceRequest& request : options.surfaces) outputs.push_back(request.path);
+  std::erase(outputs, "");
+  return outputs;
+}
+
 void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options,
                             const std::vector<std::string>& pictures) {
   std::vector<std::string> outputs = pictures;
-  outputs.push_back(options.logPath);
-  outputs.push_back(options.cacheToWrite);
-  outputs.push_back(options.frameTimesPath);
-  for (const auto& [tool, path] : options.records) outputs.push_back(path);
-  for (const SurfaceRequest& request : options.surfaces) outputs.push_back(request.path);
+  for (const std::string& path : outputFiles(options)) outputs.push_back(path);
   requireDistinctFiles(outputs, inputFiles(loaded.scene));
 }
 
@@ -329,7 +333,8 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
     else
       simulation.advanceFrame();
     if (options.untilRest) rest.afterFrame(simulation);
-    if (options.untilRest && !rest.atRest() && simulation.finished()) rest.fail(simulation.time());
+    if (options.untilRest && !rest.atRest() && simulation.finished())
+      rest.fail(simulation.time(), !outputFiles(options).empty());
     last = simulation.finished() || rest.atRest();
     // A servo that runs elsewhere hands over its rest first, a frame before the motion begins.
     if (simulation.record().start >= 0) {
