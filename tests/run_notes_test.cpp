@@ -31,6 +31,49 @@ TEST_F(RunNotes, AToolThatClosedBesideTheBodyHeldNothing) {
   EXPECT_EQ(notesOfGrips({0, 1, 0, 0}, 0.3), Notes{});  // it may hold something later
 }
 
+TEST_F(RunNotes, AMotionThatDoesNotFitTheScene) {
+  const auto notesOf = [&](const std::string& verb, double from, double to, const std::string& more = "") {
+    folder.write("own/organ.csv", fmt::format("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n{},0,0,0.5,1,0,0,0,0\n"
+                                              "{},0,0,0.4,1,0,0,0,0\n{},0,0,0.4,1,0,0,0,0\n",
+                                              from, to, to + 50));  // still at the end, of which nothing is missed
+    std::vector<std::string> words{verb, "own/organ.xml"};
+    if (!more.empty()) words.insert(words.end(), {"--set", more, "--set", "output.golden=0"});
+    Notes notes = complaints(run(words));
+    std::erase(notes, "note: tool 'probe' touched nothing in its whole motion");
+    return notes;
+  };
+  const std::string end = " s of the motion of tool 'probe' are not played: the scene is 0 to 0.48 s";
+  EXPECT_EQ(notesOf("check", 0, 0.9), Notes{});
+  EXPECT_EQ(notesOf("check", 0, 1.2), Notes{"note: 0.72 of 1.2" + end});
+  EXPECT_EQ(notesOf("replay", 0, 1.2), Notes{"note: 0.72 of 1.2" + end});
+  EXPECT_EQ(notesOf("check", -2, 0.4), Notes{"note: 2 of 2.4" + end});
+  EXPECT_EQ(notesOf("replay", 0, 1.2, "clock.duration=0.04"), Notes{});  // one who shortens a scene knows
+  EXPECT_EQ(notesOf("check", 0.5, 0.6), Notes{});
+  const std::string late = "note: tool 'probe' stands still until 3 s, where own/organ.csv begins";
+  EXPECT_EQ(notesOf("check", 3, 5), (Notes{late, "note: 2 of 2" + end}));
+  EXPECT_EQ(notesOf("check", 3, 5, "clock.duration=6"), Notes{late});
+  // Who describes a recording has said when it begins.
+  notesOf("check", 3, 5);
+  folder.write("own/hand.xml",
+               "<recording file='organ.csv'><columns time='1' position='2 3 4'/><span delay='3'/></recording>");
+  const Notes delayed = complaints(run({"check", "own/organ.xml", "--trajectory", "own/hand.xml"}));
+  EXPECT_EQ(delayed, Notes{"note: 2 of 2" + end});
+  const ProgramResult still = run({"render", "own/organ.xml", "--trajectory", "own/hand.xml", "--still", "0.04",
+                                   "--size", "64x48", "-o", "still.png"});
+  EXPECT_EQ(complaints(still), Notes{});
+}
+
+TEST_F(RunNotes, ShippedScenesHaveNone) {
+  const std::string scenes = std::string(MEDULLA_SOURCE_DIR) + "/scenes";
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(scenes)) {
+    if (entry.path().extension() != ".xml" || readFile(entry.path().string()).find("<scene") == std::string::npos)
+      continue;
+    const ProgramResult r = run({"check", entry.path().string()});
+    EXPECT_EQ(r.exitCode, 0) << r.err;
+    EXPECT_EQ(complaints(r), Notes{}) << entry.path();
+  }
+}
+
 TEST_F(RunNotes, ABodyOfWhichEveryNodeIsHeld) {
   std::string text = read("own/organ.xml");
   text.replace(text.find("spheres=\"1\""), 11, "sphere=\"1 2 4 5\"");

@@ -105,6 +105,8 @@ TEST(TrajectoryFile, EveryMistakeIsNamedWithItsLine) {
   expectComplaint(header + good + good, "file.csv:3: ", "strictly increasing");
   expectComplaint(header + good + "-1,0,0,0,1,0,0,0,0\n", "file.csv:3: ", "strictly increasing");
   expectComplaint(header + "1e10,0,0,0,1,0,0,0,0\n", "file.csv:2: ", "time is 10000000000 s");
+  expectComplaint(header + "1700000000.25,0,0,0,1,0,0,0,0\n",
+                  "file.csv:2: ", "a <recording> that names this file takes");
   expectComplaint(header + good + "1,0,0,0,1.0011,0,0,0,0\n", "file.csv:3: ", "length 1.0011");
   expectComplaint(header + "0,0,0,0,0.9,0,0,0,0\n", "file.csv:2: ", "length 0.9");
   expectComplaint(header + "0,0,0,0,0,0,0,0,0\n", "file.csv:2: ", "length 0");

@@ -7,7 +7,7 @@ namespace medulla {
 // Everything that a run does before its first step: reading, looking up, laying out.
 int runCheck(const RunOptions& options) {
   const LoadedScene loaded = loadRun(options);
-  printWarnings(loaded.scene, makeWorld(loaded));
+  printWarnings(loaded, makeWorld(loaded));
   fmt::print("valid yes\n");
   return 0;
 }

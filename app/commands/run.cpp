@@ -285,7 +285,31 @@ void PictureTimes::afterFrame(const Simulation& simulation, const std::function<
   }
 }
 
-void printWarnings(const Scene& scene, const World& world) {
+// Scripted motions end before their scenes by intention, and the tool stands still from then on. What lies outside the
+// scene is never seen, and a table whose clock begins late was likely cut out of a longer one.
+static void printUnplayed(const LoadedScene& loaded) {
+  constexpr double kLeast = 0.5, kShare = 0.05;  // s; of the motion
+  const Scene& scene = loaded.scene;
+  const bool isShortened = std::any_of(scene.overridden.begin(), scene.overridden.end(),
+                                       [](const OverriddenAttribute& o) { return o.path == "clock.duration"; });
+  for (std::size_t k = 0; k < loaded.trajectories.size(); ++k) {
+    const SceneTool& tool = scene.tools[k];
+    const double start = loaded.trajectories[k].samples.front().time, end = motionEnd(loaded.trajectories[k]);
+    const double length = end - start;
+    const double outside = length - std::max(0.0, std::min(end, scene.duration) - std::max(start, 0.0));
+    if (tool.recordingPath.empty() && start > kLeast && length > 0)
+      fmt::print(stderr, "note: tool '{}' stands still until {:.6g} s, where {} begins\n", tool.name, start,
+                 tool.trajectoryPath);
+    if (!isShortened && outside >= kLeast && outside > kShare * length)
+      fmt::print(stderr,
+                 "note: {:.4g} of {:.4g} s of the motion of tool '{}' are not played: the scene is 0 to {:.6g} s\n",
+                 outside, length, tool.name, scene.duration);
+  }
+}
+
+void printWarnings(const LoadedScene& loaded, const World& world) {
+  const Scene& scene = loaded.scene;
+  printUnplayed(loaded);
   for (const BodyOverlap& o : world.startOverlaps())
     fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n", scene.bodies[o.body0].name,
                scene.bodies[o.body1].name, 1e3 * o.depth);
@@ -325,7 +349,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   FrameTimesRecorder frameTimes(options);
   ForceComparison forces(loaded);
   RestWatch rest(loaded, simulation);
-  printWarnings(loaded.scene, simulation.world());
+  printWarnings(loaded, simulation.world());
   for (bool last = false; !last;) {
     checkInterrupt();
     if (advance)

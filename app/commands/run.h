@@ -74,7 +74,7 @@ CacheLayout cacheLayout(const LoadedScene& loaded);
 LoadedScene loadRun(const RunOptions& options);
 
 // On standard error: what can run, but is hardly meant.
-void printWarnings(const Scene& scene, const World& world);
+void printWarnings(const LoadedScene& loaded, const World& world);
 
 // Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` after the last, before
 // records, log and surfaces appear under their names: what fails there leaves those as they were. Until rest: as

@@ -84,6 +84,11 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name) {
     rows.requireCells(columns, expected);
     row.clear();
     for (std::size_t k = 0; k < columns; ++k) row.push_back(rows.number(k, columnNames[k]));
+    if (std::abs(row[time]) > kTimeReach)
+      rows.fail(
+          fmt::format("time is {} s, expected seconds since the scene's start; a <recording> that names this file "
+                      "takes stamps of any clock",
+                      row[time]));
     addSample(trajectory, sampleOfRow(row, rows), name, rows.line());
     if (columns > requiredColumns) trajectory.measuredForces.emplace_back(row[fx], row[fy], row[fz]);
   }
