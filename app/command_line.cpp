@@ -265,7 +265,8 @@ void checkRender(const RenderArguments& a) {
                           !a.run.records.empty() || std::find(a.show.begin(), a.show.end(), "force") != a.show.end();
   if (!a.cache.empty() && asksForRun)
     usageError("--cache", a.cache,
-               "no --log, --frame-times, --surface-at, --record or --show force: nothing is simulated");
+               "no --log, --frame-times, --surface-at, --record or --show force: nothing is simulated, and a cache has "
+               "pictures only, no ticks");
   if (!a.resume) return;
   if (a.outputs.empty() || !a.still.empty()) usageError("--resume", "", "-o DIR: folders of PNG files can be resumed");
   for (const std::string& output : a.outputs)
@@ -307,7 +308,7 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
   std::string parts = "draw also:";
   for (const ShownPart& part : shownParts()) parts += fmt::format(" {} ({}),", part.name, part.meaning);
   parts.back() = ';';
-  parts += " of the model what is named [mesh,spheres,links]";
+  parts += " of the model what is named [mesh,spheres,links]; force shows every tick, and is not drawn from a --cache";
   c->add_option("--show", a.show, parts)->delimiter(',')->type_name("PART,...")->allow_extra_args(false);
   c->add_option("--size", a.size,
                 fmt::format("picture size in pixels, from {} to {}, of videos even numbers (default: the scene's)",
@@ -326,7 +327,8 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
       ->check(numberFrom(0, kEndless, "a time in seconds"))
       ->type_name("T")
       ->excludes(frames);
-  c->add_option("--cache", a.cache, "draw the states that replay --cache wrote instead of simulating")
+  c->add_option("--cache", a.cache,
+                "draw the states that replay --cache wrote instead of simulating; these lack the ticks of --show force")
       ->type_name("FILE");
   addContext(*c, a.context);
 }
@@ -360,7 +362,9 @@ Verb addReplay(CLI::App& app) {
   CLI::App* c = app.add_subcommand("replay", "run a scene without pictures, as fast as it goes, and print its results");
   addSceneOptions(*c, a->run);
   addRunOptions(*c, a->run);
-  c->add_option("--cache", a->cache, "write what every picture shows, for medulla render --cache")->type_name("FILE");
+  c->add_option("--cache", a->cache,
+                "write what every picture shows, for medulla render --cache; not the ticks of --show force")
+      ->type_name("FILE");
   c->add_flag("--realtime", a->realtime,
               "run against the clock: the servo in a thread of its own at its rate, the dynamics in another; tells CPU "
               "times of ticks, and which came late");

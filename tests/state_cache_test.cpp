@@ -174,6 +174,21 @@ TEST_F(CacheOfScene, OfAnotherMotionItIsRefusedOfAnotherPictureNot) {
   EXPECT_FALSE(std::filesystem::exists(folder / "x"));
 }
 
+// The strip chart shows the force of every tick, which no picture holds.
+TEST_F(CacheOfScene, HelpNamesWhatItCannotShow) {
+  expectRefused(render({"--show", "force", "-o", "x"}), "--show force: nothing is simulated, and a cache has pictures",
+                2);
+  const auto helpOf = [&](const std::string& verb) {
+    std::istringstream words(run({verb, "--help"}).out);
+    std::string text;
+    for (std::string word; words >> word;) text += word + " ";
+    return text;
+  };
+  EXPECT_NE(helpOf("render").find("force shows every tick, and is not drawn from a --cache"), std::string::npos);
+  EXPECT_NE(helpOf("render").find("these lack the ticks of --show force"), std::string::npos);
+  EXPECT_NE(helpOf("replay").find("not the ticks of --show force"), std::string::npos);
+}
+
 TEST_F(CacheOfScene, CompareNamesTheFirstPictureAndFieldThatDiffer) {
   EXPECT_EQ(run({"compare", "organ.cache", "organ.cache"}).out, "equal yes\npictures 12\n");
   const auto replay = [&](const std::string& set) {
