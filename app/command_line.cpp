@@ -370,8 +370,8 @@ Verb addReplay(CLI::App& app) {
               "times of ticks, and which came late");
   c->add_flag(
       "--until-rest", a->untilRest,
-      "end when no body has moved for a swing of its slowest mode and no load is still growing; exit code 4 where that "
-      "is not before the scene's duration");
+      "end when no body has moved for a swing of its slowest mode and no load is still growing; exit code 4 and no "
+      "files where that is not before the scene's duration");
   return {c, [a] {
             RunOptions options = runOptions(a->run);
             options.untilRest = a->untilRest;

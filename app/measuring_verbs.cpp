@@ -142,8 +142,10 @@ Verb addGolden(CLI::App& app) {
   c->add_option("SCENE", o.scenes, "scene files (default: those that the images in --dir name, or scenes/*.xml)");
   c->add_option("--dir", o.folder, "folder of the golden images (default: golden_images beside the scene's folder)")
       ->type_name("DIR");
-  c->add_option("--update", o.update,
-                "store what is drawn now: of a scene, by file or name, or of one moment, such as liver_45 (repeatable)")
+  c->add_option(
+       "--update", o.update,
+       "store what is drawn now: of a scene, by file or name, whose images of former moments are removed, or of "
+       "one moment, such as liver_45 (repeatable)")
       ->type_name("NAME")
       ->allow_extra_args(false);
   c->add_option("--failures", o.failures, "where report.html and the pictures that fail go")

@@ -113,6 +113,7 @@ std::string drawnWith(const GoldenOptions& options) {
 
 std::vector<std::string> namesOf(const std::vector<Moment>& moments) {
   std::vector<std::string> names;
+  names.reserve(moments.size());
   for (const Moment& m : moments) names.push_back(m.name);
   return names;
 }
@@ -221,6 +222,7 @@ int updateImages(const std::vector<std::string>& scenes, const GoldenOptions& op
   }
   const std::string renderedWith = drawnWith(options);
   std::vector<Update> updates;
+  updates.reserve(chosen.size());
   for (const std::string& path : chosen) updates.push_back(updateOf(path, options, renderedWith));
   for (const Update& update : updates) apply(update);
   return 0;
