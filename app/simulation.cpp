@@ -49,6 +49,7 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   totals_.touched.resize(tools.size());
   totals_.held.resize(tools.size());
   totals_.closings.resize(tools.size());
+  for (const ToolSample& input : inputs_) totals_.beganClosed.push_back(input.grip > kGripCloses);
   record_.duration = frameDuration_;
   record_.from = record_.to = current_;
   record_.inputs.assign(ticksPerFrame_ + 1, inputs_);
@@ -137,7 +138,7 @@ void Simulation::accountImpulses(const std::vector<Eigen::Vector3d>& given) {
   }
   totals_.toolImpulse += impulse;
   totals_.impulseDifference += difference;
-  lastMismatch_ = impulse > 0 ? 100 * difference / impulse : 0;
+  lastMismatch_ = mismatchOf(difference, impulse);
 }
 
 void Simulation::accountVolumes() {

@@ -58,6 +58,12 @@ struct PictureState {
 // State at a time within the record: surface, device and proxy blended between ticks. `out` is reused.
 void stateAt(const ServoRecord& record, double time, PictureState& out);
 
+// %, of impulses in N s; of what is no more than rounding, 0.
+inline double mismatchOf(double difference, double impulse) {
+  constexpr double kRounding = 1e-9;
+  return impulse > kRounding ? 100 * difference / impulse : 0;
+}
+
 // Results of a run so far.
 struct RunTotals {
   double simulated = 0;  // s
@@ -66,10 +72,11 @@ struct RunTotals {
   double volumeRatioMin = 1, volumeRatioMax = 1;  // of any body
   long clampedTicks = 0, gripSlips = 0;           // of all tools
   std::vector<bool> touched, held;                // has tool k been in contact or held anything; has it held anything
-  std::vector<int> closings;                      // how often tool k's grip has closed
+  std::vector<int> closings;                      // how often tool k's grip has closed since it began
+  std::vector<bool> beganClosed;                  // was it closed then
   double userEnergyMax = 0;                       // J, the most that any tool had handed to the user
   double toolImpulse = 0, impulseDifference = 0;  // N s, sums over frames and tools of lengths
-  double impulseMismatch() const { return toolImpulse > 0 ? 100 * impulseDifference / toolImpulse : 0; }  // %
+  double impulseMismatch() const { return mismatchOf(impulseDifference, toolImpulse); }
 };
 
 // The loop of a run in logical time: ticks of the servo over the two last dynamics frames, then one dynamics frame

@@ -20,9 +20,10 @@ struct Grip {
   double give = 0;               // m/N, of what is held, by the nodes' own; 0 where a node does not give
 };
 
-// Opens or closes by the sample's grip (closed above kGripCloses). Closing in contact holds every node of the touched
-// body within gripRadius of the contact point, and at least the three of the touched triangle, where they are: the
-// springs are slack then. `grip.held` must have room for every node of the surface: nothing is allocated here.
+// Opens or closes by the sample's grip (closed above kGripCloses). Closing in contact, also at a run's first tick,
+// holds every node of the touched body within gripRadius of the contact point, and at least the three of the touched
+// triangle, where they are: the springs are slack then. `grip.held` must have room for every node of the surface:
+// nothing is allocated here.
 void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
                 double gripRadius, Grip& grip);
 

@@ -252,6 +252,10 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
   tool.device = input;
   tool.motion.velocity = way / tickDuration;
   followSurface(buckets, alphaBefore, alpha, tool.settings.radius, tool.proxy);
+  // Jaws that close, or are closed when a run begins, hold what the tool meets in this very tick, too. Later they hold
+  // nothing: closed jaws that come upon tissue push it.
+  const bool closes = !tool.grip.closed && input.grip > kGripCloses;
+  if (closes && !tool.proxy.inContact()) followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
   tickGrip(surface, alpha, state.force, before, tickDuration, tool);
   if (feelGrip(surface, alpha, tickDuration, tool, state)) return;
   tool.motion.velocity = way / tickDuration;  // of what has slipped out it was another

@@ -108,6 +108,30 @@ TEST(Grab, ClosingOnNothingHoldsNothingAndAClosedGripStillPresses) {
   EXPECT_FALSE(run.loads.toolSprings.empty());
 }
 
+TEST(Grab, AGripThatIsClosedWhenTheRunBeginsHoldsWhatItTouches) {
+  ToolRun run = grabbing();
+  run.device = [](double t) { return deviceAt(approach(1) + 0.02 * ease(t, 0.1, 0.5) * Vector3d::UnitZ(), 1); };
+  run.run(0.8, [&](double, const ToolState& tool) { ASSERT_TRUE(tool.holding); });
+  EXPECT_GE(run.loads.heldNodes.size(), 3U);
+}
+
+TEST(Grab, WhatItComesUponInTheVeryTickOfClosingIsHeldWithoutForceStep) {
+  constexpr double kSpeed = 0.04;  // m/s
+  const auto coming = [](double t) { return touch - kSpeed * t * Vector3d::UnitZ(); };
+  ToolRun open = grabbing(), run = grabbing();
+  double met = 0;
+  open.device = [=](double t) { return deviceAt(coming(t)); };
+  open.run(0.1, [&](double t, const ToolState& tool) { met = met == 0 && tool.inContact ? t : met; });
+  ASSERT_GT(met, 0.01);
+  run.device = [=](double t) { return deviceAt(coming(t), t >= met ? 1 : 0); };
+  double first = -1;
+  run.run(met + 0.04, [&](double t, const ToolState& tool) {
+    ASSERT_EQ(tool.holding, t >= met);
+    if (tool.holding && first < 0) first = tool.force.norm();
+  });
+  EXPECT_LT(first, 1.2 * run.tool.stiffness * kSpeed * run.tickDuration);  // what a tick of the way adds
+}
+
 TEST(Grab, PullingTakesTheTissueAlongAndReleaseLetsItGo) {
   ToolRun run = grabbing();
   run.device = [](double t) {

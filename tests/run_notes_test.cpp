@@ -27,6 +27,7 @@ using Notes = std::vector<std::string>;
 TEST_F(RunNotes, AToolThatClosedBesideTheBodyHeldNothing) {
   EXPECT_EQ(notesOfGrips({0, 1, 0, 0}, 0.6), Notes{"note: tool 'probe' closed once and held nothing"});
   EXPECT_EQ(notesOfGrips({0, 1, 0, 1}, 0.6), Notes{"note: tool 'probe' closed 2 times and held nothing"});
+  EXPECT_EQ(notesOfGrips({1, 1, 1, 1}, 0.6), Notes{"note: tool 'probe' was closed from the start and held nothing"});
   EXPECT_EQ(notesOfGrips({0, 0, 0, 0}, 0.6), Notes{});  // nothing was to be held
   EXPECT_EQ(notesOfGrips({0, 1, 0, 0}, 0.3), Notes{});  // it may hold something later
 }
@@ -72,6 +73,15 @@ TEST_F(RunNotes, ShippedScenesHaveNone) {
     EXPECT_EQ(r.exitCode, 0) << r.err;
     EXPECT_EQ(complaints(r), Notes{}) << entry.path();
   }
+}
+
+TEST_F(RunNotes, AToolThatBeginsClosedInTissueHoldsItAtRest) {
+  folder.write("own/organ.csv",
+               "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,-0.0525,-0.0385,0.019,1,0,0,0,1\n"
+               "0.2,-0.0525,-0.0385,0.019,1,0,0,0,1\n");
+  const ProgramResult r = run({"replay", "own/organ.xml"});
+  EXPECT_EQ(complaints(r), Notes{});
+  EXPECT_NE(r.out.find("impulse_mismatch 0 %"), std::string::npos) << r.out;
 }
 
 TEST_F(RunNotes, ABodyOfWhichEveryNodeIsHeld) {

@@ -331,6 +331,8 @@ static void printNotes(const LoadedScene& loaded, const RunTotals& totals) {
     else if (closings > 0 && !totals.held[k])
       fmt::print(stderr, "note: tool '{}' closed {} and held nothing\n", name,
                  closings == 1 ? "once" : fmt::format("{} times", closings));
+    else if (totals.beganClosed[k] && !totals.held[k])
+      fmt::print(stderr, "note: tool '{}' was closed from the start and held nothing\n", name);
   }
   if (totals.volumeRatioMin <= 0)
     fmt::print(stderr,
