@@ -19,20 +19,26 @@ glm::quat toGlm(const Eigen::Quaterniond& q) {
 
 namespace {
 
-SurfaceShape shapeOf(const TriangleMesh& mesh, const Eigen::Isometry3d& worldFromMesh, const std::string& look) {
+SurfaceShape shapeOf(const std::vector<std::array<int, 3>>& triangles, const std::string& look) {
   SurfaceShape shape;
   shape.look = look;
-  for (const Eigen::Vector3d& v : mesh.vertices) shape.restPositions.push_back(toGlm(worldFromMesh * v));
-  for (const auto& t : mesh.triangles) shape.triangles.push_back({unsigned(t[0]), unsigned(t[1]), unsigned(t[2])});
+  for (const auto& t : triangles) shape.triangles.push_back({unsigned(t[0]), unsigned(t[1]), unsigned(t[2])});
   return shape;
 }
 
-SurfaceShape shapeOf(const RenderSurface& surface, const std::vector<Eigen::Vector3d>& nodes, const std::string& look) {
-  SurfaceShape shape;
-  shape.look = look;
-  evaluateRenderSurface(surface, nodes, shape.restPositions);
-  for (const auto& t : surface.triangles) shape.triangles.push_back({unsigned(t[0]), unsigned(t[1]), unsigned(t[2])});
+SurfaceShape shapeOf(const TriangleMesh& mesh, const Eigen::Isometry3d& worldFromMesh, const std::string& look) {
+  SurfaceShape shape = shapeOf(mesh.triangles, look);
+  for (const Eigen::Vector3d& v : mesh.vertices) shape.restPositions.push_back(toGlm(worldFromMesh * v));
   return shape;
+}
+
+void drawnPositions(const SceneBody& body, const SurfaceSmoothing& smoothing, const std::vector<Eigen::Vector3d>& nodes,
+                    std::vector<glm::vec3>& out) {
+  const RenderSurface& surface = body.model->renderSurface;
+  if (smoothing.share.empty())
+    evaluateRenderSurface(surface, nodes, out);
+  else
+    evaluateRenderSurface(surface, smoothed(smoothing, nodes), out);
 }
 
 void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& state, Picture& picture) {
@@ -136,7 +142,9 @@ SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Rende
   };
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const SceneBody& body = scene.bodies[b];
-    SurfaceShape shape = shapeOf(body.model->renderSurface, rest.bodies[b].nodes, body.look);
+    smoothings_.push_back(body.links == LinkModel::identified ? SurfaceSmoothing{} : makeSurfaceSmoothing(*body.model));
+    SurfaceShape shape = shapeOf(body.model->renderSurface.triangles, body.look);
+    drawnPositions(body, smoothings_[b], rest.bodies[b].nodes, shape.restPositions);
     shape.travels = body.fixed.empty() && body.fixedNodes.empty();
     add(body.line, std::move(shape));
   }
@@ -164,7 +172,7 @@ void SceneView::compose(const PictureState& state, ViewKind view, const Shown& s
   picture.surfaces.resize(scene.bodies.size() + drawnStatics_);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyFrame& frame = state.frame.bodies[b];
-    evaluateRenderSurface(scene.bodies[b].model->renderSurface, frame.nodes, picture.surfaces[b].positions);
+    drawnPositions(scene.bodies[b], smoothings_[b], frame.nodes, picture.surfaces[b].positions);
     if (view != ViewKind::tissue)
       drawBodyModel(scene.bodies[b], frame, shown, heightAtTarget(picture.camera), picture.model);
   }

@@ -5,6 +5,7 @@
 
 #include "app/shown_parts.h"
 #include "app/simulation.h"
+#include "app/surface_smoothing.h"
 #include "render/renderer.h"
 
 // Physics to draw lists: the one place where Eigen becomes GLM.
@@ -30,6 +31,7 @@ class SceneView {
  private:
   const LoadedScene* loaded_;
   float widening_;
+  std::vector<SurfaceSmoothing> smoothings_;  // of each body
   std::size_t drawnStatics_ = 0;
 };
 
