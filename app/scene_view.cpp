@@ -50,10 +50,11 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   instrument.scale = float(tool.settings.radius / std::clamp(tool.settings.radius, kThinnest, kThickest));
   instrument.touching = state.inContact || state.holding;
   // Where a grip closes the jaws meet tissue and hold it. Over the grip's last part, a few pictures long, they close
-  // on it and it rises between them: it would jump into and out of the jaws else.
+  // on it and it rises between them: it would jump into and out of the jaws else. Firm jaws stand half a millimetre
+  // apart at their tips: what lies between is thinner than that farther in, and would seem to be nothing.
   constexpr double kFirm = 0.95;
   const double firm = std::clamp((input.grip - kGripCloses) / (kFirm - kGripCloses), 0.0, 1.0);
-  constexpr double kOpenJaw = 0.38, kHoldingJaw = 0.11, kClosedJaw = 0.03;  // rad
+  constexpr double kOpenJaw = 0.38, kHoldingJaw = 0.11, kClosedJaw = 0.012;  // rad
   const double closed = std::min(input.grip / kGripCloses, 1.0);
   instrument.jawAngle = float(kOpenJaw + (kHoldingJaw - kOpenJaw) * closed + (kClosedJaw - kHoldingJaw) * firm);
   instrument.hold = state.holding ? float(firm * firm * (3 - 2 * firm)) : 0.f;

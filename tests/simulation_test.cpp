@@ -40,6 +40,25 @@ TEST(Simulation, PicturesOnTicksShowTheTickAndOthersLieBetween) {
   EXPECT_EQ(at.frame.bodies[0].nodes[0], record.to.bodies[0].nodes[0]);
 }
 
+// A wedge of open air between closed jaws would look as if they held nothing.
+TEST(SceneView, JawsOfAFirmGripMeet) {
+  const LoadedScene loaded = shortScene(1);
+  Simulation simulation(loaded);
+  simulation.advanceFrame();
+  Renderer renderer(rendererSettings(32, 32, "auto", Quality::draft));
+  const SceneView view(loaded, simulation.record().from, renderer);
+  PictureState state;
+  stateAt(simulation.record(), 0, state);
+  const auto gap = [&](double grip) {  // m, between the tips of jaws of 2 cm
+    state.inputs[0].grip = grip;
+    Picture picture;
+    view.compose(state, ViewKind::tissue, {}, picture);
+    return 2 * 0.02f * picture.instruments[0].jawAngle;
+  };
+  EXPECT_GT(gap(0), 0.01f);
+  EXPECT_LT(gap(1), 0.0006f);
+}
+
 // Loop's limit weights sum to one and reproduce rigid motion: the drawn surface moves with the body.
 TEST(SceneView, DrawnSurfaceFollowsARigidMotion) {
   const LoadedScene loaded = shortScene(1);
