@@ -179,6 +179,7 @@ Look dolphin() {
   l.patches[2] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {0, -0.6f, 1}, 0.565f, 0.615f, 1};
   l.patches[3] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {0, -0.6f, -1}, -0.435f, -0.385f, 1};
   l.patches[4] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {-1, 0, 0}, -0.20f, -0.14f, 1};  // flukes, between their tips
+  l.spot = {{0.010f, 0.011f, 0.013f}, {0.887f, 0.425f}, 0.030f};                      // eyes
   l.wrap = {0.10f, 0.12f, 0.14f};
   l.roughness = 0.50f;
   l.wetRoughness = 0.30f;

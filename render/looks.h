@@ -22,6 +22,13 @@ struct Patch {
   float warp = 0;    // cells by which the noise's places are shifted about: on a plane along its lattice it makes boxes
 };
 
+// A dot of colour on both sides of a body whose sides face +z and -z.
+struct Spot {
+  glm::vec3 colour{0};  // linear RGB
+  glm::vec2 place{0};   // of x and y in the surface's bounding box, 0..1
+  float radius = 0;     // m, to where it has faded out, from half of it on; 0: none
+};
+
 // Vessels and fine structure of the tileable detail texture.
 struct DetailPattern {
   int side = 512;           // texels
@@ -40,6 +47,7 @@ struct Look {
   glm::vec3 albedoLow{0.5f}, albedoHigh{0.5f};  // linear RGB; noise at mottleFrequency mixes between them
   float mottleFrequency = 22;                   // 1/m
   std::array<Patch, 5> patches;
+  Spot spot;                 // over the patches
   glm::vec3 wrap{0};         // 0..1 per channel: light that bleeds past the terminator (subsurface scattering)
   glm::vec3 glow{0};         // linear RGB: light that comes through where the tissue is thin
   float glowDepth = 0.004f;  // m of tissue that let 1/e of it through

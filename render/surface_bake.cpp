@@ -229,6 +229,9 @@ void bakeAlbedo(SceneMesh& mesh, const MeshPart& part) {
       const float at = patch.noiseWeight * fractalNoise(cell) + glm::dot(patch.gradient, inBox);
       albedo = glm::mix(albedo, patch.colour, patch.amount * smoothStep(patch.from, patch.to, at));
     }
+    const vec3 fromSpot = (inBox - vec3(look.spot.place, inBox.z)) * extent;
+    if (const float r = look.spot.radius; r > 0)
+      albedo = glm::mix(look.spot.colour, albedo, smoothStep(0.5f * r, r, glm::length(fromSpot)));
     mesh.albedo[i] = albedo;
   }
 }
