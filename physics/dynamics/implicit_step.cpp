@@ -230,7 +230,7 @@ void setEnough(ImplicitData& s, double share) {
 // From the present state, which `s.start` holds, with its momenta there. False where the iteration does not settle.
 bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   constexpr int kIterations = 20;
-  constexpr double kSolved = 0.03, kNear = 0.3;
+  constexpr double kSolved = 0.03, kClose = 0.1, kNear = 0.3;
   const double share = s.duration < d.substep ? 1e-6 : 1e-3;  // of two stages, or one
   if (d.contact.mode != ContactMode::none) {
     findContacts(d);
@@ -243,16 +243,16 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   setEnough(s, share);
   double left = sizeOfResidual(s);
   Operator derivative = differentiate;
-  bool hasMoved = true;  // so far that the matrix of before is no longer near
+  bool hasMoved = true;  // so far that the matrix of before is no longer close
   for (int i = 0; i < kIterations && left > 1; ++i) {
     const double before = left;
     if (hasMoved) assembleSystem(d, s);
     s.iterations += solveSystem(d, s, kSolved, derivative);
     ++s.solves;
     left = search(d, s, stage, before);
+    hasMoved = left > kClose * before;
     // Far from the solution the true derivative is not definite, and a way down is worth more than the tangent.
-    hasMoved = left > kNear * before;
-    if (hasMoved) {
+    if (left > kNear * before) {
       if (derivative == applySystem && !(left < before)) break;
       derivative = applySystem;
     }
