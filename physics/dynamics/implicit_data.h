@@ -69,7 +69,7 @@ struct ImplicitData {
   // Constants.
   std::vector<Quad> freedom;              // as Motion: 1, or 0 where a freedom is held or led
   std::vector<InertiaGroup> inertia;      // four spheres each
-  std::vector<double> pull, carriedMass;  // kg, per node: the attachments' share; what a host feels of node and spring
+  std::vector<double> pull, carriedMass;  // kg, per node: the attachments' share; what a host feels of node and springs
   std::vector<double> nodeMobility;       // 1/kg, per node: of itself, its attachment and its edges; 0: held
   // Of attachments that are stiffer along their normals, over the square of the node's area: what a node moves less
   // along it (1/(kg m4)), what a host feels more (kg/m4). Empty where there are none.

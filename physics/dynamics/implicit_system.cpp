@@ -12,11 +12,11 @@
 //   | S + J^T G J   -J^T G |  spheres
 //   |   -G J         M + G |  nodes
 //
-// The preconditioner eliminates the nodes by their own blocks of M + G, and takes for what is left of J^T ... J the
-// masses that a node behind an attachment alone would have: exact but for the edges' springs and the pressure. What
-// such a block D lacks of M + G, e say, weighs a motion of hosts and nodes alike by e^2 / D more than its mass: nothing
-// that is much stiffer than the rest may be left out. Contacts and tools are rows of rank one on top; in the
-// preconditioner a contact stands with its own spheres' blocks alone.
+// The preconditioner takes D - M for G, D the nodes' own blocks of M + G, and eliminates the nodes exactly: a motion of
+// hosts and nodes alike feels no spring in either. Not so with G itself and D for M + G: what D lacks of that, e say,
+// weighs such a motion by e^2 / D more than its mass, and stiff or small bodies hovered. Without the pressure, a stiff
+// direction per host. Contacts and tools are rows of rank one on top; in the preconditioner a contact stands with its
+// own spheres' blocks alone.
 namespace medulla {
 
 namespace {
@@ -112,10 +112,6 @@ void loadFactor(const WorldData& d, ImplicitData& s, const std::vector<Block6>& 
   }
 }
 
-bool isHeldNode(const ImplicitData& s, int node) {
-  return s.nodeMobility[node] == 0;
-}
-
 // D^-1: the velocities that `impulses` give to nodes whose neighbours and hosts stay.
 void moveNodes(const WorldData& d, const ImplicitData& s, const Quad* impulses, Quad* out) {
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
@@ -133,17 +129,17 @@ void precondition(WorldData& d, ImplicitData& s, const Motion& r, Motion& z) {
   const std::size_t first = 2 * static_cast<std::size_t>(d.spheres.count);
   z = r;
   if (d.nodes.dynamicEnd > 0) {
-    // Spheres: r_s + J^T F r_n
+    // Spheres: r_s + J^T F r_n, F = 1 - D^-1 M
     moveNodes(d, s, r.data() + first, s.given.data());
     for (int i = 0; i < d.nodes.dynamicEnd; ++i)
-      store(s.given[i], isHeldNode(s, i) ? splat(0) : fnma(splat(d.nodes.mass[i]), load(s.given[i]), load(r[first + i])));
+      store(s.given[i], fnma(splat(d.nodes.mass[i]), load(s.given[i]), load(r[first + i])));
     returnImpulses(d, s.given, z);
   }
   for (std::size_t i = 0; i < s.blocks.size(); ++i) s.blocks[i] = blockOf(z, i).cwiseProduct(blockOf(s.freedom, i));
   s.spheres.solve(s.blocks);
   for (std::size_t i = 0; i < s.blocks.size(); ++i) putBlock(s.blocks[i], z, i);
   if (d.nodes.dynamicEnd > 0) {
-    // Nodes: D^-1 r_n + F J z_s = J z_s + D^-1 (r_n - M J z_s)
+    // Nodes: J z_s + D^-1 (r_n - M J z_s)
     carryMotion(d, z, s.carried);
     for (int i = 0; i < d.nodes.dynamicEnd; ++i)
       store(s.given[i], fnma(splat(d.nodes.mass[i]), load(s.carried[i]), load(r[first + i])));
