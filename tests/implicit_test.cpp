@@ -189,6 +189,27 @@ TEST_P(ImplicitLinks, RestsWhereTheExplicitStepRests) {
   }
 }
 
+// Free fall deforms nothing: stiffness has no part in it. Backward Euler falls n (n + 1) / 2 steps' ways.
+TEST_P(ImplicitLinks, ABodyFallsAsFastHoweverStiff) {
+  const double step = 0.005, gravity = 9.81;
+  constexpr int kSteps = 40;
+  for (const int order : {1, 2}) {
+    const double fall = gravity * step * step * (order == 1 ? kSteps * (kSteps + 1) / 2 : kSteps * kSteps / 2.0);
+    for (const double young : {1e3, 1e6, 1e9}) {
+      BodyDescription body = tube(SurfaceMode::full, false, 0.2, GetParam());
+      body.tissue.young = young;
+      World world(implicitly(step, order, {0, -gravity, 0}), {body});
+      run(world, kSteps * step);
+      DynamicsFrame frame;
+      world.readFrame(frame);
+      for (std::size_t i = 0; i < frame.bodies[0].nodes.size(); ++i) {
+        const Vector3d moved = frame.bodies[0].nodes[i] - body.model->restNodes[i];
+        EXPECT_LT((moved - Vector3d(0, -fall, 0)).norm(), 1e-4 * fall) << young << ", order " << order;
+      }
+    }
+  }
+}
+
 // A body is solved as if it were alone, however light it is beside another.
 TEST(Implicit, AnIdleHeavyBodyLeavesALightOneAlone) {
   BodyDescription light = tube(SurfaceMode::full, true, 1), heavy = synthetic::ball("heavy", 0.1, {1, 0, 0});
