@@ -128,28 +128,33 @@ void settleContact(const WorldData& d, ImplicitData& s, PointLoad& load, LoadRow
   rows[2].weight = most / whole * sticking;
 }
 
-void settleTool(WorldData& d, const ImplicitData& s, const PointLoad& load, const StageLoads& stage, LoadRow* rows) {
+void settleTool(WorldData& d, ImplicitData& s, PointLoad& load, const StageLoads& stage, LoadRow* rows) {
   const PointSpring p = pointSpring(d, *stage.loads, load.index, stage.time.remaining);
   Vector3d x = Vector3d::Zero();
   for (int i = 0; i < p.count; ++i) x += p.weights[i] * nodePosition(d, p.nodes[i]);
   const Vector3d rate = ratesOf(s, rows);
   constexpr double kSticking = 1e-5;  // m/s: slower slip is dragged by less than Coulomb's friction, and sticks soon
   const double h = s.duration, spring = h * (h * p.stiffness + p.damping);
-  Vector3d pull, slip, force = Vector3d::Zero(), weight = Vector3d::Zero();  // along the axes
-  const auto act = [&](int a, double w, double along) {
-    weight[a] = w;
-    force[a] = along;
-  };
+  Vector3d pull, slip;  // along the axes
   for (int a = 0; a < 3; ++a) {
     slip[a] = load.axes[a].dot(p.anchorVelocity) - rate[a];
     pull[a] = p.stiffness * load.axes[a].dot(p.anchor - x) + p.damping * slip[a];
   }
-  if (p.outward == nullptr || pull[0] <= 0) act(0, spring, pull[0]);
-  const double most = pull[0] < 0 ? p.friction * -pull[0] : 0,
-               drag = most / std::max(kSticking, std::hypot(slip[1], slip[2]));
-  const double whole = std::hypot(pull[1], pull[2]), share = p.outward != nullptr && whole > most ? most / whole : 1;
-  for (int a = 1; a < 3; ++a) p.slides ? act(a, h * drag, drag * slip[a]) : act(a, share * spring, share * pull[a]);
-  // Beyond its limit a load is to the system the softer spring that gives as much now, as friction that slips is.
+  Vector3d force = pull, weight = Vector3d::Constant(spring);
+  if (p.outward != nullptr) {
+    if (pull[0] > 0) force[0] = weight[0] = 0;
+    const Vector3d& drags = p.slides ? slip : pull;
+    const double size = std::hypot(drags[1], drags[2]), most = std::max(0.0, p.friction * -pull[0]);
+    // A spring up to Coulomb's friction, or a damper that reaches it where sticking ends.
+    const double stiff = p.slides ? h * most / kSticking : spring, strong = p.slides ? most / kSticking * size : size;
+    const double share = strong > most ? most / strong : 1;
+    if (size > 0) turnTangents(s, load, rows, drags[1] / size, drags[2] / size);
+    force[1] = share * strong;
+    force[2] = 0;
+    weight[1] = share < 1 ? 0 : stiff;
+    weight[2] = share * stiff;
+  }
+  // Beyond its limit a load is to the system the softer spring that gives as much now.
   const double limited = force.norm() > p.forceMax ? p.forceMax / force.norm() : 1;
   d.loadForces[load.index].setZero();
   for (int a = 0; a < 3; ++a) {
