@@ -194,7 +194,7 @@ TEST_P(ImplicitLinks, ABodyFallsAsFastHoweverStiff) {
   const double step = 0.005, gravity = 9.81;
   constexpr int kSteps = 40;
   for (const int order : {1, 2}) {
-    const double fall = gravity * step * step * (order == 1 ? kSteps * (kSteps + 1) / 2 : kSteps * kSteps / 2.0);
+    const double fall = gravity * step * step * 0.5 * kSteps * (order == 1 ? kSteps + 1 : kSteps);
     for (const double young : {1e3, 1e6, 1e9}) {
       BodyDescription body = tube(SurfaceMode::full, false, 0.2, GetParam());
       body.tissue.young = young;
