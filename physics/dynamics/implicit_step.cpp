@@ -128,30 +128,6 @@ void balanceForces(WorldData& d, const ImplicitData& s, Motion& out) {
   }
 }
 
-// J: twice the energy of the motion that the residual would give each body's free masses.
-void measureLeft(const WorldData& d, ImplicitData& s) {
-  s.left.assign(d.ranges.size(), 0);
-  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
-    for (const int i : spheresOf(d.ranges[b])) {
-      const SphereGroup& g = d.spheres.groups[i / 4];
-      const Lanes* e = g.inverseInertia;
-      s.left[b] += g.inverseMass[i % 4] * vectorOf(s.residual[2 * i]).squaredNorm() +
-                   (e[0][i % 4] + e[1][i % 4] + e[2][i % 4]) / 3 * vectorOf(s.residual[2 * i + 1]).squaredNorm();
-    }
-    for (const int i : d.ranges[b].node)
-      if (i < d.nodes.dynamicEnd)
-        s.left[b] += d.nodes.inverseMass[i] * vectorOf(s.residual[2 * d.spheres.count + i]).squaredNorm();
-  }
-}
-
-// 1 where the bodies' residuals together are small enough, each against its own measure: a light body beside a heavy
-// one is solved as if it were alone.
-double sizeOfResidual(const ImplicitData& s) {
-  double squared = 0;
-  for (std::size_t b = 0; b < s.left.size(); ++b) squared += s.left[b] / s.enough[b];
-  return std::sqrt(squared);
-}
-
 void evaluateResidual(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   balanceForces(d, s, s.balance);
   s.residual = s.balance;
@@ -160,7 +136,6 @@ void evaluateResidual(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   for (const SphereDrive& drive : d.drives)
     s.workOfPaths += dotProduct(load(s.residual[2 * drive.sphere]), load(s.motion[2 * drive.sphere]));
   hold(s.freedom, s.residual);
-  measureLeft(d, s);
 }
 
 // y = derivative of the residual along x, by a difference of the forces themselves: 10 nm of motion in centimetres
@@ -188,19 +163,23 @@ void leadDriven(WorldData& d, ImplicitData& s, double end) {
   for (const SphereDrive& drive : d.drives) s.motion[2 * drive.sphere] = d.spheres.velocity[drive.sphere];
 }
 
-// Goes along s.change as far as it makes the residual smaller. Returns its size there.
+// Goes along s.change as far as it makes the residual smaller, which may be nowhere. Returns its size there.
 double search(WorldData& d, ImplicitData& s, const StageLoads& stage, double before) {
   constexpr int kHalvings = 12;
-  double share = 1, gone = 0, left = 0;
-  for (int k = 0; k <= kHalvings; ++k, share *= 0.5) {
+  double gone = 0;
+  const auto sizeAt = [&](double share) {
     addScaled(share - gone, s.change, s.motion);
     gone = share;
     place(d, s, s.duration);
     evaluateResidual(d, s, stage);
-    left = sizeOfResidual(s);
-    if (left < (1 - 1e-4 * share) * before) break;
+    return residualSize(d, s);
+  };
+  double share = 1;
+  for (int k = 0; k <= kHalvings; ++k, share *= 0.5) {
+    const double left = sizeAt(share);
+    if (left < (1 - 1e-4 * share) * before) return left;
   }
-  return left;
+  return sizeAt(0);
 }
 
 // Rounding stops some iterations of very stiff bodies just short of what is enough: within this.
@@ -240,14 +219,15 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   leadDriven(d, s, stage.time.end);
   place(d, s, s.duration);
   evaluateResidual(d, s, stage);
+  measureResidual(d, s);
   setEnough(s, share);
-  double left = sizeOfResidual(s);
+  double left = residualSize(d, s);
   Operator derivative = differentiate;
   bool hasMoved = true;  // so far that the matrix of before is no longer close
   for (int i = 0; i < kIterations && left > 1; ++i) {
     const double before = left;
     if (hasMoved) assembleSystem(d, s);
-    s.iterations += solveSystem(d, s, kSolved, derivative);
+    s.iterations += solveSystem(d, s, {kSolved, kNear}, derivative);
     ++s.solves;
     left = search(d, s, stage, before);
     hasMoved = left > kClose * before;
