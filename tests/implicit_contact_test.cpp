@@ -123,21 +123,6 @@ TEST(ImplicitContact, AThrownHeapComesToRest) {
   }
 }
 
-// What Newton's iteration leaves open of a contact's stiff answer is no momentum of the body.
-TEST(ImplicitContact, WhatRestsIsNotLifted) {
-  for (const double step : {0.02, 0.05}) {
-    WorldSettings settings = contactSettings(1);
-    settings.frameDuration = step;
-    BodyDescription resting = raft("raft", {0, kRadius, 0}, 0.5);
-    resting.tissue.young = 1e6;
-    World world(settings, {resting}, {floorOf(0.5)});
-    runUntil(world, 1);
-    throwBody(world, 0, {0, 1e-4, 0});
-    for (int k = 0; k < 10; ++k) world.advance({});
-    EXPECT_LT(world.energies().kinetic, 1e-15) << step;
-  }
-}
-
 // A tissue's contact is damped critically: restitution 0.05. What comes back is asked for after whatever part of a step
 // the touch falls into.
 TEST(ImplicitContact, NothingBouncesHigh) {

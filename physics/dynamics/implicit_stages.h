@@ -57,17 +57,9 @@ void addMassOnFrames(const WorldData& d, ImplicitData& s);
 // implicit_system.cpp
 void assembleSystem(WorldData& d, ImplicitData& s);
 void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y);  // y = A x
-// ImplicitData::left of ImplicitData::residual; and its size by ImplicitData::enough.
-void measureResidual(const WorldData& d, ImplicitData& s);
-double residualSize(const WorldData& d, ImplicitData& s);
-// Conjugate gradients: A change = -residual, until what is left of the residual is small both by the preconditioner,
-// which knows its energy, and by its size: less of that, and a step along the change may not make it smaller at all.
-// Returns the iterations.
-struct Tolerances {
-  double ofEnergy, ofResidual;  // of those at the start; of the energy's root
-};
+// Conjugate gradients: A change = -residual, to `tolerance` of the residual. Returns the iterations.
 using Operator = void (*)(WorldData& d, ImplicitData& s, const Motion& x, Motion& y);
-int solveSystem(WorldData& d, ImplicitData& s, const Tolerances& tolerance, Operator apply);
+int solveSystem(WorldData& d, ImplicitData& s, double tolerance, Operator apply);
 void applyRows(const ImplicitData& s, const Motion& x, Motion& y);  // y += the loads' part of A x
 double product(const Motion& a, const Motion& b);
 void addScaled(double f, const Motion& b, Motion& a);  // a += f b

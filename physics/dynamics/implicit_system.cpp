@@ -52,14 +52,10 @@ void applyPressure(const WorldData& d, ImplicitData& s) {
   }
 }
 
-// given = G (x - carried): impulses of attachments, edges and pressure on the nodes. `x` holds a velocity per node, or
-// is null: 0.
+// given = G (x - carried): impulses of attachments, edges and pressure on the nodes, of which `x` holds the velocities.
 void applySurface(const WorldData& d, ImplicitData& s, const Quad* x) {
   std::vector<Quad>& displaced = s.carried;
-  for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
-    const Lanes of = x != nullptr ? load(x[i]) : splat(0);
-    store(displaced[i], of - load(displaced[i]));
-  }
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) store(displaced[i], load(x[i]) - load(displaced[i]));
   const Lanes h2 = splat(s.duration * s.duration);
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
     const Lanes3 own = gatherFour(displaced, 4 * g);
@@ -165,31 +161,6 @@ void addScaled(double f, const Motion& b, Motion& a) {
   for (std::size_t i = 0; i < a.size(); ++i) store(a[i], fma(splat(f), load(b[i]), load(a[i])));
 }
 
-// J: twice the energy of the motion that the residual would give each body's free masses.
-void measureResidual(const WorldData& d, ImplicitData& s) {
-  s.left.assign(d.ranges.size(), 0);
-  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
-    for (const int i : spheresOf(d.ranges[b])) {
-      const SphereGroup& g = d.spheres.groups[i / 4];
-      const Lanes* e = g.inverseInertia;
-      s.left[b] += g.inverseMass[i % 4] * vectorOf(s.residual[2 * i]).squaredNorm() +
-                   (e[0][i % 4] + e[1][i % 4] + e[2][i % 4]) / 3 * vectorOf(s.residual[2 * i + 1]).squaredNorm();
-    }
-    for (const int i : d.ranges[b].node)
-      if (i < d.nodes.dynamicEnd)
-        s.left[b] += d.nodes.inverseMass[i] * vectorOf(s.residual[2 * d.spheres.count + i]).squaredNorm();
-  }
-}
-
-// 1 where the bodies' residuals together are small enough, each against its own measure: a light body beside a heavy
-// one is solved as if it were alone.
-double residualSize(const WorldData& d, ImplicitData& s) {
-  measureResidual(d, s);
-  double squared = 0;
-  for (std::size_t b = 0; b < s.left.size(); ++b) squared += s.left[b] / s.enough[b];
-  return std::sqrt(squared);
-}
-
 static void setMasses(const WorldData& d, ImplicitData& s) {
   const Lanes zero = splat(0);
   const Matrix3Lanes none = zeroMatrix();
@@ -262,9 +233,8 @@ void applyRows(const ImplicitData& s, const Motion& x, Motion& y) {
   }
 }
 
-int solveSystem(WorldData& d, ImplicitData& s, const Tolerances& tolerance, Operator apply) {
+int solveSystem(WorldData& d, ImplicitData& s, double tolerance, Operator apply) {
   constexpr int kIterations = 200;
-  const double small = tolerance.ofResidual * residualSize(d, s);
   std::fill(s.change.begin(), s.change.end(), Quad{});
   Motion& r = s.residual;
   negate(r);
@@ -272,9 +242,9 @@ int solveSystem(WorldData& d, ImplicitData& s, const Tolerances& tolerance, Oper
   precondition(d, s, r, s.preconditioned);
   s.direction = s.preconditioned;
   double size = product(r, s.preconditioned);
-  const double enough = tolerance.ofEnergy * tolerance.ofEnergy * size;
+  const double enough = tolerance * tolerance * size;
   for (int i = 0; i < kIterations; ++i) {
-    if (!(size > enough) && !(residualSize(d, s) > small)) return i;
+    if (!(size > enough)) return i;
     apply(d, s, s.direction, s.image);
     const double curvature = product(s.direction, s.image);
     // Along such a direction the residual is no minimum; what the preconditioner says is a way down all the same.
