@@ -39,6 +39,13 @@ struct PointLoad {
   std::array<Eigen::Vector3d, 3> axes;
 };
 
+// What sliding asks of a contact's or a tool's friction: implicit_loads.cpp.
+struct Drag {
+  Eigen::Vector3d wanted;    // N s: what would stop it
+  Eigen::Vector3d foretold;  // N s: what the linear system made of that, up to the limit
+  double most = 0;           // N s: Coulomb's limit; 0 where nothing pushes
+};
+
 // What a contact's friction goes on from.
 struct Holding {
   Eigen::Vector3d impulse;  // N s, across the normal
@@ -93,7 +100,8 @@ struct ImplicitData {
   std::vector<int> rowQuad;
   std::vector<Quad> rowCoefficient;
   std::vector<PointLoad> loads;
-  std::vector<Holding> held;  // per contact
+  std::vector<Drag> drags, dragsBefore;  // as `loads`: at the present motion, and where the last system was made
+  std::vector<Holding> held;             // per contact
 
   StageStart before, start;      // of the step, of its present stage
   std::vector<double> bodyMass;  // kg, per body
@@ -104,7 +112,7 @@ struct ImplicitData {
   double workOfPaths = 0;          // J, that led spheres give in this stage
   std::vector<WholeMotion> whole;  // per body, at the stage's end
   Motion balance, kept;            // the residual without loads; the motion while a derivative is taken
-  Motion motion, residual, change, direction, image, preconditioned;
+  Motion motion, residual, remaining, change, direction, image, preconditioned;
   std::vector<Eigen::Vector3d> toolImpulses;  // N s, per load, of the whole step
   std::vector<Quad> carried, given;           // per node: the operator's velocities of anchors, impulses
   std::vector<Vector6> blocks;

@@ -88,8 +88,8 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
   s.lumped.resize(d.spheres.count);
   s.lumpedBeside.resize(s.pairs.size());
   s.blocks.resize(d.spheres.count);
-  for (Motion* m : {&s.balance, &s.kept, &s.before.motion, &s.start.motion, &s.motion, &s.residual, &s.change,
-                    &s.direction, &s.image, &s.preconditioned})
+  for (Motion* m : {&s.balance, &s.kept, &s.before.motion, &s.start.motion, &s.motion, &s.residual, &s.remaining,
+                    &s.change, &s.direction, &s.image, &s.preconditioned})
     m->resize(s.freedom.size());
   s.carried.resize(d.nodes.dynamicEnd);
   s.given.resize(d.nodes.dynamicEnd);

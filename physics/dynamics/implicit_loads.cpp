@@ -101,13 +101,44 @@ void turnTangents(ImplicitData& s, PointLoad& load, const LoadRow* rows, double 
   }
 }
 
+// Friction is `wanted`, cut off at `most`. At the limit the derivative of that is (1 - e e^T) most / |wanted| times the
+// stiffness of sticking, e the way of the drag: nothing resists along it, and the iteration overshoots to sliding the
+// other way, at one contact of a heap or another in every iteration. With foretold e^T / most in place of e e^T it does
+// not (Chan, Golub and Mulet 1999, of total variation, which has the same kink; of friction: Stadler 2004): what slides
+// on comes to that, what turns about is resisted as by the chord.
+void setDrag(ImplicitData& s, std::size_t load, const Vector3d& wanted, double most, const Vector3d& foretoldFirst) {
+  Drag& now = s.drags[load];
+  now = {wanted, wanted, most};
+  if (s.dragsBefore.empty()) {
+    now.foretold = foretoldFirst;
+  } else if (const Drag& before = s.dragsBefore[load]; before.wanted.norm() > before.most) {
+    const double size = before.wanted.norm(), along = before.wanted.dot(wanted - before.wanted) / (size * size);
+    now.foretold = before.most / size * wanted - along * before.foretold;
+  }
+  const double foretold = now.foretold.norm();
+  if (foretold > most) now.foretold *= most / foretold;
+}
+
+// What resists more motion along the drag, and across it, as shares of what resists where it sticks.
+struct Resistance {
+  double along = 1, across = 1;
+};
+Resistance resistanceOf(const Drag& drag) {
+  const double size = drag.wanted.norm();
+  if (size <= drag.most) return {};
+  if (!(drag.most > 0)) return {0, 0};
+  const double across = drag.most / size, agreed = drag.foretold.dot(drag.wanted) / (drag.most * size);
+  return {across * std::min(1.0, 1 - agreed), across};
+}
+
 // Friction that holds goes on from what it held with, l0, less what stops the rest of the sliding, s v: what bears a
 // weight on a slope does so without creeping. With the energy l^2 / (2 s) l = c (l0 - s v), where c <= 1 is Coulomb's
 // limit, is passive: its work is l.v = (l0 - l / c).l / s <= (l0^2 - l^2) / (2 s). Between steps of different durations
 // the force stays, not the impulse, and s may change as well: a ledger says what has really been taken in, and
 // workOfLoads() lets no more than that come back. At the limit more motion along the drag drags no more: to the system
 // only motion across it is resisted.
-void settleContact(const WorldData& d, ImplicitData& s, PointLoad& load, LoadRow* rows) {
+void settleContact(const WorldData& d, ImplicitData& s, std::size_t k, LoadRow* rows) {
+  PointLoad& load = s.loads[k];
   const Contact& c = d.contact.contacts[load.index];
   const ContactLaw law = contactLaw(d, c, s.duration);
   const Vector3d rate = ratesOf(s, rows);
@@ -119,16 +150,16 @@ void settleContact(const WorldData& d, ImplicitData& s, PointLoad& load, LoadRow
   const Vector3d held = s.held[load.index].impulse;
   const double drag[2] = {load.axes[1].dot(held) - sticking * rate[1], load.axes[2].dot(held) - sticking * rate[2]};
   const double most = c.friction * wanted, whole = std::hypot(drag[0], drag[1]);
-  if (whole <= most) {
-    for (int a = 0; a < 2; ++a) rows[1 + a].impulse = drag[a], rows[1 + a].weight = sticking;
-    return;
-  }
-  turnTangents(s, load, rows, drag[0] / whole, drag[1] / whole);
-  rows[1].impulse = most;
-  rows[2].weight = most / whole * sticking;
+  setDrag(s, k, drag[0] * load.axes[1] + drag[1] * load.axes[2], most, held);
+  if (whole > 0) turnTangents(s, load, rows, drag[0] / whole, drag[1] / whole);
+  const Resistance resistance = resistanceOf(s.drags[k]);
+  rows[1].impulse = std::min(whole, most);
+  rows[1].weight = resistance.along * sticking;
+  rows[2].weight = resistance.across * sticking;
 }
 
-void settleTool(WorldData& d, ImplicitData& s, PointLoad& load, const StageLoads& stage, LoadRow* rows) {
+void settleTool(WorldData& d, ImplicitData& s, std::size_t k, const StageLoads& stage, LoadRow* rows) {
+  PointLoad& load = s.loads[k];
   const PointSpring p = pointSpring(d, *stage.loads, load.index, stage.time.remaining);
   Vector3d x = Vector3d::Zero();
   for (int i = 0; i < p.count; ++i) x += p.weights[i] * nodePosition(d, p.nodes[i]);
@@ -147,12 +178,14 @@ void settleTool(WorldData& d, ImplicitData& s, PointLoad& load, const StageLoads
     const double size = std::hypot(drags[1], drags[2]), most = std::max(0.0, p.friction * -pull[0]);
     // A spring up to Coulomb's friction, or a damper that reaches it where sticking ends.
     const double stiff = p.slides ? h * most / kSticking : spring, strong = p.slides ? most / kSticking * size : size;
-    const double share = strong > most ? most / strong : 1;
+    const Vector3d slipping = drags[1] * load.axes[1] + drags[2] * load.axes[2];
+    setDrag(s, k, (size > 0 ? h * strong / size : 0) * slipping, h * most, Vector3d::Zero());
     if (size > 0) turnTangents(s, load, rows, drags[1] / size, drags[2] / size);
-    force[1] = share * strong;
+    const Resistance resistance = resistanceOf(s.drags[k]);
+    force[1] = std::min(strong, most);
     force[2] = 0;
-    weight[1] = share < 1 ? 0 : stiff;
-    weight[2] = share * stiff;
+    weight[1] = resistance.along * stiff;
+    weight[2] = resistance.across * stiff;
   }
   // Beyond its limit a load is to the system the softer spring that gives as much now.
   const double limited = force.norm() > p.forceMax ? p.forceMax / force.norm() : 1;
@@ -237,12 +270,13 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
       for (int i = 0; i < p.count; ++i) addNodeTerms(d, s, p.nodes[i], hosts[i], p.weights[i] * axis);
     });
   }
+  s.drags.assign(s.loads.size(), {Vector3d::Zero(), Vector3d::Zero()});
   for (std::size_t k = 0; k < s.loads.size(); ++k) {
     LoadRow* rows = &s.rows[3 * k];
     if (s.loads[k].isContact)
-      settleContact(d, s, s.loads[k], rows);
+      settleContact(d, s, k, rows);
     else
-      settleTool(d, s, s.loads[k], stage, rows);
+      settleTool(d, s, k, stage, rows);
   }
   addDeadLoads(d, s, stage.time.end);
   for (const LoadRow& row : s.rows) {

@@ -65,6 +65,24 @@ double product(const Motion& a, const Motion& b);
 void addScaled(double f, const Motion& b, Motion& a);  // a += f b
 void hold(const std::vector<Quad>& freedom, Motion& m);
 
+// implicit_stage.cpp: backward Euler in one stage, by Newton's iteration.
+// From the present state, which `s.start` holds, with its momenta there. False where the iteration does not settle.
+bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage);
+void place(WorldData& d, const ImplicitData& s, double time);  // where `s.motion` leads to in `time` from the start
+double restEnergy(const ImplicitData& s);  // J, below which motion is what the iteration leaves open
+// Of the four spheres of a group as they stand.
+Lanes3 angularMomenta(const WorldData& d, const ImplicitData& s, std::size_t group);
+// `visit(sphere, momentum)` of every sphere.
+template <class Visit>
+void visitAngularMomenta(const WorldData& d, const ImplicitData& s, const Visit& visit) {
+  for (int i = 0; i < d.spheres.count; i += 4) {
+    const Lanes3 momenta = angularMomenta(d, s, i / 4);
+    Lanes l[4] = {momenta.x, momenta.y, momenta.z, splat(0)};
+    transpose(l[0], l[1], l[2], l[3]);
+    for (int k = 0; k < std::min(4, d.spheres.count - i); ++k) visit(i + k, l[k]);
+  }
+}
+
 // implicit_step.cpp: one substep; positions, velocities, momenta and the tools' impulses.
 void stepImplicitly(WorldData& d, const Loads& loads, const StepTime& time, std::vector<Eigen::Vector3d>& toolImpulse);
 

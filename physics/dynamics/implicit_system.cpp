@@ -236,7 +236,8 @@ void applyRows(const ImplicitData& s, const Motion& x, Motion& y) {
 int solveSystem(WorldData& d, ImplicitData& s, double tolerance, Operator apply) {
   constexpr int kIterations = 200;
   std::fill(s.change.begin(), s.change.end(), Quad{});
-  Motion& r = s.residual;
+  Motion& r = s.remaining;
+  r = s.residual;
   negate(r);
   hold(s.freedom, r);
   precondition(d, s, r, s.preconditioned);

@@ -1,0 +1,260 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "physics/dynamics/angles.h"
+#include "physics/dynamics/contact_stages.h"
+#include "physics/dynamics/identified_stages.h"
+#include "physics/dynamics/implicit_stages.h"
+
+// Backward Euler in a stage of duration T from the state (x0, q0, p0, L0): the motion u at its end obeys
+//   M u - p0 = T f(x0 + T u, u),   I(q) w - L0 = T tau,   q = exp(T w) q0,
+// solved by Newton's iteration.
+namespace medulla {
+
+namespace {
+
+using Eigen::Vector3d;
+
+struct Orientation {
+  Lanes3 q;
+  Lanes w;
+};
+
+Orientation gatherOrientations(const std::vector<Quad>& q, std::size_t i) {
+  Orientation out;
+  out.q = gatherFour(q, i, out.w);
+  return out;
+}
+
+// exp(turn) q; what does not turn keeps its bits.
+Orientation turned(const Orientation& from, const Lanes3& turn) {
+  const Lanes zero = splat(0);
+  const Lanes angle = squareRoot(dot(turn, turn)), half = splat(0.5) * angle, turns = isLess(zero, angle);
+  Lanes c, s;
+  quickCosineSine(half, c, s);
+  const Lanes3 axis = (s / select(turns, angle, splat(1))) * turn;
+  const Lanes3 q = fma(c, from.q, fma(from.w, axis, cross(axis, from.q)));
+  const Lanes w = c * from.w - dot(axis, from.q);
+  const Lanes scale = splat(1) / squareRoot(fma(w, w, dot(q, q)));
+  const Lanes3 unit = scale * q;
+  return {{select(turns, unit.x, from.q.x), select(turns, unit.y, from.q.y), select(turns, unit.z, from.q.z)},
+          select(turns, scale * w, from.w)};
+}
+
+// out = a + f b, three numbers each
+void setSum(const Quad& a, double f, const Quad& b, Quad& out) {
+  store(out, fma(splat(f), load(b), load(a)));
+}
+
+}  // namespace
+
+Lanes3 angularMomenta(const WorldData& d, const ImplicitData& s, std::size_t group) {
+  const Orientation o = gatherOrientations(d.spheres.orientation, 4 * group);
+  const Rotation r = rotationOf(o.q, o.w);
+  const Lanes3 omega = gatherFour(d.spheres.angularVelocity, 4 * group);
+  return rotate(r, timesSymmetric(s.inertia[group].entry, rotateBack(r, omega)));
+}
+
+void place(WorldData& d, const ImplicitData& s, double time) {
+  Spheres& to = d.spheres;
+  for (int i = 0; i < to.count; ++i) {
+    const Quad& v = s.motion[2 * i];
+    setSum(s.start.position[i], time, v, to.position[i]);
+    to.velocity[i] = v;
+    to.angularVelocity[i] = s.motion[2 * i + 1];
+  }
+  for (std::size_t i = 0; i < to.orientation.size(); i += 4) {
+    const Orientation now =
+        turned(gatherOrientations(s.start.orientation, i), splat(time) * gatherFour(to.angularVelocity, i));
+    storeFour(now.q, now.w, to.orientation, i);
+  }
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
+    d.nodes.velocity[g] = gatherFour(s.motion, 2 * to.count + 4 * g);
+    d.nodes.position[g] = fma(splat(time), d.nodes.velocity[g], s.start.nodePosition[g]);
+  }
+  d.links.unwoundTwist = s.start.unwoundTwist;
+}
+
+namespace {
+
+// M u - p0 - T (f - c M u) at the placed state, c the ambient drag, without loads at points.
+void balanceForces(WorldData& d, const ImplicitData& s, Motion& out) {
+  runStage(d, evaluateForces);
+  const Lanes t = splat(s.duration), dragged = splat(1 + s.duration * d.settings.ambientDrag);
+  for (int i = 0; i < d.spheres.count; ++i) {
+    const Lanes mass = splat(d.spheres.groups[i / 4].mass[i % 4]);
+    const Lanes v = dragged * load(s.motion[2 * i]) - load(s.start.motion[2 * i]);
+    store(out[2 * i], mass * v - t * load(d.spheres.force[i]));
+  }
+  visitAngularMomenta(d, s, [&](int i, Lanes momentum) {
+    store(out[2 * i + 1], dragged * momentum - load(s.start.angularMomentum[i]) - t * load(d.spheres.torque[i]));
+  });
+  const Lanes3 fallen = t * splat(d.gravity);
+  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {
+    const std::size_t k = 2 * static_cast<std::size_t>(d.spheres.count) + 4 * g;
+    const Lanes3 gained = dragged * gatherFour(s.motion, k) - gatherFour(s.start.motion, k) - fallen;
+    storeFour(loadFour(d.nodes.mass, 4 * g) * gained - t * d.nodes.force[g], out, k);
+  }
+}
+
+// J: twice the energy of the motion that the residual would give each body's free masses.
+void measureResidual(const WorldData& d, ImplicitData& s) {
+  s.left.assign(d.ranges.size(), 0);
+  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
+    for (const int i : spheresOf(d.ranges[b])) {
+      const SphereGroup& g = d.spheres.groups[i / 4];
+      const Lanes* e = g.inverseInertia;
+      s.left[b] += g.inverseMass[i % 4] * vectorOf(s.residual[2 * i]).squaredNorm() +
+                   (e[0][i % 4] + e[1][i % 4] + e[2][i % 4]) / 3 * vectorOf(s.residual[2 * i + 1]).squaredNorm();
+    }
+    for (const int i : d.ranges[b].node)
+      if (i < d.nodes.dynamicEnd)
+        s.left[b] += d.nodes.inverseMass[i] * vectorOf(s.residual[2 * d.spheres.count + i]).squaredNorm();
+  }
+}
+
+// 1 where the bodies' residuals together are small enough, each against its own measure: a light body beside a heavy
+// one is solved as if it were alone.
+double residualSize(const ImplicitData& s) {
+  double squared = 0;
+  for (std::size_t b = 0; b < s.left.size(); ++b) squared += s.left[b] / s.enough[b];
+  return std::sqrt(squared);
+}
+
+void evaluateResidual(WorldData& d, ImplicitData& s, const StageLoads& stage) {
+  balanceForces(d, s, s.balance);
+  s.residual = s.balance;
+  evaluateLoads(d, s, stage);
+  s.workOfPaths = 0;
+  for (const SphereDrive& drive : d.drives)
+    s.workOfPaths += dotProduct(load(s.residual[2 * drive.sphere]), load(s.motion[2 * drive.sphere]));
+  hold(s.freedom, s.residual);
+  measureResidual(d, s);
+}
+
+// y = derivative of the residual along x, by a difference of the forces themselves: 10 nm of motion in centimetres
+// leave eight digits.
+void differentiate(WorldData& d, ImplicitData& s, const Motion& x, Motion& y) {
+  constexpr double kMove = 1e-8, kLever = 0.01;  // m
+  double fastest = 0;
+  for (int i = 0; i < d.spheres.count; ++i)
+    fastest = std::max({fastest, vectorOf(x[2 * i]).norm(), kLever * vectorOf(x[2 * i + 1]).norm()});
+  for (std::size_t i = 2 * static_cast<std::size_t>(d.spheres.count); i < x.size(); ++i)
+    fastest = std::max(fastest, vectorOf(x[i]).norm());
+  const double share = kMove / (s.duration * fastest);
+  s.kept = s.motion;
+  addScaled(share, x, s.motion);
+  place(d, s, s.duration);
+  balanceForces(d, s, y);
+  s.motion = s.kept;
+  for (std::size_t i = 0; i < y.size(); ++i) store(y[i], splat(1 / share) * (load(y[i]) - load(s.balance[i])));
+  applyRows(s, x, y);
+  hold(s.freedom, y);
+}
+
+void leadDriven(WorldData& d, ImplicitData& s, double end) {
+  driveSpheres(d, end, s.duration);
+  for (const SphereDrive& drive : d.drives) s.motion[2 * drive.sphere] = d.spheres.velocity[drive.sphere];
+}
+
+// Goes along s.change until the residual is smaller, or the slope along the change, its product with the residual, half
+// as steep at most (Matthies and Strang 1979): contacts that open, close and slide make residuals that are not yet
+// smaller on the best way there is. `left` becomes the residual's size; false: nothing was found, and all stays.
+bool search(WorldData& d, ImplicitData& s, const StageLoads& stage, double& left) {
+  constexpr int kTrials = 12;
+  constexpr double kFlat = 0.5;
+  const double before = left, down = product(s.residual, s.change);
+  double low = 0, high = 1, slopeLow = down, slopeHigh = 0, share = 1;
+  const auto go = [&](double by) {
+    addScaled(by, s.change, s.motion);
+    place(d, s, s.duration);
+    evaluateResidual(d, s, stage);
+    left = residualSize(s);
+  };
+  go(share);
+  for (int k = 0; k < kTrials; ++k) {
+    if (left < (1 - 1e-4 * share) * before) return true;
+    double slope = product(s.residual, s.change), to = 0.5 * share;
+    if (down < 0) {
+      if (std::abs(slope) <= -kFlat * down || (share == 1 && slope < 0)) return true;
+      if (slope < 0)
+        low = share, slopeLow = slope;
+      else  // or not finite
+        high = share, slopeHigh = slope >= 0 ? slope : std::numeric_limits<double>::infinity();
+      const double nearest = 0.1 * (high - low), secant = low - slopeLow * (high - low) / (slopeHigh - slopeLow);
+      to = std::max(low + nearest, std::min(secant, high - nearest));
+    }
+    go(to - share);
+    share = to;
+  }
+  go(-share);
+  return false;
+}
+
+// Rounding stops some iterations of very stiff bodies just short of what is enough: within this.
+constexpr double kSettled = 10;
+
+// sqrt(J / kg): the residual per mass that accelerations of no account leave.
+double leastResidual(const ImplicitData& s) {
+  constexpr double kLeastAcceleration = 1e-5;  // m/s2
+  return s.duration * kLeastAcceleration;
+}
+
+}  // namespace
+
+// J, below which motion is what the iteration leaves open.
+double restEnergy(const ImplicitData& s) {
+  const double least = kSettled * leastResidual(s);
+  return 0.5 * s.totalMass * least * least;
+}
+
+namespace {
+
+// From the bodies' residuals where the stage begins: `share` of them.
+void setEnough(ImplicitData& s, double share) {
+  s.enough.resize(s.left.size());
+  for (std::size_t b = 0; b < s.left.size(); ++b) {
+    const double enough = share * std::sqrt(s.left[b]) + leastResidual(s) * std::sqrt(s.bodyMass[b]);
+    s.enough[b] = enough * enough;
+  }
+}
+
+}  // namespace
+
+bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
+  constexpr int kIterations = 20;
+  constexpr double kSolved = 0.03, kClose = 0.1, kNear = 0.3;
+  const double share = s.duration < d.substep ? 1e-6 : 1e-3;  // of two stages, or one
+  if (d.contact.mode != ContactMode::none) {
+    findContacts(d);
+    recallFriction(d, s);
+  }
+  s.motion = s.start.motion;
+  s.dragsBefore.clear();
+  leadDriven(d, s, stage.time.end);
+  place(d, s, s.duration);
+  evaluateResidual(d, s, stage);
+  setEnough(s, share);
+  double left = residualSize(s);
+  Operator derivative = differentiate;
+  bool hasMoved = true;  // so far that the matrix of before is no longer close
+  for (int i = 0; i < kIterations && left > 1; ++i) {
+    const double before = left;
+    s.dragsBefore = s.drags;
+    if (hasMoved) assembleSystem(d, s);
+    s.iterations += solveSystem(d, s, kSolved, derivative);
+    ++s.solves;
+    const bool moved = search(d, s, stage, left);
+    hasMoved = left > kClose * before;
+    // Far from the solution the true derivative is not definite, and a way down is worth more than the tangent.
+    if (left > kNear * before) {
+      if (derivative == applySystem && !moved) break;
+      derivative = applySystem;
+    }
+  }
+  return left <= kSettled;
+}
+
+}  // namespace medulla
