@@ -9,7 +9,7 @@ namespace medulla {
 
 // Cholesky factor of a sparse symmetric positive definite matrix of 6x6 blocks, one row of blocks per sphere and one
 // block beside the diagonal per link. Order and fill are found once (minimum degree); factorising and solving allocate
-// nothing. A trees' matrix fills in nowhere.
+// nothing. A tree's matrix fills in nowhere.
 class BlockCholesky {
  public:
   // Row and column of the blocks beside the diagonal; either order, repeats add up.

@@ -1,4 +1,5 @@
 #include <Eigen/Dense>
+#include <limits>
 
 #include "physics/dynamics/stages.h"
 

@@ -71,6 +71,11 @@ struct CarriedHost {
   int first, end;  // in ImplicitData::carriedBlocks
 };
 
+// N s, N m s, about the origin.
+struct LostMomenta {
+  Eigen::Vector3d linear, angular;
+};
+
 struct ImplicitData {
   double duration = 0;  // s, of a stage
   // Constants.
@@ -111,6 +116,7 @@ struct ImplicitData {
   std::vector<double> left, enough;
   double workOfPaths = 0;          // J, that led spheres give in this stage
   std::vector<WholeMotion> whole;  // per body, at the stage's end
+  std::vector<LostMomenta> lost;   // per body, in this step
   Motion balance, kept;            // the residual without loads; the motion while a derivative is taken
   Motion motion, residual, remaining, change, direction, image, preconditioned;
   std::vector<Eigen::Vector3d> toolImpulses;  // N s, per load, of the whole step

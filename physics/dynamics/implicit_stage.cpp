@@ -5,7 +5,6 @@
 
 #include "physics/dynamics/angles.h"
 #include "physics/dynamics/contact_stages.h"
-#include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"
 
 // Backward Euler in a stage of duration T from the state (x0, q0, p0, L0): the motion u at its end obeys
@@ -166,30 +165,31 @@ bool search(WorldData& d, ImplicitData& s, const StageLoads& stage, double& left
   constexpr int kTrials = 12;
   constexpr double kFlat = 0.5;
   const double before = left, down = product(s.residual, s.change);
-  double low = 0, high = 1, slopeLow = down, slopeHigh = 0, share = 1;
+  double low = 0, high = 1, slopeLow = down, slopeHigh = 0, share = 1, gone = 0;
   const auto go = [&](double by) {
     addScaled(by, s.change, s.motion);
     place(d, s, s.duration);
     evaluateResidual(d, s, stage);
     left = residualSize(s);
   };
-  go(share);
   for (int k = 0; k < kTrials; ++k) {
+    go(share - gone);
+    gone = share;
     if (left < (1 - 1e-4 * share) * before) return true;
-    double slope = product(s.residual, s.change), to = 0.5 * share;
-    if (down < 0) {
-      if (std::abs(slope) <= -kFlat * down || (share == 1 && slope < 0)) return true;
-      if (slope < 0)
-        low = share, slopeLow = slope;
-      else  // or not finite
-        high = share, slopeHigh = slope >= 0 ? slope : std::numeric_limits<double>::infinity();
-      const double nearest = 0.1 * (high - low), secant = low - slopeLow * (high - low) / (slopeHigh - slopeLow);
-      to = std::max(low + nearest, std::min(secant, high - nearest));
+    const double slope = product(s.residual, s.change);
+    if (!(down < 0)) {
+      share *= 0.5;
+      continue;
     }
-    go(to - share);
-    share = to;
+    if (std::abs(slope) <= -kFlat * down || (share == 1 && slope < 0)) return true;
+    if (slope < 0)
+      low = share, slopeLow = slope;
+    else  // or not finite
+      high = share, slopeHigh = slope >= 0 ? slope : std::numeric_limits<double>::infinity();
+    const double nearest = 0.1 * (high - low), secant = low - slopeLow * (high - low) / (slopeHigh - slopeLow);
+    share = std::max(low + nearest, std::min(secant, high - nearest));
   }
-  go(-share);
+  go(-gone);
   return false;
 }
 

@@ -18,6 +18,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kGamma = 0.29289321881345248;  // 1 - 1/sqrt(2)
+constexpr double kGain = (1 - kGamma) / kGamma;
 
 // The present state becomes the one that the stage sets out from.
 void beginHere(const WorldData& d, StageStart& start) {
@@ -55,15 +56,15 @@ ImplicitData& dataOf(WorldData& d, const Part& part) {
 // The second stage of SDIRK2 starts from the step's initial state plus (1 - gamma) h times the velocity and the force
 // of the first stage.
 void beginSecondStage(WorldData& d, ImplicitData& s, double late) {
-  const double gain = (1 - kGamma) / kGamma;  // p1 - p0 is the force times the first stage's duration
+  // p1 - p0 is the force times the first stage's duration
   visitAngularMomenta(d, s, [&](int i, Lanes end) {
     const Lanes start = load(s.start.angularMomentum[i]);
-    store(s.start.angularMomentum[i], fma(splat(gain), end - start, start));
+    store(s.start.angularMomentum[i], fma(splat(kGain), end - start, start));
   });
   place(d, s, late);
   for (std::size_t i = 0; i < s.motion.size(); ++i) {
     const Lanes start = load(s.start.motion[i]);
-    store(s.start.motion[i], fma(splat(gain), load(s.motion[i]) - start, start));
+    store(s.start.motion[i], fma(splat(kGain), load(s.motion[i]) - start, start));
   }
   for (int i = 0; i < d.spheres.count; ++i) {
     s.start.position[i] = d.spheres.position[i];
@@ -125,31 +126,45 @@ void addToolImpulses(const WorldData& d, double time, std::vector<Vector3d>& imp
 // or with a contact that pushes in a step of two stages. The state is of no account but where it is done.
 enum class Ending { done, failed, touched };
 
-// Gives free bodies back the momenta that a stage of backward Euler loses. The sum of a body's residuals is what
-// Newton's iteration left open of its momentum. Its angular momentum shrinks besides, because the step follows
-// tangents: forces balance about the places at the step's end, x1, and the momenta p0 that they change were about x0:
-// T sum u x p0 in all, for a rigid body turning at w a rate of T w^2.
-void keepMomenta(WorldData& d, ImplicitData& s) {
-  wholeMotions(d, s.whole);
-  for (std::size_t b = 0; b < s.whole.size(); ++b) {
+// Adds up what a stage takes of free bodies' momenta. The sum of a body's residuals is what Newton's iteration left
+// open, `share` of it lasts. Its spin shrinks besides, because the stage follows tangents: forces balance about the
+// places at its end, and the momenta p0 that they change were about those at its start; for `tangents` s, the sum of u
+// x p0 of motion against the body's own mean motion. For a rigid body turning at w, a rate of T w^2.
+void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents) {
+  for (std::size_t b = 0; b < s.lost.size(); ++b) {
     const BodyRange& r = d.ranges[b];
     if (r.support.freedom != RigidFreedom::all) continue;
-    Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero();
-    const auto addLost = [&](double mass, const Vector3d& at, std::size_t quad) {
-      const Vector3d residual = vectorOf(s.residual[quad]);
-      linear -= residual;
-      angular -=
-          at.cross(residual) + s.duration * mass * vectorOf(s.motion[quad]).cross(vectorOf(s.start.motion[quad]));
+    Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero(), turning = Vector3d::Zero();
+    Vector3d start = Vector3d::Zero(), end = Vector3d::Zero();  // N s, of the whole body
+    double whole = 0;
+    const auto add = [&](double mass, const Vector3d& at, std::size_t quad) {
+      const Vector3d residual = vectorOf(s.residual[quad]), u = vectorOf(s.motion[quad]),
+                     u0 = vectorOf(s.start.motion[quad]);
+      linear += residual;
+      angular += at.cross(residual);
+      turning += mass * u.cross(u0);
+      start += mass * u0;
+      end += mass * u;
+      whole += mass;
     };
     for (const int i : spheresOf(r)) {
-      addLost(d.spheres.groups[i / 4].mass[i % 4], vectorOf(d.spheres.position[i]), 2 * i);
-      angular -= vectorOf(s.residual[2 * i + 1]);
+      add(d.spheres.groups[i / 4].mass[i % 4], vectorOf(d.spheres.position[i]), 2 * i);
+      angular += vectorOf(s.residual[2 * i + 1]);
     }
     for (const int i : r.node)
       if (i < d.nodes.dynamicEnd)
-        addLost(d.nodes.mass[i], vectorAt(d.nodes.position, i), 2 * static_cast<std::size_t>(d.spheres.count) + i);
-    addMomenta(d, static_cast<int>(b), s.whole[b], linear, angular);
+        add(d.nodes.mass[i], vectorAt(d.nodes.position, i), 2 * static_cast<std::size_t>(d.spheres.count) + i);
+    s.lost[b].linear += share * linear;
+    s.lost[b].angular += share * angular + tangents * (turning - end.cross(start) / whole);
   }
+}
+
+// Gives that back.
+void keepMomenta(WorldData& d, ImplicitData& s) {
+  wholeMotions(d, s.whole);
+  for (std::size_t b = 0; b < s.whole.size(); ++b)
+    if (d.ranges[b].support.freedom == RigidFreedom::all)
+      addMomenta(d, static_cast<int>(b), s.whole[b], -s.lost[b].linear, -s.lost[b].angular);
 }
 
 struct StepEnergy {
@@ -181,6 +196,7 @@ Ending attempt(WorldData& d, ImplicitData& s, std::size_t halvings, const Loads&
   constexpr std::size_t kMustSettle = 2;
   const double late = d.substep - s.duration;  // 0 in one stage
   s.start = s.before;
+  s.lost.assign(d.ranges.size(), {Vector3d::Zero(), Vector3d::Zero()});
   s.toolImpulses.assign(d.loadForces.size(), Vector3d::Zero());
   const auto solve = [&](const StepTime& end, double lasting) {
     const bool settled = solveStage(d, s, {&loads, end});
@@ -192,12 +208,15 @@ Ending attempt(WorldData& d, ImplicitData& s, std::size_t halvings, const Loads&
   if (late > 0) {
     const Ending first = solve({time.end - late, time.remaining + late}, late);
     if (first != Ending::done) return first;
+    // Of p0 + k (p1 - p0), k = (1 - g) / g, at x0 + (1 - g) h u; forces balance about x0 + g h u.
+    noteLost(d, s, kGain, late * (2 - kGain));
     beginSecondStage(d, s, late);
   }
   const Ending last = solve(time, s.duration);
   if (last != Ending::done) return last;
   visitAngularMomenta(d, s, [&](int i, Lanes momentum) { store(d.spheres.angularMomentum[i], momentum); });
-  if (late == 0 && kineticEnergy(d, s) > restEnergy(s)) keepMomenta(d, s);
+  noteLost(d, s, 1, s.duration);
+  if (kineticEnergy(d, s) > restEnergy(s)) keepMomenta(d, s);
   return checkEnergy(d, s, late > 0, before);
 }
 

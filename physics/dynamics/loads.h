@@ -41,11 +41,11 @@ struct ToolSpring {
 struct HeldNode {
   int tool = 0;
   int body = 0;
-  int node = 0;
-  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();
-  Eigen::Vector3d anchorVelocity = Eigen::Vector3d::Zero();
-  double stiffness = 0;
-  double damping = 0;
+  int node = 0;                                               // of the body's model
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();           // m, at the frame's end
+  Eigen::Vector3d anchorVelocity = Eigen::Vector3d::Zero();   // m/s
+  double stiffness = 0;                                       // N/m
+  double damping = 0;                                         // N s/m
   double forceMax = std::numeric_limits<double>::infinity();  // N
 };
 

@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 #include "physics/dynamics/identified_mechanics.h"
