@@ -168,6 +168,24 @@ TEST(ImplicitContact, ABallRollsDownAsFastAsItShould) {
   EXPECT_NEAR(placeOf(world, 0).x(), 0.5 * kGravity * std::sin(slope) / 1.4, 0.02);
 }
 
+static Vector3d spinOf(const World& world) {
+  return vectorOf(world.data().spheres.angularVelocity[0]);
+}
+
+// Contact and gravity act through the centre: nothing turns, whichever way the velocity does.
+TEST(ImplicitContact, AnObliqueFallDoesNotSpin) {
+  for (const int order : {1, 2}) {
+    World world(contactSettings(order), {synthetic::ball("ball", 0.02, {0, 0.12, 0}, 0)}, {floorOf(0)});
+    throwBody(world, 0, {0.4, 0.3, 0});
+    runUntil(world, 0.12);
+    EXPECT_LT(spinOf(world).norm(), 1e-6) << "flying, order " << order;
+    EXPECT_NEAR(vectorOf(world.data().spheres.velocity[0]).x(), 0.4, 1e-9) << "flying, order " << order;
+    runUntil(world, 0.5);
+    EXPECT_LT(spinOf(world).norm(), 1e-3) << "landed, order " << order;
+    EXPECT_NEAR(vectorOf(world.data().spheres.velocity[0]).x(), 0.4, 1e-6) << "landed, order " << order;
+  }
+}
+
 // A contact is stiffer than the tissue behind it, however light the sphere and long the step: 0.4 kg on 3 g each.
 TEST(ImplicitContact, LightBodiesBearAHeavyOne) {
   std::vector<BodyDescription> bodies{raft("light", {0, kRadius, 0}, 0.5), raft("heavy", {0, 3 * kRadius, 0}, 0.5)};

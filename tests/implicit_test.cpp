@@ -291,13 +291,8 @@ TEST_P(ImplicitLinks, AFreeBodyKeepsItsMomentum) {
   EXPECT_LT((after.angular - before.angular).norm(), 1e-3 * before.angularScale);
 }
 
-// What tangents of a turning body and Newton's last residual lose is given back: stiff tissue spins on as a rigid body.
-TEST(Implicit, StiffTissueSpinsOn) {
-  BodyDescription body = tube(SurfaceMode::full, false);
-  body.tissue.young = 1e7;
-  World world(implicitly(0.005), {body});
+static void spin(World& world, const Vector3d& velocity, const Vector3d& spin) {
   WorldData& d = world.data();
-  const Vector3d spin(3, 8, 5), velocity(0.1, 0, 0);
   for (int i = 0; i < d.spheres.count; ++i) {
     d.spheres.velocity[i] = quadOf(velocity + spin.cross(vectorOf(d.spheres.position[i])));
     d.spheres.angularMomentum[i] = quadOf(inertia(d, i) * spin);
@@ -305,11 +300,25 @@ TEST(Implicit, StiffTissueSpinsOn) {
   refreshAngularVelocities(d);
   for (int i = 0; i < d.nodes.dynamicEnd; ++i)
     setVector(d.nodes.velocity, i, velocity + spin.cross(vectorAt(d.nodes.position, i)));
-  const Momentum before = momentum(d);
-  run(world, 1);
-  const Momentum after = momentum(d);
-  EXPECT_LT((after.linear - before.linear).norm(), 5e-3 * before.linear.norm());
-  EXPECT_LT((after.angular - before.angular).norm(), 0.01 * before.angular.norm());
+}
+
+// What tangents of a turning body and Newton's last residual lose is given back: stiff tissue spins on as a rigid body.
+// By a twentieth of a radian in a step and by a quarter. Each node on its own tangent a stiff body lies far from its
+// shape then, and a thousandth of that residual is more than all that acts on it.
+TEST(Implicit, StiffTissueSpinsOn) {
+  for (const int order : {1, 2}) {
+    for (const double speed : {1.0, 5.0}) {
+      BodyDescription body = tube(SurfaceMode::full, false);
+      body.tissue.young = 1e7;
+      World world(implicitly(0.005, order), {body});
+      spin(world, {0.1, 0, 0}, speed * Vector3d(3, 8, 5));
+      const Momentum before = momentum(world.data());
+      run(world, 1);
+      const Momentum after = momentum(world.data());
+      EXPECT_LT((after.linear - before.linear).norm(), 5e-3 * before.linear.norm()) << order << ", " << speed;
+      EXPECT_LT((after.angular - before.angular).norm(), 0.01 * before.angular.norm()) << order << ", " << speed;
+    }
+  }
 }
 
 TEST(Implicit, ATurnedAndMovedWorldIsTheSameWorld) {

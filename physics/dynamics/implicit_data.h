@@ -114,7 +114,10 @@ struct ImplicitData {
   // J, per body: twice the energy of the motion that its residual would give its free masses, and what is little
   // enough.
   std::vector<double> left, enough;
-  double workOfPaths = 0;          // J, that led spheres give in this stage
+  std::vector<double> turning;  // J^1/2, per free body: root of twice its energy of turning, times the angle; 0: slow
+  double chordEnergy = 0;       // J: of velocities across the tangents, because free bodies turn
+  double elasticBefore = 0;     // J, where the step begins
+  double workOfPaths = 0;       // J, that led spheres give in this stage
   std::vector<WholeMotion> whole;  // per body, at the stage's end
   std::vector<LostMomenta> lost;   // per body, in this step
   Motion balance, kept;            // the residual without loads; the motion while a derivative is taken

@@ -1,3 +1,4 @@
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -6,6 +7,7 @@
 #include "physics/dynamics/angles.h"
 #include "physics/dynamics/contact_stages.h"
 #include "physics/dynamics/implicit_stages.h"
+#include "physics/dynamics/whole_motion.h"
 
 // Backward Euler in a stage of duration T from the state (x0, q0, p0, L0): the motion u at its end obeys
 //   M u - p0 = T f(x0 + T u, u),   I(q) w - L0 = T tau,   q = exp(T w) q0,
@@ -98,20 +100,25 @@ void balanceForces(WorldData& d, const ImplicitData& s, Motion& out) {
   }
 }
 
-// J: twice the energy of the motion that the residual would give each body's free masses.
-void measureResidual(const WorldData& d, ImplicitData& s) {
-  s.left.assign(d.ranges.size(), 0);
-  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
-    for (const int i : spheresOf(d.ranges[b])) {
-      const SphereGroup& g = d.spheres.groups[i / 4];
-      const Lanes* e = g.inverseInertia;
-      s.left[b] += g.inverseMass[i % 4] * vectorOf(s.residual[2 * i]).squaredNorm() +
-                   (e[0][i % 4] + e[1][i % 4] + e[2][i % 4]) / 3 * vectorOf(s.residual[2 * i + 1]).squaredNorm();
-    }
-    for (const int i : d.ranges[b].node)
-      if (i < d.nodes.dynamicEnd)
-        s.left[b] += d.nodes.inverseMass[i] * vectorOf(s.residual[2 * d.spheres.count + i]).squaredNorm();
+// J: twice the energy of the motion that the impulses `at` a body's quads would give its free masses.
+template <class Impulse>
+double impulseEnergy(const WorldData& d, const BodyRange& range, const Impulse& at) {
+  double sum = 0;
+  for (const int i : spheresOf(range)) {
+    const SphereGroup& g = d.spheres.groups[i / 4];
+    const Lanes* e = g.inverseInertia;
+    sum += g.inverseMass[i % 4] * at(2 * i).squaredNorm() +
+           (e[0][i % 4] + e[1][i % 4] + e[2][i % 4]) / 3 * at(2 * i + 1).squaredNorm();
   }
+  for (const int i : range.node)
+    if (i < d.nodes.dynamicEnd) sum += d.nodes.inverseMass[i] * at(2 * d.spheres.count + i).squaredNorm();
+  return sum;
+}
+
+void measureResidual(const WorldData& d, ImplicitData& s) {
+  s.left.resize(d.ranges.size());
+  for (std::size_t b = 0; b < d.ranges.size(); ++b)
+    s.left[b] = impulseEnergy(d, d.ranges[b], [&](int quad) { return vectorOf(s.residual[quad]); });
 }
 
 // 1 where the bodies' residuals together are small enough, each against its own measure: a light body beside a heavy
@@ -158,6 +165,49 @@ void leadDriven(WorldData& d, ImplicitData& s, double end) {
   for (const SphereDrive& drive : d.drives) s.motion[2 * drive.sphere] = d.spheres.velocity[drive.sphere];
 }
 
+// A body that turns goes on along arcs. To turn by R in the stage its velocity at r has to be (R - 1) r / T, not w x r;
+// and what it has of the stage before, of (1 - R^-1) r / T - w x r, is over. Guessed from the velocities alone a stiff
+// body would be stretched by its turning, and a thousandth of such a residual is more than all that acts on it.
+void followArcs(WorldData& d, ImplicitData& s) {
+  place(d, s, 0);
+  d.spheres.angularMomentum = s.start.angularMomentum;
+  wholeMotions(d, s.whole);
+  s.turning.assign(s.whole.size(), 0);
+  s.chordEnergy = 0;
+  for (std::size_t b = 0; b < s.whole.size(); ++b) {
+    const BodyRange& range = d.ranges[b];
+    if (range.support.freedom != RigidFreedom::all) continue;
+    const RigidMotion motion = rigidMotionOf(s.whole[b]);
+    const double angle = s.duration * motion.spin.norm();
+    if (!(angle > 1e-6)) continue;
+    s.turning[b] = angle * std::sqrt(std::max(0.0, motion.spin.dot(spinMomentum(s.whole[b]))));
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, motion.spin.normalized()).toRotationMatrix();
+    const auto bend = [&](const Eigen::Matrix3d& by, const Vector3d& x) {  // (by - 1) r / T less w x r
+      const Vector3d r = x - motion.centre;
+      return Vector3d((by * r - r) / s.duration - motion.spin.cross(r));
+    };
+    const auto visit = [&](const auto& act) {
+      for (const int i : spheresOf(range))
+        act(d.spheres.groups[i / 4].mass[i % 4], vectorOf(d.spheres.position[i]), s.motion[2 * i]);
+      for (const int i : range.node)
+        if (i < d.nodes.dynamicEnd)
+          act(d.nodes.mass[i], vectorAt(d.nodes.position, i), s.motion[2 * d.spheres.count + i]);
+    };
+    const Eigen::Matrix3d back = 2 * Eigen::Matrix3d::Identity() - turn.transpose();
+    double had = 0, size = 0;
+    visit([&](double mass, const Vector3d& x, const Quad& velocity) {
+      const Vector3d before = bend(back, x);
+      had += mass * before.dot(vectorOf(velocity) - velocityAt(motion, x));
+      size += mass * before.squaredNorm();
+    });
+    const double share = size > 0 ? std::min(1.0, std::max(0.0, had / size)) : 0;
+    s.chordEnergy += 0.5 * size;
+    visit([&](double, const Vector3d& x, Quad& velocity) {
+      velocity = quadOf(vectorOf(velocity) + bend(turn, x) - share * bend(back, x));
+    });
+  }
+}
+
 // Goes along s.change until the residual is smaller, or the slope along the change, its product with the residual, half
 // as steep at most (Matthies and Strang 1979): contacts that open, close and slide make residuals that are not yet
 // smaller on the best way there is. `left` becomes the residual's size; false: nothing was found, and all stays.
@@ -165,16 +215,17 @@ bool search(WorldData& d, ImplicitData& s, const StageLoads& stage, double& left
   constexpr int kTrials = 12;
   constexpr double kFlat = 0.5;
   const double before = left, down = product(s.residual, s.change);
-  double low = 0, high = 1, slopeLow = down, slopeHigh = 0, share = 1, gone = 0;
-  const auto go = [&](double by) {
-    addScaled(by, s.change, s.motion);
+  double low = 0, high = 1, slopeLow = down, slopeHigh = 0, share = 1;
+  s.kept = s.motion;
+  const auto go = [&](double share) {
+    s.motion = s.kept;
+    addScaled(share, s.change, s.motion);
     place(d, s, s.duration);
     evaluateResidual(d, s, stage);
     left = residualSize(s);
   };
   for (int k = 0; k < kTrials; ++k) {
-    go(share - gone);
-    gone = share;
+    go(share);
     if (left < (1 - 1e-4 * share) * before) return true;
     const double slope = product(s.residual, s.change);
     if (!(down < 0)) {
@@ -189,8 +240,8 @@ bool search(WorldData& d, ImplicitData& s, const StageLoads& stage, double& left
     const double nearest = 0.1 * (high - low), secant = low - slopeLow * (high - low) / (slopeHigh - slopeLow);
     share = std::max(low + nearest, std::min(secant, high - nearest));
   }
-  go(-gone);
-  return false;
+  go(low);  // 0, or short of a kink
+  return low > 0;
 }
 
 // Rounding stops some iterations of very stiff bodies just short of what is enough: within this.
@@ -212,11 +263,20 @@ double restEnergy(const ImplicitData& s) {
 
 namespace {
 
-// From the bodies' residuals where the stage begins: `share` of them.
-void setEnough(ImplicitData& s, double share) {
+// From the bodies' residuals where the stage begins: `share` of them. What turns freely may begin far from its own
+// stiff shape, though nothing much acts on it: of such a body, `share` of what does, of its turning and of its strain.
+void setEnough(const WorldData& d, ImplicitData& s, double share) {
   s.enough.resize(s.left.size());
   for (std::size_t b = 0; b < s.left.size(); ++b) {
-    const double enough = share * std::sqrt(s.left[b]) + leastResidual(s) * std::sqrt(s.bodyMass[b]);
+    const double least = leastResidual(s) * std::sqrt(s.bodyMass[b]);
+    double size = std::sqrt(s.left[b]);
+    if (s.turning[b] > 0) {
+      const double external = impulseEnergy(
+          d, d.ranges[b], [&](int quad) { return Vector3d(vectorOf(s.residual[quad]) - vectorOf(s.balance[quad])); });
+      const double weight = s.duration * vectorOf(d.gravity).norm() * std::sqrt(s.bodyMass[b]);
+      size = std::min(size, std::sqrt(external) + weight + s.turning[b] + std::sqrt(2 * s.elasticBefore));
+    }
+    const double enough = share * size + least;
     s.enough[b] = enough * enough;
   }
 }
@@ -233,10 +293,11 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   }
   s.motion = s.start.motion;
   s.dragsBefore.clear();
+  followArcs(d, s);
   leadDriven(d, s, stage.time.end);
   place(d, s, s.duration);
   evaluateResidual(d, s, stage);
-  setEnough(s, share);
+  setEnough(d, s, share);
   double left = residualSize(s);
   Operator derivative = differentiate;
   bool hasMoved = true;  // so far that the matrix of before is no longer close

@@ -45,19 +45,26 @@ void wholeMotions(const WorldData& d, std::vector<WholeMotion>& out) {
   }
 }
 
+RigidMotion rigidMotionOf(const WholeMotion& whole) {
+  const Vector3d centre = whole.moment / whole.mass;
+  const Matrix3d inertia = whole.inertia - whole.mass * inertiaAt(centre);
+  return {centre, whole.linear / whole.mass, inertia.inverse() * spinMomentum(whole)};
+}
+
 void addMomenta(WorldData& d, int body, const WholeMotion& now, const Vector3d& linear, const Vector3d& angular) {
-  const Vector3d centre = now.moment / now.mass, velocity = linear / now.mass;
-  const Matrix3d inertia = now.inertia - now.mass * inertiaAt(centre);
-  const Vector3d spin = inertia.inverse() * (angular - centre.cross(linear));
-  const auto at = [&](const Vector3d& x) { return Vector3d(velocity + spin.cross(x - centre)); };
+  WholeMotion added = now;
+  added.linear = linear;
+  added.angular = angular;
+  const RigidMotion motion = rigidMotionOf(added);
+  const Vector3d& spin = motion.spin;
   const BodyRange& r = d.ranges[body];
   for (const int i : spheresOf(r)) {
-    addTo(d.spheres.velocity[i], load(quadOf(at(vectorOf(d.spheres.position[i])))));
+    addTo(d.spheres.velocity[i], load(quadOf(velocityAt(motion, vectorOf(d.spheres.position[i])))));
     d.spheres.angularVelocity[i] = quadOf(vectorOf(d.spheres.angularVelocity[i]) + spin);
     d.spheres.angularMomentum[i] = quadOf(vectorOf(d.spheres.angularMomentum[i]) + inertiaOf(d, i) * spin);
   }
   for (const int i : r.node)
-    setVector(d.nodes.velocity, i, vectorAt(d.nodes.velocity, i) + at(vectorAt(d.nodes.position, i)));
+    setVector(d.nodes.velocity, i, vectorAt(d.nodes.velocity, i) + velocityAt(motion, vectorAt(d.nodes.position, i)));
 }
 
 }  // namespace medulla

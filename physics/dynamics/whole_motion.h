@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <vector>
 
 #include "physics/dynamics/world_data.h"
@@ -20,6 +20,19 @@ struct WholeMotion {
                   angular = Eigen::Vector3d::Zero();  // kg m, N s, N m s
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // kg m2
 };
+
+struct RigidMotion {
+  Eigen::Vector3d centre, velocity, spin;  // m, m/s, rad/s
+};
+// The rigid motion of these momenta; not finite where there is no mass or no inertia.
+RigidMotion rigidMotionOf(const WholeMotion& whole);
+// N m s, about its own centre.
+inline Eigen::Vector3d spinMomentum(const WholeMotion& whole) {
+  return whole.angular - whole.moment.cross(whole.linear) / whole.mass;
+}
+inline Eigen::Vector3d velocityAt(const RigidMotion& m, const Eigen::Vector3d& x) {
+  return m.velocity + m.spin.cross(x - m.centre);
+}
 
 // Of spheres and of the nodes that move by WorldData::awake.
 void wholeMotions(const WorldData& d, std::vector<WholeMotion>& out);
