@@ -66,8 +66,10 @@ std::optional<std::string> runGnuplot(const std::string& script) {
   if (failure == ENOENT) return std::nullopt;
   if (failure != 0) throw std::runtime_error(std::string("gnuplot cannot be started: ") + std::strerror(failure));
   int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
+  pid_t ended = -1;
+  do ended = waitpid(child, &status, 0);
+  while (ended < 0 && errno == EINTR);
+  if (ended != child) throw std::runtime_error(std::string("gnuplot's end cannot be seen: ") + std::strerror(errno));
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return picture.text();
   std::string complaint = complaints.text();
   while (!complaint.empty() && (complaint.back() == '\n' || complaint.back() == ' ')) complaint.pop_back();
