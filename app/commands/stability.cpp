@@ -102,7 +102,9 @@ class TrialRunner {
     });
     p.point.survived = outcome.survived;
     p.point.recoveredAt = outcome.recoveredAt;
-    p.point.energyRatio = outcome.largestEnergy / outcome.startEnergy;
+    // Equal where both are 0, too, as nothing that could move is free.
+    p.point.energyRatio =
+        outcome.largestEnergy == outcome.startEnergy ? 1 : outcome.largestEnergy / outcome.startEnergy;
     const std::lock_guard lock(mutex_);
     journal_.add(p.point);
     done_ += p.steps - steps;

@@ -13,7 +13,7 @@ struct StabilityPoint {
   double young = 0;           // Pa
   bool survived = false;
   std::optional<double> recoveredAt;  // s
-  double energyRatio = 0;             // largest over that at the start
+  double energyRatio = 0;             // largest over that at the start, 1 where both are 0
 };
 
 // What an explicit step may be at most, by theory.
