@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 // What a golden image says of itself besides its scene: what it was rendered with, which decides the tier of the gate;
 // and hashes of the state, of the bodies and behind a blank of the tools as they are shown, which tell drift of physics
-// and haptics from drift of the pixels. Older images have the scene alone.
+// and haptics from drift of the pixels.
 constexpr const char* kRendererKey = "medulla:renderer";
 constexpr const char* kProcessorKey = "medulla:processor";
 constexpr const char* kStateKey = "medulla:state";
@@ -52,10 +52,8 @@ std::string toolsHash(const PictureState& state) {
 
 // What differs from the stored text; empty: nothing.
 std::string stateChange(const std::string& stored, const Moment& moment) {
-  const std::size_t blank = stored.find(' ');
-  if (stored.substr(0, blank) != moment.bodies) return "state differs";
-  if (blank != std::string::npos && stored.substr(blank + 1) != moment.tools) return "state of the tools differs";
-  return "";
+  if (!stored.starts_with(moment.bodies + " ")) return "state differs";
+  return stored == moment.state() ? "" : "state of the tools differs";
 }
 
 std::string processorName() {
