@@ -17,7 +17,7 @@ struct DepthMap {
   void rasterize(glm::vec3 a, glm::vec3 b, glm::vec3 c);
   float at(int x, int y) const { return depth[std::size_t(y) * stride + x]; }
 
-  int side, stride;          // side + kPadding
+  int side, stride;          // texels; stride: side + kPadding
   std::vector<float> depth;  // stride * side
 };
 

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 struct ChartMethod {
   std::string name;
   std::vector<SceneOverride> overrides;
-  bool anyModel = true;  // has it
+  bool needsIdentified = false;  // a network in the model
 };
 const std::vector<ChartMethod>& chartMethods() {
   // Each says all that it is named after, so that it is that in any scene.
@@ -39,7 +39,7 @@ const std::vector<ChartMethod>& chartMethods() {
       {"springs", {kExplicit, kFirstOrder, {"body.*.links", "springs"}}},
       {"implicit", {kImplicit, kFirstOrder}},
       {"implicit_2", {kImplicit, {"dynamics.order", "2"}}},
-      {"identified", {kExplicit, kFirstOrder, {"body.*.links", "identified"}}, false},
+      {"identified", {kExplicit, kFirstOrder, {"body.*.links", "identified"}}, true},
   };
   return methods;
 }
@@ -320,7 +320,7 @@ std::vector<std::string> chartMethodNames() {
 std::vector<std::string> chartMethodsOfAnyModel() {
   std::vector<std::string> out;
   for (const ChartMethod& method : chartMethods())
-    if (method.anyModel) out.push_back(method.name);
+    if (!method.needsIdentified) out.push_back(method.name);
   return out;
 }
 

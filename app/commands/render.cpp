@@ -16,7 +16,7 @@ namespace medulla {
 
 namespace {
 
-void applyOverrides(const RenderOptions& options, Scene& scene) {
+void applyPictureOptions(const RenderOptions& options, Scene& scene) {
   if (options.size) {
     std::tie(scene.width, scene.height) = *options.size;
     const bool video = !options.still && std::any_of(options.outputs.begin(), options.outputs.end(), isVideoName);
@@ -178,7 +178,7 @@ int runRender(const RenderOptions& options) {
   Timings timings;
   timings.stages.start("start");
   LoadedScene loaded = loadRun(options.run);
-  applyOverrides(options, loaded.scene);
+  applyPictureOptions(options, loaded.scene);
   const Wanted wanted = wantedOf(options, loaded.scene);
   requireDistinctOutputs(loaded, options.run, options.outputs);
   requireDistinctFiles(options.outputs, {options.cacheToRead});

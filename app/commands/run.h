@@ -13,7 +13,7 @@
 #include "app/simulation.h"
 #include "render/stage_times.h"
 
-// What `replay` and `render` share: a scene run to its end in logical time, with its log and surface files.
+// What the verbs that run a scene share: that scene with its options, run to its end with log and surface files.
 namespace medulla {
 
 struct SurfaceRequest {

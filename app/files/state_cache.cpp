@@ -45,7 +45,7 @@ class Taker {
   static constexpr bool reads = true;
   explicit Taker(std::string_view bytes) : bytes_(bytes) {}
   std::size_t left() const { return bytes_.size(); }
-  // Once the bytes are over: zeros, and short() says so.
+  // Once the bytes are over: zeros, and ranShort() says so.
   template <typename T>
   void raw(T& value) {
     static_assert(std::is_trivially_copyable_v<T>);

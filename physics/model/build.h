@@ -20,7 +20,7 @@ constexpr int kSpheresMax = 2000;  // the choice of balls needs spheres^2 memory
 
 struct BuildSettings {
   BuildMethod method = BuildMethod::cover;
-  int spheres = 7;  // 1..spheresMax; cover only: the skeleton's node count follows from the mesh
+  int spheres = 7;  // 1..kSpheresMax; cover only: the skeleton's node count follows from the mesh
   double gap = 0;   // % of the diagonal; if > 0, cover takes the fewest spheres that leave no larger gap, not `spheres`
   // % of the diagonal, 0..5; cover only: how far balls may stick out of the surface. More fills more, and bodies touch
   // by so much too early instead of sinking in by the gap. Without a value: overshootOf.
