@@ -7,7 +7,8 @@
 
 namespace medulla {
 
-void fadePatch(double factor, ContactPatch& patch) {
+// Pushes so far count `factor` (0 to 1) times as much.
+static void fade(double factor, ContactPatch& patch) {
   // Of the largest share: a spring that is not worth its time, unless it has just begun: frames as short as a tick add
   // less to it than that.
   constexpr double least = 0.02;
@@ -42,7 +43,7 @@ void fadePatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, 
     entry.weights *= rest;
     entry.share *= rest;
   }
-  fadePatch(std::exp(-fading), patch);
+  fade(std::exp(-fading), patch);
 }
 
 void addContacts(const Proxy& proxy, double push, ContactPatch& patch) {

@@ -25,13 +25,11 @@ struct ContactPatch {
 
 constexpr int kContactPatchCapacity = 64;  // triangles; beyond, a new one takes the place of the least share
 
-// Begins a frame: pushes of those before count `factor` (0 to 1) times as much, and nothing after a frame without any.
-void fadePatch(double factor, ContactPatch& patch);
-
-// By what the device went, `way` (m), in the frame that ended, of `duration` (s). A proxy presses on three triangles at
-// most, while the dent of a tool that is wide against the mesh has many: their shares are learnt over many frames, as
-// a mean that converges like 1 / frames. A tool that moves forgets within 50 ms, one that holds still within a second.
-// What has come off the proxy, as by tissue that slides along under a still tool, is forgotten within 50 ms, too.
+// Begins a frame: pushes of those before count less, and nothing after a frame without any. By what the device went,
+// `way` (m), in the frame that ended, of `duration` (s). A proxy presses on three triangles at most, while the dent of
+// a tool that is wide against the mesh has many: their shares are learnt over many frames, as a mean that converges
+// like 1 / frames. A tool that moves forgets within 50 ms, one that holds still within a second. What has come off the
+// proxy, as by tissue that slides along under a still tool, is forgotten within 50 ms, too.
 void fadePatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius, double way,
                double duration, ContactPatch& patch);
 

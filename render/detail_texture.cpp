@@ -49,7 +49,6 @@ class VesselPainter {
   VesselPainter(const DetailPattern& pattern, int seed)
       : side_(pattern.side),
         unit_(float(pattern.side) / 512),
-        bend_(pattern.vesselBend),
         random_(seed),
         opacity_(std::size_t(side_) * side_, 0.f),
         owner_(opacity_.size(), 0) {
@@ -79,6 +78,7 @@ class VesselPainter {
 
  private:
   static constexpr float kPi = 3.14159265f;
+  static constexpr float kBend = 0.4f;  // rad, how far vessels wind about their heading
   struct Tip {
     float x = 0, y = 0, heading = 0, width = 0;  // texels, rad
     float phase = 0;                             // of the winding
@@ -110,7 +110,7 @@ class VesselPainter {
     const float thick = t.width / unit_;
     const int length = int((22 + 34 * random_.next()) * unit_ * (0.45f + 0.5f * thick));
     // Thin vessels wind more, and in shorter waves.
-    const float amplitude = bend_ * 1.25f / (0.7f + 0.4f * thick), wave = (26 + 16 * thick) * unit_;
+    const float amplitude = kBend * 1.25f / (0.7f + 0.4f * thick), wave = (26 + 16 * thick) * unit_;
     float drift = 0;
     for (int s = 0; s < length; ++s) {
       drift += -0.05f * drift + (random_.next() - 0.5f) * 0.09f;
@@ -175,7 +175,6 @@ class VesselPainter {
   static constexpr float kThinnest = 0.3f, kClearance = 3.5f;  // texels of a 512 tile
   int side_;
   float unit_;  // texels per texel of a 512 tile
-  float bend_;
   RandomFloats random_;
   std::vector<float> opacity_;
   std::vector<std::uint16_t> owner_;  // 0: free

@@ -38,7 +38,6 @@ struct DetailPattern {
   int cells = 0;            // lobules along a tile's side
   float cellContrast = 0;   // 0..1, share of the mottling they make
   float cellRelief = 0;     // 0..1, how far they bulge
-  float vesselBend = 0.4f;  // rad, how far vessels wind about their heading
   int grain = 0;            // wood: fibres and growth rings along u, so many times longer than wide; 0: neither
 };
 

@@ -251,7 +251,7 @@ Renderer::Renderer(const RendererSettings& settings) {
 Renderer::~Renderer() = default;
 Renderer::Renderer(Renderer&&) noexcept = default;
 
-int Renderer::addSurface(SurfaceShape shape) {
+void Renderer::addSurface(SurfaceShape shape) {
   SceneMesh& m = data_->rest;
   MeshPart part;
   part.look = &findLook(shape.look);
@@ -269,7 +269,6 @@ int Renderer::addSurface(SurfaceShape shape) {
     }
   m.parts.push_back(part);
   data_->baked = false;
-  return int(m.parts.size()) - 1;
 }
 
 // Edges are smoothed as drawn; the lens's halo and rim are as wide in a picture whatever its quality.

@@ -135,7 +135,7 @@ class Renderer {
   explicit Renderer(const RendererSettings& settings);  // throws std::runtime_error when no context can be made
   ~Renderer();
   Renderer(Renderer&&) noexcept;
-  int addSurface(SurfaceShape shape);  // throws std::runtime_error on an unknown look, naming the known ones
+  void addSurface(SurfaceShape shape);  // throws std::runtime_error on an unknown look, naming the known ones
   void render(const Picture& picture, Image& out, StageTimes* times = nullptr);  // adds to `times`, if given
   // The same in two steps: OpenGL's threads fill one picture while the next is placed and lit. begin() may be one
   // picture ahead of take(), which gives the pictures in their order.

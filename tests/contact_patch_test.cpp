@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 namespace medulla {
 
@@ -15,12 +16,28 @@ static Proxy touching(int triangle) {
   return proxy;
 }
 
+// So many triangles in one place.
+static BlendedSurface pile(int triangles) {
+  BlendedSurface surface;
+  surface.triangles.assign(triangles, {0, 1, 2});
+  surface.from = surface.to = {{0, 0, 0}, {0.004, 0, 0}, {0, 0.004, 0}};
+  return surface;
+}
+
+// A still tool, on all that it has touched or `away` (m) from it; a second forgets all but 1/e of what it touches.
+static void fade(double duration, ContactPatch& patch, double away = 0) {
+  static const BlendedSurface surface = pile(2 * kContactPatchCapacity + 1);
+  Proxy proxy;
+  proxy.centre = pointAt(surface.triangle(0, 0), {0.5, 0.25, 0.25}) + Eigen::Vector3d(0, 0, away);
+  fadePatch(surface, 0, proxy, 0.005, 0, duration, patch);
+}
+
 TEST(ContactPatch, WhatIsTouchedNowCountsHoweverManyTrianglesWereBefore) {
   ContactPatch patch;
   patch.entries.reserve(kContactPatchCapacity);
   const int last = 2 * kContactPatchCapacity;
   for (int triangle = 0; triangle <= last; ++triangle) {
-    fadePatch(0.99, patch);
+    fade(0.01, patch);
     addContacts(touching(triangle), 1, patch);
   }
   ASSERT_EQ(patch.entries.size(), kContactPatchCapacity);
@@ -38,20 +55,27 @@ TEST(ContactPatch, WhatIsTouchedNowCountsHoweverManyTrianglesWereBefore) {
 TEST(ContactPatch, FadesAndIsGoneAfterAFrameWithoutTouch) {
   ContactPatch patch;
   addContacts(touching(7), 2, patch);
-  fadePatch(0.5, patch);
+  fade(std::numbers::ln2, patch);
   ASSERT_EQ(patch.entries.size(), 1U);
   EXPECT_DOUBLE_EQ(patch.entries[0].share, 1);
   EXPECT_DOUBLE_EQ(patch.total, 1);
-  fadePatch(0.5, patch);
+  fade(std::numbers::ln2, patch);
   EXPECT_TRUE(patch.entries.empty());
   EXPECT_DOUBLE_EQ(patch.total, 0);
+}
+
+TEST(ContactPatch, WhatHasComeOffTheProxyIsForgottenTwentyTimesAsFast) {
+  ContactPatch patch;
+  addContacts(touching(7), 1, patch);
+  fade(0.01, patch, 0.001);
+  EXPECT_NEAR(patch.total, std::exp(-0.2), 1e-12);
 }
 
 // A frame as short as a tick adds little to what a second of them has.
 TEST(ContactPatch, WhatBeginsGrowsToItsShareHoweverShortTheFrames) {
   ContactPatch patch;
   for (int frame = 0; frame < 1200; ++frame) {
-    fadePatch(std::exp(-1.0 / 60), patch);
+    fade(1.0 / 60, patch);
     addContacts(touching(1), 1, patch);
     if (frame >= 600) addContacts(touching(2), 1, patch);
   }
