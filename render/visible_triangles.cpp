@@ -1,7 +1,6 @@
 #include "render/visible_triangles.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 
 namespace medulla {

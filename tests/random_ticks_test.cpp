@@ -1,5 +1,4 @@
 #include <cstdlib>
-#include <string>
 
 #include "tests/proxy_run.h"
 

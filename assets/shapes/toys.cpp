@@ -1,6 +1,5 @@
 #include "assets/shapes/toys.h"
 
-#include <algorithm>
 #include <array>
 
 #include "assets/shapes/sdf.h"

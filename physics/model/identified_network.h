@@ -2,8 +2,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
-#include <optional>
 #include <string>
 #include <vector>
 

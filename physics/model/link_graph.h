@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "physics/model/power_cells.h"
-#include "physics/model/soft_body_model.h"
 #include "physics/model/surface_queries.h"
 
 namespace medulla {

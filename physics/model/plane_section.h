@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <utility>
-#include <vector>
 
 #include "physics/model/power_cells.h"
 #include "physics/model/triangle_mesh.h"

@@ -2,7 +2,6 @@
 #include <cstdint>
 #include <cstdlib>
 #include <stdexcept>
-#include <string_view>
 
 #include "app/files/trajectory_file.h"
 

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <atomic>
-#include <functional>
 #include <future>
 #include <stdexcept>
 
