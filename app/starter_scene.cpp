@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "physics/dynamics/rest_modes.h"
+#include "physics/model/mesh_topology.h"
 #include "physics/model/rotation_between.h"
 #include "physics/model/surface_queries.h"
 
@@ -28,16 +29,6 @@ struct Layout {
   double held = 0;   // -1 or 1: which end along the axis
   Vector3d touch = Vector3d::Zero(), normal = Vector3d::UnitZ();
 };
-
-std::vector<Vector3d> nodeNormals(const SoftBodyModel& m) {
-  std::vector<Vector3d> normals(m.restNodes.size(), Vector3d::Zero());
-  for (const auto& t : m.triangles) {
-    const Vector3d a = m.restNodes[t[0]], b = m.restNodes[t[1]], c = m.restNodes[t[2]];
-    for (const int node : t) normals[node] += (b - a).cross(c - a);
-  }
-  for (Vector3d& n : normals) n.normalize();
-  return normals;
-}
 
 // The node towards the free end that faces the camera best.
 int touchedNode(const SoftBodyModel& m, const Layout& l, const std::vector<Vector3d>& normals) {
@@ -84,11 +75,11 @@ double thicknessAt(const SoftBodyModel& m, const Vector3d& point) {
 // Held at the upper end where the body stands, otherwise at the bulkier one: a tail would not hold it.
 Layout layOutScene(const SoftBodyModel& m) {
   Layout l;
-  for (const Vector3d& x : m.restNodes) l.box.extend(x);
+  l.box = boundsOf(m.restNodes);
   l.size = l.box.diagonal().norm();
   l.box.sizes().maxCoeff(&l.axis);
   l.held = l.axis == 1 || volumeBeyond(m, l, 1) > volumeBeyond(m, l, -1) ? 1 : -1;
-  const std::vector<Vector3d> normals = nodeNormals(m);
+  const std::vector<Vector3d> normals = vertexNormals({m.restNodes, m.triangles});
   const int node = touchedNode(m, l, normals);
   l.touch = m.restNodes[node];
   l.normal = normals[node];

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics/dynamics/body_mechanics.h"
+
 namespace medulla {
 
 using Eigen::Vector3d;
@@ -11,10 +13,10 @@ using Points = std::vector<Vector3d>;
 // How often each node is to give way to the mean of itself and its neighbours, half each. Once spreads a node over half
 // an edge, as Loop's limit does, and squares of spreads add up.
 static int passes(const SoftBodyModel& model) {
-  double squaredEdge = 0, radius = 0;
+  const double radius = meanRadius(model);
+  double squaredEdge = 0;
   for (const auto& [a, b] : model.edges)
     squaredEdge += (model.restNodes[a] - model.restNodes[b]).squaredNorm() / static_cast<double>(model.edges.size());
-  for (const FillingSphere& sphere : model.spheres) radius += sphere.radius / static_cast<double>(model.spheres.size());
   const double coarser = std::min(static_cast<double>(model.triangles.size()) / kSmoothTriangles,
                                   kSmoothEdge * kSmoothEdge * radius * radius / squaredEdge);
   return std::max(0, static_cast<int>(std::lround(coarser)) - 1);
@@ -37,18 +39,10 @@ static std::vector<double> seriesOf(int n) {
 }
 
 static IndexLists neighboursOf(const SoftBodyModel& model) {
-  IndexLists lists;
-  lists.first.assign(model.restNodes.size() + 1, 0);
-  for (const auto& edge : model.edges)
-    for (const int end : edge) ++lists.first[end + 1];
-  for (std::size_t i = 0; i < model.restNodes.size(); ++i) lists.first[i + 1] += lists.first[i];
-  lists.item.resize(lists.first.back());
-  std::vector<int> next = lists.first;
-  for (const auto& [a, b] : model.edges) {
-    lists.item[next[a]++] = b;
-    lists.item[next[b]++] = a;
-  }
-  return lists;
+  std::vector<std::array<int, 2>> pairs;
+  pairs.reserve(2 * model.edges.size());
+  for (const auto& [a, b] : model.edges) pairs.insert(pairs.end(), {{a, b}, {b, a}});
+  return gather(static_cast<int>(model.restNodes.size()), pairs);
 }
 
 // next = scale * A now - before

@@ -11,6 +11,7 @@
 #include "app/interrupt.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/dynamics/stages.h"
+#include "physics/model/mesh_topology.h"
 #include "physics/model/surface_samples.h"
 
 namespace medulla {
@@ -19,12 +20,6 @@ namespace {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-Eigen::AlignedBox3d boxOf(const SoftBodyModel& m) {
-  Eigen::AlignedBox3d box;
-  for (const Vector3d& x : m.restNodes) box.extend(x);
-  return box;
-}
 
 // Moves all that is free: places by `move`, orientations by `turn`, which also gets the place. Model frame and world
 // are the same here.
@@ -374,7 +369,7 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
   settings.integrator = method.integrator;
   settings.order = method.order;
   World world(settings, {body});
-  const Eigen::AlignedBox3d box = boxOf(*body.model);
+  const Eigen::AlignedBox3d box = boundsOf(body.model->restNodes);
   if (found.start) found.start(world.data(), box);
 
   TortureOutcome out;

@@ -6,7 +6,6 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 
 #include "haptics/tool_input.h"
@@ -153,18 +152,6 @@ static void appendBody(const SoftBodyModel& model, BlendedSurface& surface, std:
   }
 }
 
-static void listTrianglesOfNodes(BlendedSurface& surface) {
-  std::vector<int>& first = surface.firstTriangleOfNode;
-  first.assign(surface.bodyOfNode.size() + 1, 0);
-  for (const auto& triangle : surface.triangles)
-    for (const int n : triangle) ++first[n + 1];
-  std::partial_sum(first.begin(), first.end(), first.begin());
-  surface.trianglesOfNode.resize(first.back());
-  std::vector<int> next = first;
-  for (std::size_t t = 0; t < surface.triangles.size(); ++t)
-    for (const int n : surface.triangles[t]) surface.trianglesOfNode[next[n]++] = int(t);
-}
-
 static void copyNodes(const DynamicsFrame& frame, std::vector<Vector3d>& nodes) {
   std::size_t n = 0;
   for (const BodyFrame& body : frame.bodies)
@@ -235,13 +222,13 @@ Buckets::Buckets(const std::vector<TouchableBody>& bodies, double largestRadius,
     surface.give.insert(surface.give.end(), body.give.begin(), body.give.end());
     surface.give.resize(surface.bodyOfNode.size());
   }
-  listTrianglesOfNodes(surface);
   data_->near.reserve(surface.triangles.size());
   data_->bounds.resize((data_->buckets.size() + 3) / 4 * 4);
   surface.from.resize(surface.bodyOfNode.size());
   surface.to.resize(surface.bodyOfNode.size());
   copyNodes(rest, surface.from);
   copyNodes(rest, surface.to);
+  surface.trianglesOfNodes = trianglesOfVertices({surface.from, surface.triangles});
   for (auto& step : surface.steps) step.assign(surface.from.size(), Vector3d::Zero());
   for (std::size_t k = 0; k < data_->buckets.size(); ++k) {
     Bucket& bucket = data_->buckets[k];

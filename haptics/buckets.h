@@ -8,6 +8,7 @@
 #include "haptics/embree_settings.h"
 #include "haptics/swept_triangle.h"
 #include "physics/dynamics/frame.h"
+#include "physics/model/mesh_topology.h"
 #include "physics/model/soft_body_model.h"
 
 namespace medulla {
@@ -27,8 +28,7 @@ struct BlendedSurface {
   std::vector<int> bodyOfNode;
   std::vector<int> firstNode;  // of each body
   std::vector<NodeGive> give;  // per node: TouchableBody::give
-  // The triangles of node n: trianglesOfNode[firstTriangleOfNode[n]] up to those of n + 1.
-  std::vector<int> firstTriangleOfNode, trianglesOfNode;
+  IndexLists trianglesOfNodes;
   std::vector<Eigen::Vector3d> from, to;  // m, world, per node
   // m, what each node moved from `from` to `to`, in the frame before and in the one before that
   std::array<std::vector<Eigen::Vector3d>, 3> steps;

@@ -15,8 +15,9 @@ static Vector3d doubleArea(const Triangle& t) {
 // Weighted by area; unit, or zero where all triangles are degenerate.
 static Vector3d nodeNormal(const BlendedSurface& surface, double alpha, int node) {
   Vector3d sum = Vector3d::Zero();
-  for (int k = surface.firstTriangleOfNode[node]; k < surface.firstTriangleOfNode[node + 1]; ++k)
-    sum += doubleArea(surface.triangle(surface.trianglesOfNode[k], alpha));
+  const IndexLists& lists = surface.trianglesOfNodes;
+  for (int k = lists.first[node]; k < lists.first[node + 1]; ++k)
+    sum += doubleArea(surface.triangle(lists.item[k], alpha));
   return sum.stableNormalized();
 }
 

@@ -32,8 +32,6 @@ std::string text(const Eigen::Vector3d& v) {
 
 std::vector<Result> modelResults(const SoftBodyModel& model) {
   constexpr double densityOfWater = 1000;
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& node : model.restNodes) box.extend(node);
   double radiusMin = std::numeric_limits<double>::infinity(), radiusMax = 0;
   for (const FillingSphere& s : model.spheres) {
     radiusMin = std::min(radiusMin, s.radius);
@@ -48,7 +46,7 @@ std::vector<Result> modelResults(const SoftBodyModel& model) {
                                  {"nodes", text(model.restNodes.size()), ""},
                                  {"render_triangles", text(model.renderSurface.triangles.size()), ""},
                                  {"mass_at_1000_kg/m3", text(densityOfWater * report.volume), "kg"},
-                                 {"extents", text(Eigen::Vector3d(box.sizes())), "m"},
+                                 {"extents", text(Eigen::Vector3d(boundsOf(model.restNodes).sizes())), "m"},
                                  {"radius_min", text(radiusMin), "m"},
                                  {"radius_max", text(radiusMax), "m"}};
   for (const Result& r : buildResults(report))

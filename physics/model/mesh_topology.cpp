@@ -43,7 +43,9 @@ void forEachEdge(const std::vector<Side>& sides, const Visit& visit) {
   }
 }
 
-// Counting sort of (list, item) pairs: items keep their order within a list.
+}  // namespace
+
+// A counting sort.
 IndexLists gather(int lists, const std::vector<std::array<int, 2>>& pairs) {
   IndexLists out;
   out.first.assign(lists + 1, 0);
@@ -54,8 +56,6 @@ IndexLists gather(int lists, const std::vector<std::array<int, 2>>& pairs) {
   for (const auto& pair : pairs) out.item[next[pair[0]]++] = pair[1];
   return out;
 }
-
-}  // namespace
 
 std::vector<std::array<int, 2>> uniqueEdges(const TriangleMesh& mesh) {
   std::vector<std::array<int, 2>> edges;
@@ -124,14 +124,14 @@ double enclosedVolume(const TriangleMesh& mesh) {
   return volume;
 }
 
+Eigen::AlignedBox3d boundsOf(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& point : points) box.extend(point);
+  return box;
+}
+
 double boundsDiagonal(const TriangleMesh& mesh) {
-  if (mesh.vertices.empty()) return 0;
-  Eigen::Vector3d low = mesh.vertices[0], high = low;
-  for (const auto& v : mesh.vertices) {
-    low = low.cwiseMin(v);
-    high = high.cwiseMax(v);
-  }
-  return (high - low).norm();
+  return mesh.vertices.empty() ? 0 : boundsOf(mesh.vertices).diagonal().norm();
 }
 
 std::vector<int> componentOfTriangles(const TriangleMesh& mesh, int& components) {

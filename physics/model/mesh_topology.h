@@ -16,6 +16,9 @@ struct IndexLists {
   std::vector<int> item;
 };
 
+// The lists of (list, item) pairs; items keep their order within a list.
+IndexLists gather(int lists, const std::vector<std::array<int, 2>>& pairs);
+
 // Every edge once: lower vertex first, sorted.
 std::vector<std::array<int, 2>> uniqueEdges(const TriangleMesh& mesh);
 
@@ -61,7 +64,10 @@ std::vector<Eigen::Vector3d> vertexNormals(const TriangleMesh& mesh);
 // m3 by the divergence theorem: positive when a closed surface is wound outward, cavities subtract.
 double enclosedVolume(const TriangleMesh& mesh);
 
-// m; diagonal of the axis-aligned bounding box, 0 without vertices.
+// The axis-aligned box around all; empty without points.
+Eigen::AlignedBox3d boundsOf(const std::vector<Eigen::Vector3d>& points);
+
+// m; the box's diagonal, 0 without vertices.
 double boundsDiagonal(const TriangleMesh& mesh);
 
 // Component of every triangle, connected through shared edges, numbered by its first triangle; count in `components`.

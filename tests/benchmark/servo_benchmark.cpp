@@ -4,6 +4,7 @@
 
 #include "app/files/mesh_file.h"
 #include "haptics/servo.h"
+#include "physics/model/mesh_topology.h"
 #include "tests/touch_shapes.h"
 
 namespace medulla {
@@ -21,8 +22,7 @@ static TouchShape gallbladder() {
 
 // A tool that strokes back and forth over a breathing surface, 3 mm deep. Frames are made before the clock runs.
 static void strokes(benchmark::State& state, const TouchShape& shape) {
-  Eigen::AlignedBox3d box;
-  for (const Vector3d& x : shape->restNodes) box.extend(x);
+  const Eigen::AlignedBox3d box = boundsOf(shape->restNodes);
   const Vector3d middle = box.center(), half = 0.5 * box.sizes();
   const SurfaceMotion breathing = [&](const Vector3d& x, double t) {
     return Vector3d(x + 0.03 * std::sin(6 * t) * (x - middle));
