@@ -77,12 +77,12 @@ double heightOf(const ChartPoint& p, const Curve& curve, const Frame& f) {
 }
 
 template <typename Wanted>
-std::string dataBlock(const std::string& name, const std::vector<ChartPoint>& points, const Curve& curve,
-                      const Frame& frame, const Wanted& wanted) {
-  std::string out = fmt::format("${} << EOD\n", name);
+std::string block(const std::string& name, const std::vector<ChartPoint>& points, const Curve& curve,
+                  const Frame& frame, const Wanted& wanted) {
+  std::string rows;
   for (const ChartPoint& p : points)
-    if (wanted(p)) out += fmt::format("{:.6g} {:.6g}\n", p.cpu, heightOf(p, curve, frame));
-  return out + "EOD\n";
+    if (wanted(p)) rows += fmt::format("{:.6g} {:.6g}\n", p.cpu, heightOf(p, curve, frame));
+  return dataBlock(name, rows);
 }
 
 std::string axes(const std::string& title, const Frame& f, ChartCost cost) {
@@ -164,15 +164,15 @@ std::string chartScript(const std::string& title, const std::vector<ChartPoint>&
   std::vector<ChartPoint> sorted = points;
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const ChartPoint& a, const ChartPoint& b) { return a.cpu < b.cpu; });
-  out += dataBlock("front", sorted, {}, frame, [](const ChartPoint& p) { return p.onFront; });
+  out += block("front", sorted, {}, frame, [](const ChartPoint& p) { return p.onFront; });
   plot += "$front using 1:2 with lines lw 9 lc '#e8e2c8' title 'Pareto front'";
   for (std::size_t k = 0; k < curves.size(); ++k) {
     const std::string name = fmt::format("c{}", k);
-    const auto block = [&](const std::string& called, bool failed) {
-      return dataBlock(called, bySteps, curves[k], frame,
-                       [&](const ChartPoint& p) { return p.curve == curves[k].name && atRim(p) == failed; });
+    const auto blockOf = [&](const std::string& called, bool failed) {
+      return block(called, bySteps, curves[k], frame,
+                   [&](const ChartPoint& p) { return p.curve == curves[k].name && atRim(p) == failed; });
     };
-    out += block(name, false) + block(name + "failed", true);
+    out += blockOf(name, false) + blockOf(name + "failed", true);
     plot += fmt::format(
         ", \\\n  NaN with linespoints lw 2 pt {2} ps 0.7 lc '{1}' title '{3}'"  // in the key even if all failed
         ", \\\n  ${0} using 1:2 with linespoints lw 2 pt {2} ps 0.7 lc '{1}' notitle"

@@ -13,6 +13,10 @@ std::string chartHead(double width, double height, int fontSize) {
       width, height, fontSize, kGrey);
 }
 
+std::string dataBlock(const std::string& name, const std::string& rows) {
+  return fmt::format("${} << EOD\n{}EOD\n", name, rows);
+}
+
 std::string spaced(std::string name) {
   std::replace(name.begin(), name.end(), '_', ' ');
   return name;

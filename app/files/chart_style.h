@@ -15,6 +15,9 @@ inline constexpr const char *kGrey = "#555555", *kBlack = "#000000";
 // The beginning of a script of gnuplot's: an SVG of so many pixels with a grid behind it.
 std::string chartHead(double width, double height, int fontSize);
 
+// Rows of numbers as gnuplot's $name.
+std::string dataBlock(const std::string& name, const std::string& rows);
+
 // A name as a chart shows it: blanks in the place of _.
 std::string spaced(std::string name);
 

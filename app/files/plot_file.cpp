@@ -178,12 +178,12 @@ std::string quotedName(const std::string& name) {
   return out + "'";
 }
 
-// A here-document of time and value. More rows than can be seen are drawn as the least and the largest of each bin, in
+// Of time and value. More rows than can be seen are drawn as the least and the largest of each bin, in
 // their order, so that no peak is lost.
 std::string block(const std::string& name, const Series& time, const Series& values) {
   constexpr std::size_t kBins = 1000;
-  std::string out = fmt::format("${} << EOD\n", name);
-  const auto add = [&](std::size_t k) { out += fmt::format("{:.6g} {:.5g}\n", time[k], values[k]); };
+  std::string rows;
+  const auto add = [&](std::size_t k) { rows += fmt::format("{:.6g} {:.5g}\n", time[k], values[k]); };
   const std::size_t width = time.size() > 2 * kBins ? (time.size() + kBins - 1) / kBins : 1;
   for (std::size_t k = 0; k < time.size(); k += width) {
     const auto first = values.begin() + static_cast<std::ptrdiff_t>(k),
@@ -194,7 +194,7 @@ std::string block(const std::string& name, const Series& time, const Series& val
     add(std::min(a, b));
     if (a != b) add(std::max(a, b));
   }
-  return out + "EOD\n";
+  return dataBlock(name, rows);
 }
 
 std::string shades(const std::vector<Span>& spans, const char* colour) {
@@ -267,12 +267,12 @@ std::string plotScript(const LogTable& log, const LogTable* frameTimes, const st
   const double begin = time.size() > 1 ? 2 * time[0] - time[1] : time[0];  // the first row tells how a frame ended
   const double end = std::max(time.back(), begin + 1e-3);
   out += fmt::format(
-      "set border 3 lc '#555555'\nset tics nomirror out scale 0.6\nunset mytics\nset grid lc '#d4d4d4' lt 1 lw 0.6\n"
+      "set border 3 lc '{}'\nset tics nomirror out scale 0.6\nunset mytics\nset grid lc '#d4d4d4' lt 1 lw 0.6\n"
       "set key at graph 1.015, graph 1.05 left top Left reverse vertical maxrows 8 samplen 1.6 spacing {} "
       "noautotitle\n"
       "set xrange [{:.6g}:{:.6g}]\nset lmargin at screen 0.065\nset rmargin at screen 0.85\n"
       "set multiplot\nset label 1 {} noenhanced at screen 0.065, screen {:.5f} left font ',16'\n",
-      format == PlotFormat::svg ? 0.95 : 1.2, begin, end, quotedName(title), 1 - 0.36 * kHead / height);
+      kGrey, format == PlotFormat::svg ? 0.95 : 1.2, begin, end, quotedName(title), 1 - 0.36 * kHead / height);
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const double top = kHead + static_cast<double>(p) * (kPanel + kGap), bottom = top + kPanel;
     if (p + 1 == panels.size()) out += "set format x '%g'\nset xlabel 'time, s' offset 0,0.4\n";

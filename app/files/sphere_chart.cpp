@@ -53,7 +53,7 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
   if (cheapest > 0)
     out += fmt::format("set border 11 lc '{}'\nset y2label '{}'\nset y2tics ({})\nset y2range [{:.6g}:{:.6g}]\n", kGrey,
                        costLabel(cost), logTicks(cheapest / 5, 2 * dearest), cheapest / 5, 2 * dearest);
-  out += "$rows << EOD\n" + data + "EOD\n";
+  out += dataBlock("rows", data);
   std::vector<std::string> plots;
   const auto addCurve = [&](const char* columns, int points, const char* colour, const char* meaning) {
     plots.push_back(fmt::format("$rows using {} with linespoints lw 2 pt {} ps 0.7 lc '{}' title '{}'", columns, points,

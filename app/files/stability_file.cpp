@@ -25,14 +25,14 @@ int gradeOf(const StabilityPoint& p) {
   return !p.survived ? 2 : p.recoveredAt ? 0 : 1;
 }
 
-// Points of a method and a grade as a here-document of step in ms and a height.
+// Points of a method and a grade: step in ms and a height.
 template <class Height>
 std::string block(const std::string& name, const std::vector<StabilityPoint>& points, const std::string& method,
                   int grade, const Height& height) {
-  std::string out = fmt::format("${} << EOD\n", name);
+  std::string rows;
   for (const StabilityPoint& p : points)
-    if (p.method == method && gradeOf(p) == grade) out += fmt::format("{:.6g} {:.6g}\n", 1e3 * p.step, height(p));
-  return out + "EOD\n";
+    if (p.method == method && gradeOf(p) == grade) rows += fmt::format("{:.6g} {:.6g}\n", 1e3 * p.step, height(p));
+  return dataBlock(name, rows);
 }
 
 struct Grade {
@@ -83,9 +83,9 @@ std::string stabilityScript(const std::string& title, const std::vector<Stabilit
     return static_cast<double>(std::find(trials.begin(), trials.end(), p.trial) - trials.begin());
   };
   std::string out = chartHead(1100, 1000, 13) + "set logscale x\nset xlabel 'step, ms'\nset key off\n";
-  out += "$limit << EOD\n";
-  for (const StableStep& s : limit) out += fmt::format("{:.6g} {:.6g}\n", 1e3 * s.step, s.young);
-  out += "EOD\n";
+  std::string limits;
+  for (const StableStep& s : limit) limits += fmt::format("{:.6g} {:.6g}\n", 1e3 * s.step, s.young);
+  out += dataBlock("limit", limits);
   for (std::size_t m = 0; m < methods.size(); ++m)
     for (int grade = 0; grade < 3; ++grade) {
       out += block(fmt::format("map{}_{}", m, grade), map, methods[m], grade,
