@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "app/files/fix_text.h"
 #include "app/files/input_error.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
@@ -35,19 +36,8 @@ static void requireFile(const Scene& scene, int line, const std::string& attribu
 }
 
 // As the build's command line says it.
-static std::string regionText(const NodeChoice& choice) {
-  const auto text = [](const Eigen::Vector3d& a) { return fmt::format("{},{},{}", a.x(), a.y(), a.z()); };
-  if (!choice.verticesPath.empty()) return "vertices=" + choice.verticesPath;
-  const Region& r = choice.region;
-  switch (r.shape) {
-    case Region::Shape::box:
-      return fmt::format("box={},{}", text(r.box.min()), text(r.box.max()));
-    case Region::Shape::ball:
-      return fmt::format("sphere={},{}", text(r.centre), r.radius);
-    case Region::Shape::halfSpace:
-      return fmt::format("plane={},{}", text(r.normal), r.distance);
-  }
-  return {};
+static std::string fixText(const NodeChoice& choice) {
+  return choice.verticesPath.empty() ? regionText(choice.region) : "vertices=" + choice.verticesPath;
 }
 
 // That of the model's own, identified for this body; run where the mesh lies, as that was.
@@ -58,7 +48,7 @@ static std::string identifyingCommand(const SceneBody& body) {
   const std::string form = " --link-form ";
   if (const std::size_t at = settings.find(form); at != std::string::npos)
     out += settings.substr(at, settings.find(' ', at + form.size()) - at);
-  for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix {}", shellWord(regionText(fix.nodes)));
+  for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix {}", shellWord(fixText(fix.nodes)));
   return out + " -o " + shellWord(std::filesystem::path(body.modelPath).filename().string());
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "app/files/fix_text.h"
 #include "app/files/reference_file.h"
 #include "app/files/vertex_file.h"
 #include "app/simulation.h"
@@ -42,6 +43,23 @@ TEST(VertexFile, VerticesOfTheMeshFileBecomeNodes) {
     EXPECT_EQ(loads[1].node, 3);
     EXPECT_EQ(loads[2].node, 3);
     EXPECT_EQ(loads[2].force, Eigen::Vector3d(0, 0, -1e-3));
+  }
+}
+
+TEST(FixText, APartOfSpaceReadsBackAsItWas) {
+  SoftBodyModel model;
+  model.restNodes = {{0, 0, 0}, {0.1, 0.2, 0.3}};
+  const struct {
+    Region::Shape shape;
+    std::vector<double> numbers;
+    const char* text;
+  } cases[] = {{Region::Shape::box, {-1e-7, 0, 0, 0.1, 0.2, 1.0 / 3}, "box=-1e-07,0,0,0.1,0.2,0.3333333333333333"},
+               {Region::Shape::ball, {0.1, 0.2, 0.3, 1e-9}, "sphere=0.1,0.2,0.3,1e-09"},
+               {Region::Shape::halfSpace, {-1, 0, 0, -0.1}, "plane=-1,0,0,-0.1"}};
+  for (const auto& c : cases) {
+    const Region region = makeRegion(c.shape, c.numbers).value();
+    EXPECT_EQ(regionText(region), c.text);
+    EXPECT_EQ(parseHeldRegion(c.text, model).nodes, nodesInRegion(model, region)) << c.text;
   }
 }
 

@@ -9,7 +9,6 @@
 
 #include "app/files/number_text.h"
 #include "app/files/vertex_file.h"
-#include "physics/dynamics/region.h"
 
 namespace medulla {
 
@@ -53,7 +52,36 @@ Region regionOf(const std::string& text, std::string_view word, std::string_view
   refuse(text, forms + "or vertices=FILE.csv");
 }
 
+// makeRegion's.
+std::vector<double> numbersOf(const Region& r) {
+  std::vector<double> out;
+  const auto add = [&](const Eigen::Vector3d& v) { out.insert(out.end(), v.begin(), v.end()); };
+  switch (r.shape) {
+    case Region::Shape::box:
+      add(r.box.min());
+      add(r.box.max());
+      break;
+    case Region::Shape::ball:
+      add(r.centre);
+      out.push_back(r.radius);
+      break;
+    case Region::Shape::halfSpace:
+      add(r.normal);
+      out.push_back(r.distance);
+      break;
+  }
+  return out;
+}
+
 }  // namespace
+
+std::string regionText(const Region& region) {
+  const auto form = std::find_if(kRegionForms.begin(), kRegionForms.end(),
+                                 [&](const RegionForm& f) { return f.shape == region.shape; });
+  std::string list;
+  for (const double number : numbersOf(region)) list += fmt::format("{}{}", list.empty() ? "" : ",", number);
+  return fmt::format("{}={}", form->word, list);
+}
 
 HeldRegion parseHeldRegion(const std::string& text, const SoftBodyModel& model) {
   const std::size_t equals = text.find('=');

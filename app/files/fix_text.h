@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "physics/dynamics/region.h"
 #include "physics/model/identify/held_region.h"
 #include "physics/model/soft_body_model.h"
 
@@ -12,5 +13,8 @@ namespace medulla {
 // A part of space holds what lies behind its triangles, too; vertices hold the surface between them.
 // Throws std::runtime_error on anything else.
 HeldRegion parseHeldRegion(const std::string& text, const SoftBodyModel& model);
+
+// The text of a part of space; it reads back as the same bits.
+std::string regionText(const Region& region);
 
 }  // namespace medulla
