@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "physics/dynamics/world_data.h"
 #include "tests/synthetic_model.h"
 
 // Bodies of few balls and no surface, whose contacts have closed forms.
@@ -45,6 +46,14 @@ inline BodyDescription ballBody(std::string name, std::shared_ptr<const SoftBody
 
 inline BodyDescription ball(std::string name, double radius, const Vector3d& position, double friction = 0) {
   return ballBody(std::move(name), ballModel({{Vector3d::Zero(), radius}}), position, friction);
+}
+
+inline void throwBody(World& w, int body, const Vector3d& velocity) {
+  WorldData& d = w.data();
+  const BodyRange& r = d.ranges[body];
+  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) d.spheres.velocity[i] = quadOf(velocity);
+  for (const int n : r.node)
+    if (n < d.nodes.dynamicEnd) setVector(d.nodes.velocity, n, velocity);
 }
 
 }  // namespace medulla::synthetic

@@ -16,6 +16,7 @@ using namespace states;
 using synthetic::ball;
 using synthetic::ballBody;
 using synthetic::ballModel;
+using synthetic::throwBody;
 
 namespace {
 
@@ -40,13 +41,6 @@ Vector3d positionOf(const World& w, int sphere) {
 }
 Vector3d velocityOf(const World& w, int sphere) {
   return vectorOf(w.data().spheres.velocity[sphere]);
-}
-void throwBody(World& w, int body, const Vector3d& velocity) {
-  WorldData& d = w.data();
-  const BodyRange& r = d.ranges[body];
-  for (int i = r.firstSphere; i < r.firstSphere + r.sphereCount; ++i) d.spheres.velocity[i] = quadOf(velocity);
-  for (const int n : r.node)
-    if (n < d.nodes.dynamicEnd) setVector(d.nodes.velocity, n, velocity);
 }
 
 StaticShape plane(const Vector3d& normal = Vector3d::UnitY(), double friction = 0) {

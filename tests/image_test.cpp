@@ -14,12 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class ImageTest : public testing::Test {
- protected:
-  std::string path(const std::string& name) const { return folder_ / name; }
-  std::size_t filesInFolder() const { return folder_.contents().size(); }
-  TemporaryFolder folder_;
-};
+class ImageTest : public FolderTest {};
 
 Image pattern(int width, int height) {
   Image image{width, height, std::vector<std::uint8_t>(4ul * width * height)};
@@ -112,7 +107,7 @@ TEST_F(ImageTest, AmplifiedDifferenceIsOpaqueAndSaturates) {
   Image b = a;
   b.pixels[0] = 13;
   b.pixels[1] = 200;
-  const Image d = amplifiedDifference(a, b);
+  const Image d = amplifiedDifference(a, b, 16);
   EXPECT_EQ(d.pixels, (std::vector<std::uint8_t>{48, 255, 0, 255, 0, 0, 0, 255}));
 }
 

@@ -14,6 +14,7 @@ namespace medulla {
 using Eigen::Vector3d;
 using synthetic::ballBody;
 using synthetic::ballModel;
+using synthetic::throwBody;
 
 constexpr double kRadius = 0.01, kGravity = 9.81;  // m, m/s2
 
@@ -62,11 +63,6 @@ static Vector3d placeOf(const World& world, int body) {
 static double totalEnergy(const World& world) {
   const Energies e = world.energies();
   return e.kinetic + e.elastic + e.gravity;
-}
-
-static void throwBody(World& world, int body, const Vector3d& velocity) {
-  const BodyRange& r = world.data().ranges[body];
-  for (int i = 0; i < r.sphereCount; ++i) world.data().spheres.velocity[r.firstSphere + i] = quadOf(velocity);
 }
 
 // A damper alone would let it down by g sin(a) h / (pi (2 + pi)), 1 mm/s.

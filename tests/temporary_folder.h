@@ -1,5 +1,6 @@
 #pragma once
 
+#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -33,6 +34,14 @@ class TemporaryFolder {
 
  private:
   std::string path_;
+};
+
+// Each test of it has one.
+class FolderTest : public testing::Test {
+ protected:
+  std::string path(const std::string& name) const { return folder_ / name; }
+  std::size_t filesInFolder() const { return folder_.contents().size(); }
+  TemporaryFolder folder_;
 };
 
 }  // namespace medulla

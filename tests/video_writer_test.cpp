@@ -6,8 +6,8 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
-#include <random>
 
+#include "physics/model/surface_samples.h"
 #include "render/yuv.h"
 #include "tests/complaint.h"
 #include "tests/program_run.h"
@@ -18,10 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class VideoWriterTest : public testing::Test {
+class VideoWriterTest : public FolderTest {
  protected:
-  std::string path(const std::string& name) const { return folder_ / name; }
-  std::size_t filesInFolder() const { return folder_.contents().size(); }
   static std::string outputOf(const std::string& command) {
     std::string text;
     FILE* pipe = popen(command.c_str(), "r");
@@ -31,7 +29,6 @@ class VideoWriterTest : public testing::Test {
     pclose(pipe);
     return text;
   }
-  TemporaryFolder folder_;
 };
 
 Image flat(int width, int height, std::uint8_t r, std::uint8_t g, std::uint8_t b) {
@@ -111,11 +108,11 @@ TEST_F(VideoWriterTest, EveryKindOfVideoHasEveryPicture) {
 TEST_F(VideoWriterTest, TheSamePicturesMakeTheSameBytes) {
   for (const std::string kind : {".mp4", ".webm", ".gif", ".webp"}) {
     const auto bytes = [&](const std::string& name) {
-      std::mt19937 random(1);
+      RandomSequence random{1};
       VideoWriter writer(path(name + kind), 64, 32, 25);
       Image noise = flat(64, 32, 0, 0, 0);
       for (int k = 0; k < 10; ++k) {
-        for (std::uint8_t& byte : noise.pixels) byte = static_cast<std::uint8_t>(random());
+        for (std::uint8_t& byte : noise.pixels) byte = static_cast<std::uint8_t>(256 * random.uniform());
         writer.write(noise);
       }
       writer.finish();
@@ -186,14 +183,14 @@ class FileSizeLimit {
 };
 
 TEST_F(VideoWriterTest, AFullDiskIsToldAndLeavesNothing) {
-  std::mt19937 random(1);
+  RandomSequence random{1};
   Image noise = flat(320, 160, 0, 0, 0);
   for (const char* name : {"a.mp4", "a.webm", "a.gif", "a.webp"}) {
     const FileSizeLimit limit(30000);
     const std::string message = complaintOf([&] {
       VideoWriter writer(path(name), 320, 160, 30);
       for (int k = 0; k < 40; ++k) {
-        for (std::uint8_t& byte : noise.pixels) byte = static_cast<std::uint8_t>(random());
+        for (std::uint8_t& byte : noise.pixels) byte = static_cast<std::uint8_t>(256 * random.uniform());
         writer.write(noise);
       }
       writer.finish();
