@@ -37,7 +37,7 @@ struct ImageDifference {
 ImageDifference compareImages(const Image& a, const Image& b);
 // Second tier of the golden gate: noise of another instruction set passes, a missing shadow does not.
 bool withinTolerance(const ImageDifference& d);  // <= 0.05 % over 4, <= 5 pixels over 16, PSNR >= 50 dB
-Image amplifiedDifference(const Image& a, const Image& b, int gain = 16);
+Image amplifiedDifference(const Image& a, const Image& b, int gain);
 
 // The sRGB transfer (IEC 61966-2-1) of a channel, 0 to 1 both.
 double lightFromSrgb(double shown);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "render/noise.h"
 
@@ -12,13 +13,13 @@ namespace {
 using glm::vec3;
 
 // Tool frame, m: the tip of the closed jaws at the origin, shaft along +z, jaws open about x at the hinge.
-constexpr float kHinge = 0.0200f, kShaftRadius = 0.0026f, kShaftStart = 0.0275f, kShaftEnd = 0.42f;
+constexpr float kHinge = 0.0200f, kShaftStart = 0.0275f;
 constexpr float kJawHalfWidth = 0.0021f, kJawHeight = 0.0021f;
 // Height above the bite's plane: of ridges and valleys, and of the rim that the outer side ends at. The rim lies above
 // the valleys, or the flank between them folds over and leaves holes.
 constexpr float kRidge = 0.00008f, kValley = 0.00055f, kJawRim = 0.0006f;
 constexpr int kAround = 18, kTeeth = 13;
-constexpr float kTau = 6.2831853f;
+constexpr float kTau = 2 * std::numbers::pi_v<float>;
 constexpr vec3 kSteel(0.50f, 0.50f, 0.52f), kSheath(0.020f, 0.020f, 0.022f);
 
 // Geometry in the tool frame, moved to the world as it is appended.

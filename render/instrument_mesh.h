@@ -6,6 +6,9 @@
 
 namespace medulla {
 
+// m, at scale 1: of the shaft, and how far from the tip of the closed jaws it ends.
+constexpr float kShaftRadius = 0.0026f, kShaftEnd = 0.42f;
+
 // Appends the parts of one laparoscopic grasper (shaft 5 mm across, toothed jaws) in the pose given: steel and black
 // sheath, world frame, with everything the tissue shader needs. pictureHeight: px.
 void appendInstrument(const Instrument& instrument, const Viewpoint& view, int pictureHeight, SceneMesh& mesh);

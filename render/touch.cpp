@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/instrument_mesh.h"
+
 namespace medulla {
 
 void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part) {
@@ -109,7 +111,7 @@ void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
 }
 
 void shadeAround(const Instrument& instrument, SceneMesh& mesh) {
-  const float length = 0.42f * instrument.scale, radius = 0.0026f * instrument.scale,
+  const float length = kShaftEnd * instrument.scale, radius = kShaftRadius * instrument.scale,
               farthest = 0.05f * instrument.scale;  // m
   const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, 1), start = instrument.tip + radius * axis;
   for (const MeshPart& part : mesh.parts) {

@@ -253,7 +253,7 @@ void writeFailure(const GoldenResult& r, const Image& drawn, const std::string& 
   for (const std::string& earlier : {actual, difference}) fs::remove(earlier, missing);
   if (r.passed || drawn.pixels.empty()) return;
   writePng(actual, drawn);
-  if (!r.expected.pixels.empty()) writePng(difference, amplifiedDifference(r.actual, r.expected));
+  if (!r.expected.pixels.empty()) writePng(difference, amplifiedDifference(r.actual, r.expected, kGain));
 }
 
 void compareScene(const std::string& path, const GoldenOptions& options, Comparison& comparison) {

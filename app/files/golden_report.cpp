@@ -11,8 +11,6 @@ namespace medulla {
 
 namespace {
 
-constexpr int kGain = 16;
-
 constexpr const char* kHead = R"(<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>Golden images</title>
 <style>

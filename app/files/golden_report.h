@@ -7,6 +7,8 @@
 
 namespace medulla {
 
+constexpr int kGain = 16;  // of differences that are shown
+
 // What a picture was drawn with.
 struct DrawnWith {
   std::string renderer, processor;  // GL_RENDERER and GL_VERSION; model name
