@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "haptics/force_bounds.h"
 #include "haptics/force_shading.h"
 #include "physics/model/mesh_topology.h"
 
@@ -210,8 +211,7 @@ static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& start, co
   constexpr double kStill = 1e-8;  // m per tick, 12 um/s: what slips no farther sticks, else it would slip at rest
   const double depth = (free - device).norm();
   const Vector3d normal = (free - device) / depth;
-  Vector3d slide = free - start;
-  slide -= slide.dot(normal) * normal;
+  const Vector3d slide = tangential(free - start, normal);
   const double length = slide.norm();
   if (length <= (slipping ? tool.dynamicFriction * depth + kStill : tool.staticFriction * depth)) {
     slipping = false;

@@ -109,9 +109,8 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
                            : normal.dot(last.point + tool.settings.radius * last.normal - tool.device.position);
   const double spring = tool.settings.stiffness * depth;
   tool.largestPush = std::max(tool.largestPush, spring);
-  const double along = way.dot(normal);
-  tool.motion.way[0] += std::max(along, -std::max(0.0, depth)) * normal;  // from where it touched
-  tool.motion.wayAcross[0] += way - along * normal;
+  tool.motion.way[0] += std::max(way.dot(normal), -std::max(0.0, depth)) * normal;  // from where it touched
+  tool.motion.wayAcross[0] += tangential(way, normal);
   const TissueMotion tissue = contactMotion(surface, alpha, touchedContacts(tool), normal, tool.motion);
   const Vector3d motion = motionForce(tool, tissue);
   tool.estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));

@@ -4,6 +4,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "haptics/force_bounds.h"
+
 namespace medulla {
 
 using Eigen::Vector3d;
@@ -192,8 +194,8 @@ double pushSince(const BlendedSurface& surface, double alpha, const TissueMotion
 
 double dragSince(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, const Vector3d& normal,
                  const ToolSettings& tool, const DeviceMotion& device) {
-  const auto across = [&](const Vector3d& v) { return Vector3d(v - normal.dot(v) * normal); };
-  const Vector3d step = across(tissue.step), slip = across(device.velocity) - step / surface.duration;
+  const Vector3d step = tangential(tissue.step, normal),
+                 slip = tangential(device.velocity, normal) - step / surface.duration;
   const double off = wayOver(surface.toolForceAge, alpha, device.wayAcross,
                              [&](const Vector3d& v, double frames) { return (v - frames * step).norm(); });
   return tool.stiffness * off + tool.damping * slip.norm();
