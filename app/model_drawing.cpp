@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "app/scene_view.h"
 #include "physics/dynamics/identified_mechanics.h"
@@ -209,7 +210,7 @@ std::vector<Segment> coil(glm::vec3 a, glm::vec3 b, float radius, float wire, gl
   const glm::vec3 u = glm::normalize(glm::cross(aside, w)), v = glm::cross(w, u);
   glm::vec3 before = a;
   for (int k = 1; k <= kPieces; ++k) {
-    const float s = float(k) / kPieces, angle = 6.2831853f * float(k) / kPiecesPerTurn;
+    const float s = float(k) / kPieces, angle = 2 * std::numbers::pi_v<float> * float(k) / kPiecesPerTurn;
     const float wide = radius * glm::smoothstep(0.f, kLead, std::min(s, 1 - s));
     const glm::vec3 at = k == kPieces ? b : a + s * along + wide * (std::cos(angle) * u + std::sin(angle) * v);
     out.push_back({before, at, wire, colour});

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <numbers>
 
 #include "render/noise.h"
 
 namespace medulla {
 namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
 
 // Arithmetic of IEEE 754 alone: where mathematical libraries differ in a last digit, a vessel would meet another or
 // not, and the whole tree behind it differ.
@@ -17,7 +20,7 @@ float sineOf(float angle) {  // within 0.001; two parabolas, corrected once
   return s + 0.225f * (s * std::abs(s) - s);
 }
 glm::vec2 directionOf(float angle) {
-  return {sineOf(angle + 1.57079633f), sineOf(angle)};
+  return {sineOf(angle + kPi / 2), sineOf(angle)};
 }
 float cubeRoot(float x) {  // of 0.3 to 1, by Newton's method
   float y = 1;
@@ -77,7 +80,6 @@ class VesselPainter {
   const std::vector<float>& opacity() const { return opacity_; }
 
  private:
-  static constexpr float kPi = 3.14159265f;
   static constexpr float kBend = 0.4f;  // rad, how far vessels wind about their heading
   struct Tip {
     float x = 0, y = 0, heading = 0, width = 0;  // texels, rad

@@ -7,13 +7,14 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/type_ptr.hpp>
+#include <numbers>
 
 #include "render/shaders.h"
 
 namespace medulla {
 namespace {
 
-constexpr float kTau = 6.2831853f;
+constexpr float kTau = 2 * std::numbers::pi_v<float>;
 constexpr std::array<int, 3> kRings = {8, 20, 48};
 constexpr std::array<float, 2> kFinerAbove = {0.012f, 0.06f};  // projected radius, picture heights
 constexpr glm::vec3 kBackdropColour{0.78f, 0.80f, 0.84f};      // linear RGB, of the shaders' backdrop

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/type_ptr.hpp>
+#include <numbers>
 
 #include "render/detail_texture.h"
 #include "render/shaders.h"
@@ -122,7 +123,7 @@ void TissuePass::addLook(const Look& look) {
 void TissuePass::drawMask(const Viewpoint& view) {
   std::vector<glm::vec2> strip;
   for (int k = 0; k <= kMaskSegments; ++k) {
-    const float a = 6.2831853f * float(k) / kMaskSegments;
+    const float a = 2 * std::numbers::pi_v<float> * float(k) / kMaskSegments;
     const glm::vec2 d(std::cos(a), std::sin(a));
     // A little outside the rim, which the post-process draws; the polygon's sides cut the corners by 0.05 %.
     strip.push_back(2.004f * view.rim * d / glm::vec2(view.aspect, 1));

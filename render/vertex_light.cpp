@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "render/noise.h"
 
@@ -205,7 +206,7 @@ float lightFalloff(const Light& light, float distance) {
 }
 
 GlossLobes glossLobes(const Look& look) {
-  constexpr float kPi = 3.14159265f;
+  constexpr float kPi = std::numbers::pi_v<float>;
   const auto fourth = [](float x) { return x * x * x * x; };
   const float a1 = fourth(look.roughness), a2 = fourth(look.wetRoughness);
   return {a1, a1 / kPi * 0.18f * look.specular, a2, a2 / kPi * 0.22f * look.specular};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "app/files/mesh_file.h"
 #include "app/scene_view.h"
@@ -223,7 +224,8 @@ TEST_F(Gate, TellsApartWhatAPersonWouldWantToKnow) {
   const CameraKey before = loaded.scene.camera[0];
   CameraKey& camera = loaded.scene.camera[0];
   const Eigen::Vector3d forward = camera.target - camera.position;
-  const double pixel = 2 * forward.norm() * std::tan(camera.fovDegrees * M_PI / 360) / kHeight;  // m, at the target
+  const double pixel =
+      2 * forward.norm() * std::tan(camera.fovDegrees * std::numbers::pi / 360) / kHeight;  // m, at the target
   const Eigen::Vector3d step = pixel * forward.cross(Eigen::Vector3d::UnitY()).normalized();
   camera.position += step;
   camera.target += step;

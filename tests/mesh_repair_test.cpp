@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 
 #include "physics/model/mesh_topology.h"
 #include "physics/model/self_intersection.h"
@@ -243,7 +244,7 @@ TEST(MeshRepair, OneSidedSurfaceIsRefused) {
   TriangleMesh mesh;
   constexpr int kQuads = 12;
   for (int i = 0; i < kQuads; ++i) {
-    const double angle = 2 * M_PI * i / kQuads;
+    const double angle = 2 * std::numbers::pi * i / kQuads;
     const Eigen::Vector3d out(std::cos(angle), std::sin(angle), 0);
     const Eigen::Vector3d across = std::cos(angle / 2) * out + std::sin(angle / 2) * Eigen::Vector3d::UnitZ();
     mesh.vertices.emplace_back(out - 0.2 * across);
@@ -448,14 +449,14 @@ TEST(SelfIntersection, FindsWhatTestingEveryPairFinds) {
   const TriangleMesh mesh = joined(sphere(4), sphere(4, {0.12, 0.001, 0.002}));
   double length = 0;
   for (const TriangleCut& cut : findSelfIntersections(mesh)) length += cut.length;
-  EXPECT_NEAR(length, 2 * M_PI * 0.08, 0.01);
+  EXPECT_NEAR(length, 2 * std::numbers::pi * 0.08, 0.01);
   EXPECT_TRUE(findSelfIntersections(sphere(5)).empty());
 }
 
 TEST(MeshTopology, SphereHasItsAreasVolumeAndNeighbours) {
   const TriangleMesh mesh = sphere(5);
-  EXPECT_NEAR(enclosedVolume(mesh), 4.0 / 3 * M_PI * 1e-3, 2e-5);
-  EXPECT_NEAR(surfaceArea(mesh), 4 * M_PI * 0.01, 2e-4);
+  EXPECT_NEAR(enclosedVolume(mesh), 4.0 / 3 * std::numbers::pi * 1e-3, 2e-5);
+  EXPECT_NEAR(surfaceArea(mesh), 4 * std::numbers::pi * 0.01, 2e-4);
   double sum = 0;
   for (const double a : vertexAreas(mesh)) sum += a;
   EXPECT_NEAR(sum, surfaceArea(mesh), 1e-12);
@@ -473,7 +474,7 @@ TEST(MeshTopology, SphereHasItsAreasVolumeAndNeighbours) {
   const auto seenFrom = [&](const Eigen::Vector3d& point) {
     double angles = 0;
     for (const auto& t : mesh.triangles) angles += solidAngle(mesh, t, point);
-    return angles / (4 * M_PI);
+    return angles / (4 * std::numbers::pi);
   };
   EXPECT_NEAR(seenFrom({0.01, 0.02, 0.03}), 1, 1e-12);
   EXPECT_NEAR(seenFrom({0.2, 0, 0}), 0, 1e-12);

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <numbers>
 
 #include "physics/model/attachment.h"
 #include "physics/model/ball_choice.h"
@@ -66,7 +67,7 @@ TEST(PowerCells, SumToTheBodyAndVoxelsAloneAreClose) {
 TEST(PlaneSection, EllipseAndItsHalves) {
   const TriangleMesh mesh = ellipsoidMesh(5, {3, 2, 1});
   const Plane plane{Vector3d::Zero(), Vector3d::UnitY(), Vector3d::UnitZ()};
-  const double area = 3.14159265 * 2 * 1;
+  const double area = std::numbers::pi * 2 * 1;
   const SectionMoments whole = planeSection(mesh, plane);
   EXPECT_NEAR(whole.area / area, 1, 3e-3);
   EXPECT_NEAR(whole.secondMoment(0, 0) / (area * 4 / 4), 1, 5e-3);
@@ -77,7 +78,7 @@ TEST(PlaneSection, EllipseAndItsHalves) {
 }
 
 TEST(LinkSections, StraightTubeGivesItsBeam) {
-  const double radius = 0.01, pi = 3.14159265358979;
+  const double radius = 0.01, pi = std::numbers::pi;
   BuildSettings settings;
   settings.spheres = 5;
   BuildReport report;
@@ -107,7 +108,7 @@ static TriangleMesh dumbbell(double neckRadius) {
 }
 
 TEST(LinkSections, ANeckIsNoGap) {
-  const double radius = 0.0008, pi = 3.14159265358979;
+  const double radius = 0.0008, pi = std::numbers::pi;
   BuildSettings settings;
   settings.spheres = 2;
   BuildReport report;
@@ -304,7 +305,7 @@ TEST(ModelBuild, SpheresOfSeveralBodiesAreSharedByTheGapInMetres) {
 
 // A ring in the plane of x and z.
 static TriangleMesh torusMesh(double ringRadius, double tubeRadius, int around, int across) {
-  constexpr double pi = 3.14159265358979;
+  constexpr double pi = std::numbers::pi;
   TriangleMesh mesh;
   for (int i = 0; i < around; ++i) {
     for (int j = 0; j < across; ++j) {

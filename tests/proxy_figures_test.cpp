@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstdio>
+#include <numbers>
 
 #include "tests/proxy_run.h"
 #include "tests/tool_run.h"
@@ -38,7 +39,7 @@ static Felt feelMovingSurface(double amplitude, double frequency, double radius)
   const double restHeight = r.shape->restNodes[0].z();
   r.device = [=](double) { return device; };
   r.motion = [=](const Vector3d& x, double t) {
-    return Vector3d(x.x(), x.y(), x.z() + amplitude * std::sin(2 * M_PI * frequency * t));
+    return Vector3d(x.x(), x.y(), x.z() + amplitude * std::sin(2 * std::numbers::pi * frequency * t));
   };
   r.duration = 1.5;
   Felt felt;
@@ -63,7 +64,8 @@ TEST(ProxyFigures, AStillDeviceFeelsASurfaceThatMovesThroughIt) {
     const Felt slow = feelMovingSurface(0.01, 2, radius), fast = feelMovingSurface(0.01, 10, radius);
     const std::string what = "surface +-10 mm, radius " + std::to_string(1e3 * radius) + " mm, ";
     expectReached((what + "2 Hz, lost ticks").c_str(), slow.lost, 0);
-    expectReached((what + "2 Hz, force step (N)").c_str(), slow.step, 3 * 400 * 2 * M_PI * 2 * 0.01 * tickDuration);
+    expectReached((what + "2 Hz, force step (N)").c_str(), slow.step,
+                  3 * 400 * 2 * std::numbers::pi * 2 * 0.01 * tickDuration);
     expectReached((what + "10 Hz, lost ticks").c_str(), fast.lost, 0);
   }
 }
@@ -75,7 +77,7 @@ TEST(ProxyFigures, AThinPlateMovingPastADeviceBehindItKeepsTheProxyInFront) {
     r.tool.radius = radius;
     r.device = [](double t) { return Vector3d(0.0013, 0.007 - 0.017 * std::min(1.0, t / 0.1), 0.0007); };
     r.motion = [](const Vector3d& x, double t) {
-      return Vector3d(x + 0.005 * std::sin(2 * M_PI * 3 * std::max(0.0, t - 0.2)) * Vector3d::UnitY());
+      return Vector3d(x + 0.005 * std::sin(2 * std::numbers::pi * 3 * std::max(0.0, t - 0.2)) * Vector3d::UnitY());
     };
     r.duration = 1.2;
     int lost = 0;
@@ -144,7 +146,7 @@ TEST(ProxyFigures, RestsInACornerWithoutJitter) {
 
 TEST(ProxyFigures, FollowsTheBottomOfAGroove) {
   for (const double degrees : {90.0, 40.0, 20.0, 10.0}) {
-    const double half = degrees * M_PI / 360, height = 0.05, length = 0.04, s = height * std::tan(half);
+    const double half = degrees * std::numbers::pi / 360, height = 0.05, length = 0.04, s = height * std::tan(half);
     ProxyRun r;
     r.shape = shapeOf({{-length, 0, 0},
                        {length, 0, 0},
@@ -215,7 +217,7 @@ TEST(ProxyFigures, ACoarseMeshFeelsSmooth) {
     return Vector3d(p.cwiseQuotient(half.cwiseProduct(half)).normalized());
   };
   r.device = [&](double t) {
-    const double theta = 0.5 * M_PI + 0.6 * std::sin(1.3 * t), phi = 0.9 * t;
+    const double theta = 0.5 * std::numbers::pi + 0.6 * std::sin(1.3 * t), phi = 0.9 * t;
     const Vector3d on(half.x() * std::cos(theta), half.y() * std::sin(theta) * std::cos(phi),
                       half.z() * std::sin(theta) * std::sin(phi));
     return Vector3d(on + (0.006 - 0.006 * std::min(1.0, t / 0.1)) * outward(on));
@@ -234,7 +236,7 @@ TEST(ProxyFigures, ACoarseMeshFeelsSmooth) {
   });
   EXPECT_GT(fastest, 0.09);
   expectReached("ellipsoid of 468 triangles, force step (N)", worstStep, 0.03);
-  expectReached("ellipsoid of 468 triangles, off the normal (degrees)", worstAngle * 180 / M_PI, 2);
+  expectReached("ellipsoid of 468 triangles, off the normal (degrees)", worstAngle * 180 / std::numbers::pi, 2);
 }
 
 TEST(ProxyFigures, PressingSomethingRigid) {

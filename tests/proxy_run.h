@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 #include "haptics/buckets.h"
 #include "haptics/servo.h"
@@ -75,7 +76,7 @@ inline bool isInside(const BlendedSurface& surface, double alpha, const Eigen::V
   double winding = 0;
   for (int t = 0; t < int(surface.triangles.size()); ++t) {
     const Triangle triangle = surface.triangle(t, alpha);
-    winding += solidAngle(triangle.a, triangle.b, triangle.c, p) / (4 * M_PI);
+    winding += solidAngle(triangle.a, triangle.b, triangle.c, p) / (4 * std::numbers::pi);
   }
   return winding > 0.5;
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numbers>
 
 #include "tests/proxy_run.h"
 
@@ -219,7 +220,7 @@ TEST(Proxy, ASwapOfFramesInMidSlideIsNotFelt) {
   ProxyRun r;
   r.shape = ellipsoid(32, 32, 50, 0);
   r.motion = [](const Vector3d& x, double t) {
-    return Vector3d(x + 0.002 * std::sin(2 * M_PI * 3 * t) * Vector3d::UnitZ());
+    return Vector3d(x + 0.002 * std::sin(2 * std::numbers::pi * 3 * t) * Vector3d::UnitZ());
   };
   r.device = [](double t) {
     return Vector3d(0.03 * std::sin(2 * t), 0.01 * std::sin(3 * t), 0.06 - 0.012 * std::min(1.0, t / 0.2));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "render/haze.h"
 #include "tests/complaint.h"
@@ -45,7 +46,8 @@ SurfaceShape sphere(const std::string& look, vec3 centre, float radius, std::uin
   const std::uint32_t around = 2 * rings;
   for (std::uint32_t j = 0; j <= rings; ++j)
     for (std::uint32_t i = 0; i <= around; ++i) {
-      const float theta = 3.14159265f * float(j) / float(rings), phi = 6.2831853f * float(i) / float(around);
+      const float theta = std::numbers::pi_v<float> * float(j) / float(rings),
+                  phi = 2 * std::numbers::pi_v<float> * float(i) / float(around);
       s.restPositions.push_back(
           centre + radius * vec3(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)));
     }
@@ -123,7 +125,8 @@ TEST(Renderer, BallInTheModelViewCoversItsProjectedCircle) {
     // The cone that touches the ball: tan = r / sqrt(d^2 - r^2).
     const double tangent = radius / std::sqrt(0.2 * 0.2 - double(radius) * radius);
     const double pixels = tangent / std::tan(glm::radians(20.0)) * 200;
-    EXPECT_NEAR(double(covered), 3.14159265 * pixels * pixels, 0.01 * 3.14159265 * pixels * pixels + 4) << radius;
+    EXPECT_NEAR(double(covered), std::numbers::pi * pixels * pixels, 0.01 * std::numbers::pi * pixels * pixels + 4)
+        << radius;
   }
 }
 

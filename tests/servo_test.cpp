@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <limits>
+#include <numbers>
 
 #include "tests/tool_run.h"
 
@@ -129,7 +130,7 @@ TEST(Servo, TwoToolsTouchTwoBodies) {
 TEST(Servo, OneToolTouchesTwoBodiesAtOnce) {
   const double h = 0.03;
   for (const double degrees : {45.0, 70.0, 85.0}) {
-    const double slope = std::tan(degrees / 180 * 3.14159265358979);
+    const double slope = std::tan(degrees / 180 * std::numbers::pi);
     const auto wall = [&](double side) {
       return shapeOf({{-h, 0, 0}, {h, 0, 0}, {-h, side * h / slope, h}, {h, side * h / slope, h}},
                      {{0, 1, 3}, {0, 3, 2}});

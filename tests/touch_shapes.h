@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "physics/dynamics/frame.h"
@@ -53,8 +54,9 @@ inline TouchShape ellipsoid(int around, int along, int bucketCount, double bumpi
   };
   model->restNodes.push_back(point(0, 0));
   for (int i = 1; i < along; ++i)
-    for (int j = 0; j < around; ++j) model->restNodes.push_back(point(M_PI * i / along, 2 * M_PI * j / around));
-  model->restNodes.push_back(point(M_PI, 0));
+    for (int j = 0; j < around; ++j)
+      model->restNodes.push_back(point(std::numbers::pi * i / along, 2 * std::numbers::pi * j / around));
+  model->restNodes.push_back(point(std::numbers::pi, 0));
   const int last = int(model->restNodes.size()) - 1;
   const auto id = [&](int i, int j) { return 1 + (i - 1) * around + j % around; };
   for (int j = 0; j < around; ++j) {
