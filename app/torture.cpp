@@ -338,6 +338,27 @@ int freeEnd(const BodyDescription& body) {
   return best;
 }
 
+// One step a frame, nothing that acts on it.
+World worldOf(const BodyDescription& body, const TortureMethod& method, double step) {
+  WorldSettings settings;
+  settings.gravity.setZero();
+  settings.frameDuration = step;
+  settings.substeps = 1;
+  settings.integrator = method.integrator;
+  settings.order = method.order;
+  return World(settings, {body});
+}
+
+// Where the trial's hand is at the end of the step to `t`.
+Loads handOn(int node, const BodyDescription& body, const Trial& trial, double t, double step) {
+  HeldNode hand;
+  hand.node = node;
+  hand.stiffness = 200;
+  hand.anchor = body.model->restNodes[node] + trial.path(t) * Vector3d::UnitY();
+  hand.anchorVelocity = (trial.path(t) - trial.path(t - step)) / step * Vector3d::UnitY();
+  return {{}, {hand}};
+}
+
 }  // namespace
 
 const std::vector<TortureMethod>& tortureMethods() {
@@ -362,13 +383,7 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
                        const std::function<void()>& afterStep) {
   const Trial& found = trialOf(trial);
   const BodyDescription body = bodyOf(found, whole);
-  WorldSettings settings;
-  settings.gravity.setZero();
-  settings.frameDuration = step;
-  settings.substeps = 1;
-  settings.integrator = method.integrator;
-  settings.order = method.order;
-  World world(settings, {body});
+  World world = worldOf(body, method, step);
   const Eigen::AlignedBox3d box = boundsOf(body.model->restNodes);
   if (found.start) found.start(world.data(), box);
 
@@ -384,17 +399,8 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
   try {
     while (world.time() < time) {
       checkInterrupt();
-      Loads loads;
       const double t = world.time() + step;
-      if (t <= handTime) {
-        HeldNode hand;
-        hand.node = end;
-        hand.stiffness = 200;
-        hand.anchor = body.model->restNodes[end] + found.path(t) * Vector3d::UnitY();
-        hand.anchorVelocity = (found.path(t) - found.path(t - step)) / step * Vector3d::UnitY();
-        loads.heldNodes.push_back(hand);
-      }
-      world.advance(loads);
+      world.advance(t <= handTime ? handOn(end, body, found, t, step) : Loads{});
       if (afterStep) afterStep();
       const double now = energy();
       out.largestEnergy = std::max(out.largestEnergy, now);
