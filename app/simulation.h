@@ -33,7 +33,7 @@ World makeWorld(const LoadedScene& loaded);
 // meanwhile (not recorded live), inputs and tools at its ticks (index 0 is the state at `start`), and what the dynamics
 // was handed at its end.
 struct ServoRecord {
-  double start = 0, duration = 0;
+  double start = 0, duration = 0;  // s
   DynamicsFrame from, to;
   std::vector<std::vector<ToolSample>> inputs;
   std::vector<std::vector<ToolState>> tools;
@@ -49,7 +49,7 @@ struct FrameTimes {
 
 // The state that a picture shows.
 struct PictureState {
-  double time = 0;
+  double time = 0;  // s
   DynamicsFrame frame;
   std::vector<ToolSample> inputs;
   std::vector<ToolState> tools;
