@@ -7,7 +7,7 @@ namespace medulla {
 // Everything that a run does before its first step: reading, looking up, laying out.
 int runCheck(const RunOptions& options) {
   const LoadedScene loaded = loadRun(options);
-  printWarnings(loaded, makeWorld(loaded));
+  printWarnings(loaded, options, makeWorld(loaded));
   fmt::print("valid yes\n");
   return 0;
 }

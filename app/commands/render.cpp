@@ -182,10 +182,7 @@ int runRender(const RenderOptions& options) {
   const Wanted wanted = wantedOf(options, loaded.scene);
   requireDistinctOutputs(loaded, options.run, options.outputs);
   requireDistinctFiles(options.outputs, {options.cacheToRead});
-  if (options.still) {  // nothing later is asked for, as by --set
-    loaded.scene.duration = *options.still;
-    loaded.scene.overridden.push_back({0, "duration", "clock.duration"});
-  }
+  if (options.still) loaded.scene.duration = *options.still;  // nothing later is asked for
   if (options.cacheToRead.empty())
     renderRun(loaded, options, wanted, timings);
   else

@@ -33,6 +33,7 @@ struct RunOptions {
   EmbreeSettings embree;
   bool realtime = false;   // replay only: the servo runs against the clock
   bool untilRest = false;  // ends when nothing moves any more; the scene's duration is the longest it may take
+  bool isExcerpt = false;  // of the scene: that motions go on after its end is meant
 };
 
 // The state at a time, once a run has passed it.
@@ -70,10 +71,14 @@ std::uint64_t pictureHash(const LoadedScene& loaded);
 // Of a cache of this run.
 CacheLayout cacheLayout(const LoadedScene& loaded);
 
+// The files of `option`, with every tool named, and known.
+std::map<std::string, std::string> filesOfTools(const std::string& option, const Scene& scene,
+                                                const std::map<std::string, std::string>& files);
+
 LoadedScene loadRun(const RunOptions& options);
 
 // On standard error: what can run, but is hardly meant.
-void printWarnings(const LoadedScene& loaded, const World& world);
+void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world);
 
 // Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` after the last, before
 // records, log and surfaces appear under their names: what fails there leaves those as they were. Until rest: as
@@ -83,6 +88,9 @@ void printWarnings(const LoadedScene& loaded, const World& world);
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
                              const std::function<void()>& afterFrame, const std::function<void()>& finish = {},
                              const std::function<void()>& advance = {});
+
+// Every file that the run writes, but for pictures.
+std::vector<std::string> outputFiles(const RunOptions& options);
 
 // Every file that the run writes besides `pictures` must differ from the others and from what it reads.
 void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options,
