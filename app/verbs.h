@@ -30,9 +30,18 @@ struct RunArguments {
   std::vector<std::string> sets, trajectories, records;
   std::vector<std::vector<std::string>> surfaces;
 };
-void addSceneOptions(CLI::App& command, RunArguments& a);  // SCENE, --set, --trajectory
+void addOverrides(CLI::App& command, RunArguments& a);     // --set, --trajectory
+void addSceneOptions(CLI::App& command, RunArguments& a);  // SCENE and these
 RunOptions runOptions(const RunArguments& a);
 void addContext(CLI::App& command, std::string& context);
+
+void flushResults();  // throws std::runtime_error where standard output cannot be written
+
+// running_verbs.cpp
+Verb addRender(CLI::App& app);
+Verb addReplay(CLI::App& app);
+Verb addCheck(CLI::App& app);
+Verb addInfo(CLI::App& app);
 
 // model_verbs.cpp
 Verb addBuild(CLI::App& app);
