@@ -118,9 +118,9 @@ struct ImplicitData {
   double chordEnergy = 0;       // J: of velocities across the tangents, because free bodies turn
   double elasticBefore = 0;     // J, where the step begins
   double workOfPaths = 0;       // J, that led spheres give in this stage
-  std::vector<WholeMotion> whole;  // per body, at the stage's end
+  std::vector<WholeMotion> whole;  // per body, at the stage's start or end
   std::vector<LostMomenta> lost;   // per body, in this step
-  Motion balance, kept;            // the residual without loads; the motion while a derivative is taken
+  Motion balance, kept;  // the residual without loads; the motion while a derivative is taken or a search goes on
   Motion motion, residual, remaining, change, direction, image, preconditioned;
   std::vector<Eigen::Vector3d> toolImpulses;  // N s, per load, of the whole step
   std::vector<Quad> carried, given;           // per node: the operator's velocities of anchors, impulses

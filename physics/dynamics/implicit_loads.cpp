@@ -135,8 +135,7 @@ Resistance resistanceOf(const Drag& drag) {
 // weight on a slope does so without creeping. With the energy l^2 / (2 s) l = c (l0 - s v), where c <= 1 is Coulomb's
 // limit, is passive: its work is l.v = (l0 - l / c).l / s <= (l0^2 - l^2) / (2 s). Between steps of different durations
 // the force stays, not the impulse, and s may change as well: a ledger says what has really been taken in, and
-// workOfLoads() lets no more than that come back. At the limit more motion along the drag drags no more: to the system
-// only motion across it is resisted.
+// workOfLoads() lets no more than that come back.
 void settleContact(const WorldData& d, ImplicitData& s, std::size_t k, LoadRow* rows) {
   PointLoad& load = s.loads[k];
   const Contact& c = d.contact.contacts[load.index];
@@ -177,12 +176,11 @@ void settleTool(WorldData& d, ImplicitData& s, std::size_t k, const StageLoads& 
     const Vector3d& drags = p.slides ? slip : pull;
     const double size = std::hypot(drags[1], drags[2]), most = std::max(0.0, p.friction * -pull[0]);
     // A spring up to Coulomb's friction, or a damper that reaches it where sticking ends.
-    const double stiff = p.slides ? h * most / kSticking : spring, strong = p.slides ? most / kSticking * size : size;
-    const Vector3d slipping = drags[1] * load.axes[1] + drags[2] * load.axes[2];
-    setDrag(s, k, (size > 0 ? h * strong / size : 0) * slipping, h * most, Vector3d::Zero());
+    const double per = p.slides ? most / kSticking : 1, stiff = p.slides ? h * per : spring;
+    setDrag(s, k, h * per * (drags[1] * load.axes[1] + drags[2] * load.axes[2]), h * most, Vector3d::Zero());
     if (size > 0) turnTangents(s, load, rows, drags[1] / size, drags[2] / size);
     const Resistance resistance = resistanceOf(s.drags[k]);
-    force[1] = std::min(strong, most);
+    force[1] = std::min(per * size, most);
     force[2] = 0;
     weight[1] = resistance.along * stiff;
     weight[2] = resistance.across * stiff;

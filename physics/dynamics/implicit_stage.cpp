@@ -169,14 +169,15 @@ void leadDriven(WorldData& d, ImplicitData& s, double end) {
 // and what it has of the stage before, of (1 - R^-1) r / T - w x r, is over. Guessed from the velocities alone a stiff
 // body would be stretched by its turning, and a thousandth of such a residual is more than all that acts on it.
 void followArcs(WorldData& d, ImplicitData& s) {
+  s.turning.assign(d.ranges.size(), 0);
+  s.chordEnergy = 0;
+  if (std::none_of(d.ranges.begin(), d.ranges.end(), isFree)) return;
   place(d, s, 0);
   d.spheres.angularMomentum = s.start.angularMomentum;
   wholeMotions(d, s.whole);
-  s.turning.assign(s.whole.size(), 0);
-  s.chordEnergy = 0;
   for (std::size_t b = 0; b < s.whole.size(); ++b) {
     const BodyRange& range = d.ranges[b];
-    if (range.support.freedom != RigidFreedom::all) continue;
+    if (!isFree(range)) continue;
     const RigidMotion motion = rigidMotionOf(s.whole[b]);
     const double angle = s.duration * motion.spin.norm();
     if (!(angle > 1e-6)) continue;
@@ -186,24 +187,17 @@ void followArcs(WorldData& d, ImplicitData& s) {
       const Vector3d r = x - motion.centre;
       return Vector3d((by * r - r) / s.duration - motion.spin.cross(r));
     };
-    const auto visit = [&](const auto& act) {
-      for (const int i : spheresOf(range))
-        act(d.spheres.groups[i / 4].mass[i % 4], vectorOf(d.spheres.position[i]), s.motion[2 * i]);
-      for (const int i : range.node)
-        if (i < d.nodes.dynamicEnd)
-          act(d.nodes.mass[i], vectorAt(d.nodes.position, i), s.motion[2 * d.spheres.count + i]);
-    };
     const Eigen::Matrix3d back = 2 * Eigen::Matrix3d::Identity() - turn.transpose();
     double had = 0, size = 0;
-    visit([&](double mass, const Vector3d& x, const Quad& velocity) {
+    visitMasses(d, range, [&](double mass, const Vector3d& x, int quad) {
       const Vector3d before = bend(back, x);
-      had += mass * before.dot(vectorOf(velocity) - velocityAt(motion, x));
+      had += mass * before.dot(vectorOf(s.motion[quad]) - velocityAt(motion, x));
       size += mass * before.squaredNorm();
     });
     const double share = size > 0 ? std::min(1.0, std::max(0.0, had / size)) : 0;
     s.chordEnergy += 0.5 * size;
-    visit([&](double, const Vector3d& x, Quad& velocity) {
-      velocity = quadOf(vectorOf(velocity) + bend(turn, x) - share * bend(back, x));
+    visitMasses(d, range, [&](double, const Vector3d& x, int quad) {
+      s.motion[quad] = quadOf(vectorOf(s.motion[quad]) + bend(turn, x) - share * bend(back, x));
     });
   }
 }
@@ -217,9 +211,9 @@ bool search(WorldData& d, ImplicitData& s, const StageLoads& stage, double& left
   const double before = left, down = product(s.residual, s.change);
   double low = 0, high = 1, slopeLow = down, slopeHigh = 0, share = 1;
   s.kept = s.motion;
-  const auto go = [&](double share) {
+  const auto go = [&](double to) {
     s.motion = s.kept;
-    addScaled(share, s.change, s.motion);
+    addScaled(to, s.change, s.motion);
     place(d, s, s.duration);
     evaluateResidual(d, s, stage);
     left = residualSize(s);

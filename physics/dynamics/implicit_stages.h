@@ -65,6 +65,18 @@ double product(const Motion& a, const Motion& b);
 void addScaled(double f, const Motion& b, Motion& a);  // a += f b
 void hold(const std::vector<Quad>& freedom, Motion& m);
 
+inline bool isFree(const BodyRange& range) {
+  return range.support.freedom == RigidFreedom::all;
+}
+// Calls visit(mass, position, quad of its motion) for all of a body that has a motion of its own.
+template <class Visit>
+void visitMasses(const WorldData& d, const BodyRange& range, const Visit& visit) {
+  for (const int i : spheresOf(range))
+    visit(d.spheres.groups[i / 4].mass[i % 4], vectorOf(d.spheres.position[i]), 2 * i);
+  for (const int i : range.node)
+    if (i < d.nodes.dynamicEnd) visit(d.nodes.mass[i], vectorAt(d.nodes.position, i), 2 * d.spheres.count + i);
+}
+
 // implicit_stage.cpp: backward Euler in one stage, by Newton's iteration.
 // From the present state, which `s.start` holds, with its momenta there. False where the iteration does not settle.
 bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage);

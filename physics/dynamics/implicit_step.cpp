@@ -133,11 +133,11 @@ enum class Ending { done, failed, touched };
 void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents) {
   for (std::size_t b = 0; b < s.lost.size(); ++b) {
     const BodyRange& r = d.ranges[b];
-    if (r.support.freedom != RigidFreedom::all) continue;
+    if (!isFree(r)) continue;
     Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero(), turning = Vector3d::Zero();
     Vector3d start = Vector3d::Zero(), end = Vector3d::Zero();  // N s, of the whole body
     double whole = 0;
-    const auto add = [&](double mass, const Vector3d& at, std::size_t quad) {
+    visitMasses(d, r, [&](double mass, const Vector3d& at, int quad) {
       const Vector3d residual = vectorOf(s.residual[quad]), u = vectorOf(s.motion[quad]),
                      u0 = vectorOf(s.start.motion[quad]);
       linear += residual;
@@ -146,14 +146,8 @@ void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents
       start += mass * u0;
       end += mass * u;
       whole += mass;
-    };
-    for (const int i : spheresOf(r)) {
-      add(d.spheres.groups[i / 4].mass[i % 4], vectorOf(d.spheres.position[i]), 2 * i);
-      angular += vectorOf(s.residual[2 * i + 1]);
-    }
-    for (const int i : r.node)
-      if (i < d.nodes.dynamicEnd)
-        add(d.nodes.mass[i], vectorAt(d.nodes.position, i), 2 * static_cast<std::size_t>(d.spheres.count) + i);
+    });
+    for (const int i : spheresOf(r)) angular += vectorOf(s.residual[2 * i + 1]);
     s.lost[b].linear += share * linear;
     s.lost[b].angular += share * angular + tangents * (turning - end.cross(start) / whole);
   }
@@ -163,8 +157,7 @@ void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents
 void keepMomenta(WorldData& d, ImplicitData& s) {
   wholeMotions(d, s.whole);
   for (std::size_t b = 0; b < s.whole.size(); ++b)
-    if (d.ranges[b].support.freedom == RigidFreedom::all)
-      addMomenta(d, static_cast<int>(b), s.whole[b], -s.lost[b].linear, -s.lost[b].angular);
+    if (isFree(d.ranges[b])) addMomenta(d, static_cast<int>(b), s.whole[b], -s.lost[b].linear, -s.lost[b].angular);
 }
 
 struct StepEnergy {
