@@ -187,7 +187,7 @@ static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& tou
     isFlat = isFlat && (normal - contact.normal).norm() < flat;
     shaded[count++] = {normal, normal.dot(proxy.centre)};
   }
-  const Vector3d pull = proxy.centre - device, before = proxy.felt;
+  const Vector3d before = proxy.felt;
   Vector3d nearest;
   std::array<double, 3> pressure;
   proxy.felt = Vector3d::Zero();
@@ -199,41 +199,68 @@ static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& tou
     }
   }
   proxy.device = device;
-  proxy.shading = proxy.felt.isZero(0) ? Vector3d::Zero() : Vector3d(proxy.felt - pull);
 }
 
-// Coulomb friction as a change of the goal. Without friction the proxy would slide from `start` to `free`, pressed by
-// the depth |free - device|. It may trail behind `free` by up to mu times that depth. Stick: the goal is pulled back
-// onto the line through the start along the contact normal; slip: by exactly mu_d depth. Solving again towards the new
+// Where the device would draw the proxy if there were no friction, along the planes alone that stop it right here.
+// False where none does. The triangles touched a tick ago do not tell: a proxy that slid off one is within kTouching of
+// it for a tenth of a millimetre more, and their normal leans by then.
+static bool freeOfTouched(const Buckets& buckets, double alpha, Proxy proxy, const Vector3d& device, Vector3d& free) {
+  const Vector3d way = device - proxy.centre;
+  constexpr double kNear = 2e-5;  // m: of several touched surfaces that move apart only their mean is kept up with
+  const double step = std::min(1.0, kNear / way.norm());
+  const TouchedPlanes touched = slideTo(buckets, alpha, proxy.centre + step * way, proxy);
+  std::array<double, 3> pressure;
+  return touched.count > 0 && nearestInHalfSpaces(device, touched.planes.data(), touched.count, free, pressure) &&
+         (free - device).norm() > kArrived;
+}
+
+// Coulomb friction as a change of the goal. Without friction the proxy would slide from where it is to `free`, pressed
+// by the depth |free - device|. It may trail behind `free` by up to mu times that depth. Stick: the goal is pulled back
+// onto the line through the proxy along the contact normal; slip: by exactly mu_d depth. Solving again towards the new
 // goal, rather than moving `free` back, keeps grooves and bumps right.
-static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& start, const Vector3d& free,
-                             const Vector3d& device, bool& slipping) {
+//
+// `free` lies on the planes touched now, not on those met on the way: a proxy that sticks by the normal of the next
+// triangle while it lies on this one is pushed on by depth times the angle between them each tick, as far as the next
+// crease of the mesh, however slight.
+static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& free, const Vector3d& device,
+                             const Vector3d& advance, Proxy& proxy) {
   constexpr double kStill = 1e-8;  // m per tick, 12 um/s: what slips no farther sticks, else it would slip at rest
-  const double depth = (free - device).norm();
-  const Vector3d normal = (free - device) / depth;
-  const Vector3d slide = tangential(free - start, normal);
+  const double depth = (free - device).norm(), least = tool.dynamicFriction * depth;
+  const Vector3d slide = tangential(free - proxy.centre, (free - device) / depth);
   const double length = slide.norm();
-  if (length <= (slipping ? tool.dynamicFriction * depth + kStill : tool.staticFriction * depth)) {
-    slipping = false;
-    return device - slide;
+  if (length > (proxy.slipping ? least + kStill : tool.staticFriction * depth)) {
+    proxy.slipping = true;
+    proxy.slideDirection = slide / length;
+    return device - least * proxy.slideDirection;
   }
-  slipping = true;
-  return device - (tool.dynamicFriction * depth / length) * slide;
+  // A slide that pauses in a crease of the mesh, held by the next triangle as well, has not come to rest while the
+  // device goes on: else static friction would have to be overcome in each, and what presses would go over from one
+  // triangle to the other at once. A tenth less is the depth's change from one triangle to the other.
+  const Vector3d& along = proxy.slideDirection;
+  const double trail = std::min(least, along.dot(device - proxy.centre));
+  proxy.slipping = proxy.slipping && trail > 0.9 * least && along.dot(advance) > kStill;
+  return device - (proxy.slipping ? Vector3d(trail * along) : slide);
 }
 
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Vector3d& device,
                   Proxy& proxy) {
-  const Vector3d start = proxy.centre;
+  const Vector3d start = proxy.centre, advance = device - proxy.device - proxy.surfaceMotion;
+  Vector3d free, goal = device;
+  const bool isHeld = tool.staticFriction > 0 && freeOfTouched(buckets, alpha, proxy, device, free);
   TouchedPlanes touched = slideTo(buckets, alpha, device, proxy);
   shade(buckets, alpha, touched, device, proxy);
-  const bool pressed = touched.count > 0 && (proxy.centre - device).norm() > kArrived;
-  if (pressed && tool.staticFriction > 0) {
-    const Vector3d goal = frictionGoal(tool, start, proxy.centre, device, proxy.slipping);
+  if (!isHeld) free = proxy.centre;
+  const bool isPressed = touched.count > 0 && (proxy.centre - device).norm() > kArrived;
+  if (isPressed && tool.staticFriction > 0) {
     proxy.centre = start;
+    goal = frictionGoal(tool, free, device, advance, proxy);
     touched = slideTo(buckets, alpha, goal, proxy);
   }
+  proxy.shading = proxy.felt.isZero(0) ? Vector3d::Zero() : Vector3d(proxy.felt - (proxy.centre - goal));
   keepPressingContacts(buckets, alpha, touched, proxy);
-  if (!proxy.inContact()) proxy.slipping = true;
+  if (proxy.inContact()) return;
+  proxy.slipping = true;
+  proxy.slideDirection.setZero();
 }
 
 // ---- The surface moves -----------------------------------------------------------------------------------

@@ -22,6 +22,7 @@ struct Proxy {
   // The tool's radius; less while surfaces leave no room for it: a squeezed proxy shrinks rather than tunnels.
   double radius = 0;
   bool slipping = true;
+  Eigen::Vector3d slideDirection = Eigen::Vector3d::Zero();  // unit, in which it slipped last in this contact, or zero
   // m; as if by the smooth surface that the mesh stands for (force_shading.h), the proxy is felt at centre + shading.
   Eigen::Vector3d shading = Eigen::Vector3d::Zero();
   Eigen::Vector3d felt = Eigen::Vector3d::Zero();  // m, from the device to there, without friction; zero: not shaded

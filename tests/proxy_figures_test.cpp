@@ -208,6 +208,46 @@ TEST(ProxyFigures, SlidesAgainstDynamicFriction) {
   expectReached("dynamic friction of 0.3, off by", off, 1e-3);
 }
 
+// Along a trough that is bent by 2 degrees every 5.2 mm, 2 mm deep, then still. `each` gets the ratio of drag to press,
+// against the round trough's normal; by the mesh's a degree more or less is right.
+static void slideAlongTrough(const std::function<void(double time, double ratio)>& each) {
+  constexpr double round = 0.15, bend = 2 * std::numbers::pi / 180, halfWidth = 0.03;  // m, rad, m
+  constexpr int half = 10;
+  std::vector<Vector3d> nodes;
+  std::vector<std::array<int, 3>> triangles;
+  for (int i = -half; i <= half; ++i)
+    for (const double z : {-halfWidth, halfWidth})
+      nodes.emplace_back(round * std::sin(i * bend), -round * std::cos(i * bend), z);
+  for (int i = 0; i < 4 * half; i += 2) {
+    triangles.push_back({i, i + 1, i + 3});
+    triangles.push_back({i, i + 3, i + 2});
+  }
+  ProxyRun r;
+  r.shape = shapeOf(nodes, triangles);
+  r.tool.staticFriction = 0.3;
+  r.tool.dynamicFriction = 0.2;
+  const auto angle = [=](double t) { return bend * (-6.3 + 11.6 * std::clamp((t - 0.2) / 3, 0.0, 1.0)); };
+  r.device = [=](double t) {
+    const double depth = round - r.tool.radius + 0.002 * std::min(1.0, t / 0.1);
+    return Vector3d(depth * std::sin(angle(t)), -depth * std::cos(angle(t)), 0.004);
+  };
+  r.duration = 4;
+  r.run([&](double t, const ToolState& tool, const BlendedSurface&, double) {
+    const Vector3d along(std::cos(angle(t)), std::sin(angle(t)), 0), out(-along.y(), along.x(), 0);
+    each(t, -tool.force.dot(along) / tool.force.dot(out));
+  });
+}
+
+TEST(ProxyFigures, CreasesOfTheMeshDoNotChangeFriction) {
+  double off = 0, least = 1;
+  slideAlongTrough([&](double t, double ratio) {
+    if (t > 0.6 && t < 3.2) off = std::max(off, std::abs(ratio - 0.2));
+    if (t > 3.2) least = std::min(least, ratio);
+  });
+  expectReached("friction of 0.2 over creases of 2 degrees, off by", off, 0.025);
+  expectReached("the same, still: less by", 0.2 - least, 0.025);
+}
+
 // Over an ellipsoid of 468 triangles, 3 mm deep: along it, around it and across, as fast as 0.1 m/s.
 TEST(ProxyFigures, ACoarseMeshFeelsSmooth) {
   ProxyRun r;
