@@ -101,7 +101,7 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
 }
 
 // What a run came to that was hardly meant. A run that ends before a tool's motion does says nothing of the tool.
-static void printNotes(const LoadedScene& loaded, const RunTotals& totals) {
+static void printNotes(const LoadedScene& loaded, const RunTotals& totals, const CreepReport& creep) {
   for (std::size_t k = 0; k < loaded.trajectories.size(); ++k) {
     if (motionEnd(loaded.trajectories[k]) > totals.simulated + 1e-9) continue;
     const std::string& name = loaded.scene.tools[k].name;
@@ -119,6 +119,14 @@ static void printNotes(const LoadedScene& loaded, const RunTotals& totals) {
                "note: a body was turned inside out (volume_ratio_min {:.3g}): its model is too coarse, its tissue too "
                "soft for what acts on it, or a step too long\n",
                totals.volumeRatioMin);
+  if (creep.substeps == 0) return;
+  std::vector<std::string> names;
+  for (std::size_t b = 0; b < creep.bodies.size(); ++b)
+    if (creep.bodies[b]) names.push_back(fmt::format("'{}'", loaded.scene.bodies[b].name));
+  fmt::print(stderr,
+             "note: no step held in {}, where {} crept on without speed: deformed beyond what steps follow, for what "
+             "acts there\n",
+             creep.substeps == 1 ? "1 substep" : fmt::format("{} substeps", creep.substeps), fmt::join(names, ", "));
 }
 
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
@@ -143,7 +151,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   }
   if (finish) finish();
   recorders.commit(simulation);
-  printNotes(loaded, simulation.totals());
+  printNotes(loaded, simulation.totals(), simulation.world().creep());
   return recorders.forceResults();
 }
 

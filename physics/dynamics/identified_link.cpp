@@ -148,9 +148,13 @@ double identifiedLinkEnergy(const Identified& s, const IdentifiedBody& body) {
   return sum;
 }
 
-double identifiedLinkEnergy(const WorldData& d) {
+double identifiedLinkEnergy(const WorldData& d, std::vector<double>* ofBodies) {
   double sum = 0;
-  for (const IdentifiedBody& body : d.identified.bodies) sum += identifiedLinkEnergy(d.identified, body);
+  for (std::size_t b = 0; b < d.identified.bodies.size(); ++b) {
+    const double own = identifiedLinkEnergy(d.identified, d.identified.bodies[b]);
+    sum += own;
+    if (ofBodies != nullptr) (*ofBodies)[b] += own;
+  }
   return sum;
 }
 

@@ -9,14 +9,14 @@ namespace medulla {
 // identified_link.cpp
 void evaluateIdentifiedLinks(WorldData&, const Batch&);  // frames from spheres; links' forces on frames
 void returnFrameForces(WorldData&, const Batch&);        // from frames to spheres, added
-double identifiedLinkEnergy(const WorldData&);
+double identifiedLinkEnergy(const WorldData&, std::vector<double>* ofBodies);  // as linkEnergy()
 double identifiedLinkEnergy(const Identified&, const IdentifiedBody&);
 
 // identified_turns.cpp
 // Frames that links tell a whole turn apart are so no longer, of the state that frames were last placed at: where that
 // leaves less energy in the links, or whatever it leaves.
 void dropCostlyTurns(WorldData&);
-void dropWholeTurns(WorldData&);
+void dropWholeTurns(WorldData&, int body);
 
 // identified_surface.cpp: the nodes of a range that hangs on frames.
 void pullOnFrames(WorldData&, const HostRange&);

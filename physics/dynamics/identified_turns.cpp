@@ -90,9 +90,9 @@ void dropCostlyTurns(WorldData& d) {
     if (anyTurnedTooFar(d.identified, body)) alignSigns(d, body, false);
 }
 
-void dropWholeTurns(WorldData& d) {
-  for (const IdentifiedBody& body : d.identified.bodies)
-    if (anyTurnedTooFar(d.identified, body)) alignSigns(d, body, true);
+void dropWholeTurns(WorldData& d, int body) {
+  const IdentifiedBody& of = d.identified.bodies[body];
+  if (anyTurnedTooFar(d.identified, of)) alignSigns(d, of, true);
 }
 
 }  // namespace medulla

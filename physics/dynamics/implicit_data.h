@@ -76,6 +76,18 @@ struct LostMomenta {
   Eigen::Vector3d linear, angular;
 };
 
+// What the energy of a body that joined no other by contact says of a step, or of all that joined.
+enum class Verdict { passes, slows, rests, fails };
+
+// J: of a body, or of an island of bodies that push each other, in the balance of its first.
+struct EnergyBalance {
+  double kineticBefore = 0, elasticBefore = 0, kinetic = 0, elastic = 0;
+  double given = 0;   // by gravity, loads, contacts and paths
+  double chords = 0;  // of velocities across the tangents, because free bodies turn
+  double mass = 0;    // kg
+  double most = 0;    // WorldData::mostEnergy
+};
+
 struct ImplicitData {
   double duration = 0;  // s, of a stage
   // Constants.
@@ -111,15 +123,19 @@ struct ImplicitData {
   StageStart before, start;      // of the step, of its present stage
   std::vector<double> bodyMass;  // kg, per body
   double totalMass = 0;          // kg
+  std::vector<int> bodyOf;       // as Motion
   // J, per body: twice the energy of the motion that its residual would give its free masses, and what is little
   // enough.
   std::vector<double> left, enough;
   std::vector<double> turning;  // J^1/2, per free body: root of twice its energy of turning, times the angle; 0: slow
-  double chordEnergy = 0;       // J: of velocities across the tangents, because free bodies turn
-  double elasticBefore = 0;     // J, where the step begins
-  double workOfPaths = 0;       // J, that led spheres give in this stage
-  std::vector<WholeMotion> whole;  // per body, at the stage's start or end
-  std::vector<LostMomenta> lost;   // per body, in this step
+  double elasticBefore = 0;     // J, of all, where the step begins
+  std::vector<double> workOfPaths, workOfLoads;  // J, per body, in this stage
+  std::vector<EnergyBalance> bodies, islands;    // per body
+  std::vector<int> island;                       // per body: the first one of its island
+  std::vector<Verdict> verdicts;                 // per body: of its island
+  std::vector<double> sums;                      // J, per body, while energies are summed up
+  std::vector<WholeMotion> whole;                // per body, at the stage's start or end
+  std::vector<LostMomenta> lost;                 // per body, in this step
   Motion balance, kept;  // the residual without loads; the motion while a derivative is taken or a search goes on
   Motion motion, residual, remaining, change, direction, image, preconditioned;
   std::vector<Eigen::Vector3d> toolImpulses;  // N s, per load, of the whole step

@@ -71,6 +71,13 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
     for (const int i : r.node) mass += d.nodes.mass[i];
     s.totalMass += mass;
   }
+  for (std::size_t b = 0; b < d.ranges.size(); ++b)
+    s.bodyOf.insert(s.bodyOf.end(), 2 * static_cast<std::size_t>(d.ranges[b].sphereCount), static_cast<int>(b));
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) s.bodyOf.push_back(d.nodes.groupHosts[i / 4].body);
+  for (std::vector<double>* of : {&s.workOfPaths, &s.workOfLoads, &s.sums}) of->resize(d.ranges.size());
+  for (std::vector<EnergyBalance>* of : {&s.bodies, &s.islands}) of->resize(d.ranges.size());
+  s.island.resize(d.ranges.size());
+  s.verdicts.resize(d.ranges.size());
   for (int k = 0; k < d.links.count; ++k) {
     const LinkGroup& g = d.links.groups[k / 4];
     s.pairs.push_back({static_cast<int>(g.sphere0[k % 4]), static_cast<int>(g.sphere1[k % 4])});

@@ -228,7 +228,7 @@ void keepFriction(WorldData& d, const ImplicitData& s) {
   d.contact.held.clear();
   for (std::size_t k = 0; k < s.loads.size() && s.loads[k].isContact; ++k) {
     const LoadRow* rows = &s.rows[3 * k];
-    if (!(rows[0].impulse > 0)) continue;
+    if (!(rows[0].impulse > 0) || hasFailed(s, bodyOf(s, rows[0]))) continue;
     const Vector3d impulse = rows[1].impulse * s.loads[k].axes[1] + rows[2].impulse * s.loads[k].axes[2];
     const double left = std::max(0.0, s.held[s.loads[k].index].energy - workAcross(s, rows));
     d.contact.held.push_back({d.contact.contacts[s.loads[k].index].key, quadOf(impulse / s.duration),
@@ -236,16 +236,19 @@ void keepFriction(WorldData& d, const ImplicitData& s) {
   }
 }
 
-double workOfLoads(const ImplicitData& s) {
-  double sum = 0;
+void sumWorkOfLoads(ImplicitData& s) {
+  std::vector<double>& work = s.workOfLoads;
+  std::fill(work.begin(), work.end(), 0);
   for (std::size_t k = 0; k < s.loads.size(); ++k) {
     const LoadRow* rows = &s.rows[3 * k];
+    if (isEmpty(rows[0])) continue;
+    double& of = work[bodyOf(s, rows[0])];
     const double across = workAcross(s, rows);
-    sum += rows[0].impulse * rateOf(s, rows[0]);
-    sum += s.loads[k].isContact ? std::min(across, s.held[s.loads[k].index].energy) : across;
+    of += rows[0].impulse * rateOf(s, rows[0]);
+    of += s.loads[k].isContact ? std::min(across, s.held[s.loads[k].index].energy) : across;
   }
-  for (std::size_t k = 3 * s.loads.size(); k < s.rows.size(); ++k) sum += s.rows[k].impulse * rateOf(s, s.rows[k]);
-  return sum;
+  for (std::size_t k = 3 * s.loads.size(); k < s.rows.size(); ++k)
+    if (!isEmpty(s.rows[k])) work[bodyOf(s, s.rows[k])] += s.rows[k].impulse * rateOf(s, s.rows[k]);
 }
 
 bool contactPushes(const ImplicitData& s) {

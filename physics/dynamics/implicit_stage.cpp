@@ -133,9 +133,10 @@ void evaluateResidual(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   balanceForces(d, s, s.balance);
   s.residual = s.balance;
   evaluateLoads(d, s, stage);
-  s.workOfPaths = 0;
+  s.workOfPaths.assign(d.ranges.size(), 0);
   for (const SphereDrive& drive : d.drives)
-    s.workOfPaths += dotProduct(load(s.residual[2 * drive.sphere]), load(s.motion[2 * drive.sphere]));
+    s.workOfPaths[s.bodyOf[2 * drive.sphere]] +=
+        dotProduct(load(s.residual[2 * drive.sphere]), load(s.motion[2 * drive.sphere]));
   hold(s.freedom, s.residual);
   measureResidual(d, s);
 }
@@ -170,7 +171,7 @@ void leadDriven(WorldData& d, ImplicitData& s, double end) {
 // body would be stretched by its turning, and a thousandth of such a residual is more than all that acts on it.
 void followArcs(WorldData& d, ImplicitData& s) {
   s.turning.assign(d.ranges.size(), 0);
-  s.chordEnergy = 0;
+  for (EnergyBalance& e : s.bodies) e.chords = 0;
   if (std::none_of(d.ranges.begin(), d.ranges.end(), isFree)) return;
   place(d, s, 0);
   d.spheres.angularMomentum = s.start.angularMomentum;
@@ -195,7 +196,7 @@ void followArcs(WorldData& d, ImplicitData& s) {
       size += mass * before.squaredNorm();
     });
     const double share = size > 0 ? std::min(1.0, std::max(0.0, had / size)) : 0;
-    s.chordEnergy += 0.5 * size;
+    s.bodies[b].chords = 0.5 * size;
     visitMasses(d, range, [&](double, const Vector3d& x, int quad) {
       s.motion[quad] = quadOf(vectorOf(s.motion[quad]) + bend(turn, x) - share * bend(back, x));
     });
@@ -249,10 +250,9 @@ double leastResidual(const ImplicitData& s) {
 
 }  // namespace
 
-// J, below which motion is what the iteration leaves open.
-double restEnergy(const ImplicitData& s) {
+double restEnergy(const ImplicitData& s, double mass) {
   const double least = kSettled * leastResidual(s);
-  return 0.5 * s.totalMass * least * least;
+  return 0.5 * mass * least * least;
 }
 
 namespace {

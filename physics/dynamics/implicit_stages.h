@@ -30,9 +30,15 @@ struct StageLoads {
 };
 void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& loads);  // rows, and their part of the residual
 void recallFriction(const WorldData& d, ImplicitData& s);  // of ContactData::contacts: ImplicitData::held
-void keepFriction(WorldData& d, const ImplicitData& s);    // for the step after this one
+void keepFriction(WorldData& d, const ImplicitData& s);    // for the step after this one; of bodies that did not fail
 bool contactPushes(const ImplicitData& s);
-double workOfLoads(const ImplicitData& s);  // J, in this stage
+void sumWorkOfLoads(ImplicitData& s);      // ImplicitData::workOfLoads; a contact's is its first body's
+inline bool isEmpty(const LoadRow& row) {  // of a held node of a skin
+  return row.first == row.end;
+}
+inline int bodyOf(const ImplicitData& s, const LoadRow& row) {  // the first, where two touch
+  return s.bodyOf[s.rowQuad[row.first]];
+}
 
 // link_stiffness.cpp: adds the links' stiffness and damping, times the squared duration, to `diagonal`; sets `beside`.
 void addLinkStiffness(const WorldData& d, ImplicitData& s);
@@ -81,7 +87,7 @@ void visitMasses(const WorldData& d, const BodyRange& range, const Visit& visit)
 // From the present state, which `s.start` holds, with its momenta there. False where the iteration does not settle.
 bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage);
 void place(WorldData& d, const ImplicitData& s, double time);  // where `s.motion` leads to in `time` from the start
-double restEnergy(const ImplicitData& s);  // J, below which motion is what the iteration leaves open
+double restEnergy(const ImplicitData& s, double mass);  // J, below which motion is what the iteration leaves open
 // Of the four spheres of a group as they stand.
 Lanes3 angularMomenta(const WorldData& d, const ImplicitData& s, std::size_t group);
 // `visit(sphere, momentum)` of every sphere.
@@ -94,6 +100,20 @@ void visitAngularMomenta(const WorldData& d, const ImplicitData& s, const Visit&
     for (int k = 0; k < std::min(4, d.spheres.count - i); ++k) visit(i + k, l[k]);
   }
 }
+
+// implicit_energy.cpp: what a step made of energy, judged for each island of bodies that push each other by itself.
+void noteEnergyBefore(WorldData& d, ImplicitData& s);       // at forces of the state that the step sets out from
+double kineticEnergy(const WorldData& d, ImplicitData& s);  // J
+// At the step's end: ImplicitData::verdicts. False where any failed, and nothing is done then. Else islands that gained
+// a little are slowed down, and those at rest stay as they were.
+bool keepEnergy(WorldData& d, ImplicitData& s, bool twoStages);
+// The same where some failed that cannot be tried again: these go on without speed.
+void creep(WorldData& d, ImplicitData& s);
+inline bool hasFailed(const ImplicitData& s, int body) {
+  return s.verdicts[body] == Verdict::fails;
+}
+// Puts back the state that `start` holds.
+void restore(WorldData& d, const StageStart& start);
 
 // implicit_step.cpp: one substep; positions, velocities, momenta and the tools' impulses.
 void stepImplicitly(WorldData& d, const Loads& loads, const StepTime& time, std::vector<Eigen::Vector3d>& toolImpulse);

@@ -73,57 +73,13 @@ void beginSecondStage(WorldData& d, ImplicitData& s, double late) {
   std::copy_n(d.nodes.position.begin(), s.start.nodePosition.size(), s.start.nodePosition.begin());
 }
 
-// J
-double kineticEnergy(const WorldData& d, const ImplicitData& s) {
-  double kinetic = 0;
-  visitAngularMomenta(d, s, [&](int i, Lanes momentum) {
-    kinetic += d.spheres.groups[i / 4].mass[i % 4] * vectorOf(d.spheres.velocity[i]).squaredNorm() +
-               dotProduct(load(d.spheres.angularVelocity[i]), momentum);
-  });
-  for (int i = 0; i < d.nodes.dynamicEnd; ++i) kinetic += d.nodes.mass[i] * vectorAt(d.nodes.velocity, i).squaredNorm();
-  return 0.5 * kinetic;
-}
-
-// J: what gravity, loads, contacts and paths give in the last stage, for the time of the whole step.
-double workOf(const WorldData& d, const ImplicitData& s) {
-  double sum = s.workOfPaths;
-  const Vector3d gravity = s.duration * vectorOf(d.gravity);
-  for (int i = 0; i < d.spheres.count; ++i)
-    sum += d.spheres.groups[i / 4].mass[i % 4] * gravity.dot(vectorOf(s.motion[2 * i]));
-  for (int i = 0; i < d.nodes.dynamicEnd; ++i)
-    sum += d.nodes.mass[i] * gravity.dot(vectorOf(s.motion[2 * d.spheres.count + i]));
-  sum += workOfLoads(s);
-  return d.substep / s.duration * sum;
-}
-
-void slowDown(WorldData& d, double share) {
-  const Lanes kept = splat(share);
-  for (std::vector<Quad>* all : {&d.spheres.velocity, &d.spheres.angularVelocity, &d.spheres.angularMomentum})
-    for (Quad& v : *all) store(v, kept * load(v));
-  for (Lanes3& v : d.nodes.velocity) v = kept * v;
-}
-
-// Puts back the state that `start` holds.
-void restore(WorldData& d, const StageStart& start) {
-  Spheres& s = d.spheres;
-  s.position = start.position;
-  s.orientation = start.orientation;
-  s.angularMomentum = start.angularMomentum;
-  std::copy(start.nodePosition.begin(), start.nodePosition.end(), d.nodes.position.begin());
-  d.links.unwoundTwist = start.unwoundTwist;
-  for (int i = 0; i < s.count; ++i) {
-    s.velocity[i] = start.motion[2 * i];
-    s.angularVelocity[i] = start.motion[2 * i + 1];
-  }
-  for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) d.nodes.velocity[g] = gatherFour(start.motion, 2 * s.count + 4 * g);
-}
-
 void addToolImpulses(const WorldData& d, double time, std::vector<Vector3d>& impulses) {
   for (std::size_t k = 0; k < impulses.size(); ++k) impulses[k] += time * d.loadForces[k];
 }
 
 // How a step ended: done; not settled, or with energy from nowhere, or so far that contacts may have been passed;
-// or with a contact that pushes in a step of two stages. The state is of no account but where it is done.
+// or with a contact that pushes in a step of two stages. The state is of no account but where it is done, or cannot be
+// tried again.
 enum class Ending { done, failed, touched };
 
 // Adds up what a stage takes of free bodies' momenta. The sum of a body's residuals is what Newton's iteration left
@@ -160,37 +116,12 @@ void keepMomenta(WorldData& d, ImplicitData& s) {
     if (isFree(d.ranges[b])) addMomenta(d, static_cast<int>(b), s.whole[b], -s.lost[b].linear, -s.lost[b].angular);
 }
 
-struct StepEnergy {
-  double kinetic, elastic;  // J
-};
-
-Ending checkEnergy(WorldData& d, const ImplicitData& s, bool twoStages, const StepEnergy& before) {
-  // Backward Euler loses energy where the potential is convex; elsewhere this decides. Order 2 swings about it.
-  const double given = workOf(d, s), elastic = elasticEnergy(d), kinetic = kineticEnergy(d, s);
-  const double sum = before.kinetic + before.elastic, scale = sum + std::abs(given), allowed = sum + given - elastic;
-  if (twoStages) return kinetic <= allowed + 0.5 * scale ? Ending::done : Ending::failed;
-  if (kinetic <= allowed) return Ending::done;
-  // At rest what the iteration leaves open has either sign: such a world stays.
-  if (std::max(kinetic, before.kinetic) < restEnergy(s)) {
-    restore(d, s.before);
-    slowDown(d, 0);
-    return Ending::done;
-  }
-  constexpr double kSlack = 1e-3, kRounding = 1e-13;
-  // After a shorter step than this one velocities along chords have more of it.
-  if (!(kinetic <= allowed + kSlack * scale + s.chordEnergy)) return Ending::failed;
-  slowDown(d, std::sqrt(std::max(0.0, allowed) / kinetic));
-  return allowed > -kRounding * scale ? Ending::done : Ending::failed;
-}
-
 // One or two stages from s.before.
-Ending attempt(WorldData& d, ImplicitData& s, std::size_t halvings, const Loads& loads, const StepTime& time,
-               const StepEnergy& before) {
+Ending attempt(WorldData& d, ImplicitData& s, std::size_t halvings, const Loads& loads, const StepTime& time) {
   // A body far beyond what its links measure may not settle in any step; what loses energy is then good enough.
   constexpr std::size_t kMustSettle = 2;
   const double late = d.substep - s.duration;  // 0 in one stage
   s.start = s.before;
-  s.elasticBefore = before.elastic;
   s.lost.assign(d.ranges.size(), {Vector3d::Zero(), Vector3d::Zero()});
   s.toolImpulses.assign(d.loadForces.size(), Vector3d::Zero());
   const auto solve = [&](const StepTime& end, double lasting) {
@@ -211,23 +142,17 @@ Ending attempt(WorldData& d, ImplicitData& s, std::size_t halvings, const Loads&
   if (last != Ending::done) return last;
   visitAngularMomenta(d, s, [&](int i, Lanes momentum) { store(d.spheres.angularMomentum[i], momentum); });
   noteLost(d, s, 1, s.duration);
-  if (kineticEnergy(d, s) > restEnergy(s)) keepMomenta(d, s);
-  return checkEnergy(d, s, late > 0, before);
+  if (kineticEnergy(d, s) > restEnergy(s, s.totalMass)) keepMomenta(d, s);
+  return keepEnergy(d, s, late > 0) ? Ending::done : Ending::failed;
 }
 
-// The last resort of a body so deformed that its forces are not the slope of its energy (links shorter than a
-// twentieth, or folded to 180 degrees): it moves without speed, as long as it has no more energy than it has ever had,
-// or stays. Likewise frames that were a whole turn apart are so no longer.
-void creep(WorldData& d, const ImplicitData& s) {
-  notePenetration(d.contact);
-  d.contact.held.clear();
-  if (!(elasticEnergy(d) <= d.mostEnergy)) restore(d, s.before);
-  slowDown(d, 0);
-  const auto orientation = d.spheres.orientation;
-  runStage(d, evaluateForces);
-  dropWholeTurns(d);
-  runStage(d, evaluateForces);
-  if (!(elasticEnergy(d) <= d.mostEnergy)) d.spheres.orientation = orientation;
+// What tools gave to bodies whose step did not fail.
+void giveToTools(const WorldData& d, const ImplicitData& s, const Loads& loads, const StepTime& time,
+                 std::vector<Vector3d>& toolImpulse) {
+  for (std::size_t k = 0; k < d.loadForces.size(); ++k) {
+    const PointSpring spring = pointSpring(d, loads, k, time.remaining);
+    if (!hasFailed(s, d.nodes.groupHosts[spring.nodes[0] / 4].body)) toolImpulse[spring.tool] += s.toolImpulses[k];
+  }
 }
 
 void advanceBy(WorldData& d, Part part, const Loads& loads, const StepTime& time, std::vector<Vector3d>& toolImpulse);
@@ -254,17 +179,16 @@ void advanceBy(WorldData& d, Part part, const Loads& loads, const StepTime& time
   ImplicitData& s = dataOf(d, part);
   beginHere(d, s.before);
   runStage(d, evaluateForces);
-  const StepEnergy before{kineticEnergy(d, s), elasticEnergy(d)};
-  d.mostEnergy = std::max(d.mostEnergy, before.kinetic + before.elastic);
-  const Ending ending = attempt(d, s, part.halvings, loads, time, before);
-  if (ending == Ending::done) {
+  noteEnergyBefore(d, s);
+  const Ending ending = attempt(d, s, part.halvings, loads, time);
+  const bool last = deepest && part.oneStage;  // fails by its energy alone
+  if (last && ending != Ending::done) creep(d, s);
+  if (last || ending == Ending::done) {
     keepFriction(d, s);
     notePenetration(d.contact);
-    for (std::size_t k = 0; k < d.loadForces.size(); ++k)
-      toolImpulse[pointSpring(d, loads, k, time.remaining).tool] += s.toolImpulses[k];
+    giveToTools(d, s, loads, time, toolImpulse);
     return;
   }
-  if (deepest && part.oneStage) return creep(d, s);
   restore(d, s.before);
   if (deepest || ending == Ending::touched) return advanceBy(d, {part.halvings, true}, loads, time, toolImpulse);
   advanceByHalves(d, part.halvings, loads, time, toolImpulse);
@@ -273,7 +197,9 @@ void advanceBy(WorldData& d, Part part, const Loads& loads, const StepTime& time
 }  // namespace
 
 void stepImplicitly(WorldData& d, const Loads& loads, const StepTime& time, std::vector<Vector3d>& toolImpulse) {
+  d.creepsNow = false;
   advanceBy(d, {}, loads, time, toolImpulse);
+  d.creep.substeps += d.creepsNow;
 }
 
 }  // namespace medulla

@@ -135,7 +135,7 @@ void appendNodes(NodeOrder& order, WorldData& d, const BodyMechanics& mechanics,
       order.node.push_back(-1);
     }
     range.endGroup = static_cast<int>(order.node.size()) / 4;
-    d.nodes.groupHosts.resize(range.endGroup, {range.host, onLink});
+    d.nodes.groupHosts.resize(range.endGroup, {range.host, onLink, b});
     ranges.push_back(range);
   }
 }
@@ -339,6 +339,8 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
   addSprings(d, mechanics);
   for (std::size_t b = 0; b < d.bodies.size(); ++b) addDrives(d, d.bodies[b], d.ranges[b]);
   listSlots(d);
+  d.mostEnergy.resize(d.bodies.size(), 0);
+  d.creep.bodies.resize(d.bodies.size(), false);
   layOutRest(d);
   layOutSurfaceParts(d, mechanics);
   refreshAngularVelocities(d);

@@ -368,8 +368,9 @@ static double energyOf(const LinkGroup& link, const LinkMeasures& m, const Flexi
          link.elongation[lane] * (link.beam[lane] > 0 ? rest * rest * neoHookeanEnergy(length / rest) : linear);
 }
 
-double linkEnergy(const WorldData& d) {
-  double sum = identifiedLinkEnergy(d);
+double linkEnergy(const WorldData& d, std::vector<double>* ofBodies) {
+  double sum = identifiedLinkEnergy(d, ofBodies);
+  std::size_t body = 0;
   for (std::size_t g = 0; g < d.links.groups.size(); ++g) {
     const LinkGroup& link = d.links.groups[g];
     const LinkMeasures m =
@@ -380,7 +381,13 @@ double linkEnergy(const WorldData& d) {
     const Flexion &m0 = b.moments0, &m1 = b.moments1;
     const Lanes twice = q0.a * m0.a + q0.b * m0.b + q1.a * m1.a + q1.b * m1.b + link.torsion * m.twist * m.twist;
     const int lanes = std::min(4, d.links.count - 4 * static_cast<int>(g));
-    for (int lane = 0; lane < lanes; ++lane) sum += energyOf(link, m, q0, q1, twice, lane);
+    for (int lane = 0; lane < lanes; ++lane) {
+      const double own = energyOf(link, m, q0, q1, twice, lane);
+      sum += own;
+      if (ofBodies == nullptr) continue;
+      while (4 * static_cast<int>(g) + lane >= d.ranges[body].firstLink + d.ranges[body].linkCount) ++body;
+      (*ofBodies)[body] += own;
+    }
   }
   return sum;
 }

@@ -86,9 +86,10 @@ void feelGravity(WorldData&);  // before it, at a frame's end: less what bodies 
 // Angular velocity from orientation and angular momentum.
 void refreshAngularVelocities(WorldData&);
 
-// J: elastic energies of the current state.
-double linkEnergy(const WorldData&);
-double surfaceEnergy(const WorldData&);  // edges, attachments and pressure; of the last evaluateAttachments()
+// J: elastic energies of the current state; where `ofBodies` is given, each body's is added there.
+double linkEnergy(const WorldData&, std::vector<double>* ofBodies = nullptr);
+// Edges, attachments and pressure; of the last evaluateAttachments().
+double surfaceEnergy(const WorldData&, std::vector<double>* ofBodies = nullptr);
 inline double elasticEnergy(const WorldData& d) {
   return linkEnergy(d) + surfaceEnergy(d);
 }

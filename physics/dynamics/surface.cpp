@@ -135,21 +135,26 @@ void finishNodeForces(WorldData& d, const Batch& batch) {
     range.onFrames ? returnToFrames(d, range, splat(pressureOf(d, range))) : returnToSphere(d, range);
 }
 
-double surfaceEnergy(const WorldData& d) {
+double surfaceEnergy(const WorldData& d, std::vector<double>* ofBodies) {
   double sum = 0;
+  const auto add = [&](double energy, int body) {
+    sum += energy;
+    if (ofBodies != nullptr) (*ofBodies)[body] += energy;
+  };
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
     const Eigen::Vector3d own = vectorOf(d.nodes.displaced[i]);
-    sum += 0.5 * d.nodes.groups[i / 4].stiffness[i % 4] * own.squaredNorm() + normalEnergy(d, i);
+    const int body = d.nodes.groupHosts[i / 4].body;
+    add(0.5 * d.nodes.groups[i / 4].stiffness[i % 4] * own.squaredNorm() + normalEnergy(d, i), body);
     for (int e = d.springs.first[i / 4]; e < d.springs.first[i / 4 + 1]; ++e) {
       const SpringGroup& s = d.springs.groups[e];  // half of each spring here, half at its other node
       const Eigen::Vector3d other = vectorOf(d.nodes.displaced[s.other[i % 4] / sizeof(Quad)]);
-      sum += 0.25 * s.stiffness[i % 4] * (other - own).squaredNorm();
+      add(0.25 * s.stiffness[i % 4] * (other - own).squaredNorm(), body);
     }
   }
   for (std::size_t k = 0; k < d.surface.parts.size(); ++k) {
     const HostRange r = movingRange(d, k);
     const double pressure = pressureOf(d, r);
-    if (pressure != 0) sum += pressure * d.nodes.swollen[r.part] - 0.5 * pressure * pressure / r.bulk;
+    if (pressure != 0) add(pressure * d.nodes.swollen[r.part] - 0.5 * pressure * pressure / r.bulk, r.body);
   }
   return sum;
 }

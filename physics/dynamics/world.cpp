@@ -310,6 +310,10 @@ const std::vector<BodyOverlap>& World::startOverlaps() const {
   return data_->contact.startOverlaps;
 }
 
+const CreepReport& World::creep() const {
+  return data_->creep;
+}
+
 std::uint64_t World::stateHash() const {
   const WorldData& d = *data_;
   NumberHash hash;
@@ -344,7 +348,8 @@ std::uint64_t World::stateHash() const {
   for (const SurfacePart& p : d.surface.parts)
     if (!p.always) hash.add(p.moves ? p.quietFrames : -1.0);
   for (const Quad& q : d.surface.weight) add(q, 3);
-  if (d.settings.integrator == Integrator::implicit) hash.add(d.mostEnergy);
+  if (d.settings.integrator == Integrator::implicit)
+    for (const double most : d.mostEnergy) hash.add(most);
   for (const Rest& r : d.rest) hash.add(r.asleep ? -1.0 : r.stillFrames);
   for (const StillPlace& place : d.stillPlace) {
     add(place.position, 3);

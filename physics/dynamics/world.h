@@ -105,6 +105,12 @@ struct Energies {
   double kinetic = 0, elastic = 0, gravity = 0;  // J
 };
 
+// Implicit substeps in which a step failed at every length, so that bodies went on without speed.
+struct CreepReport {
+  long substeps = 0;
+  std::vector<bool> bodies;  // which ones, in any of them
+};
+
 struct WorldData;  // arrays laid out for the step; physics/dynamics/world_data.h
 
 class World {
@@ -135,6 +141,7 @@ class World {
   // What contact has let through so far; who overlapped before anything moved, each pair of bodies once, in order.
   PenetrationReport penetration() const;
   const std::vector<BodyOverlap>& startOverlaps() const;
+  const CreepReport& creep() const;
   std::uint64_t stateHash() const;  // FNV-1a over every state variable's bits
 
   WorldData& data() { return *data_; }  // for tortures, tests and benchmarks: states that no scene can reach

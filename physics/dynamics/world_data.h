@@ -158,6 +158,7 @@ struct HostRange {
 struct GroupHost {
   int host;
   bool onLink;
+  int body;
 };
 
 struct Nodes {
@@ -360,7 +361,9 @@ struct WorldData {
   SkinLoads skinLoads;
   ContactData contact;
   std::vector<std::shared_ptr<ImplicitData>> implicit;  // per halving of the step; made when it is first needed
-  double mostEnergy = 0;  // J, kinetic and elastic, at the beginning of any implicit step so far
+  std::vector<double> mostEnergy;  // J, per body: kinetic and elastic, at the beginning of any implicit step so far
+  CreepReport creep;
+  bool creepsNow = false;  // some body, in the present substep
 
   // Force of each tool load in the current substep, tool springs first, then held nodes; zero at the frame's start.
   std::vector<Eigen::Vector3d> loadForces;

@@ -1,0 +1,226 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "physics/dynamics/identified_stages.h"
+#include "physics/dynamics/implicit_stages.h"
+#include "physics/dynamics/stages.h"
+
+// Backward Euler loses energy where the potential is convex; elsewhere, what a step made of energy decides. Nothing but
+// contacts that push takes energy from body to body: what these join is an island, and judged by itself.
+namespace medulla {
+
+namespace {
+
+using Eigen::Vector3d;
+
+// J, of each body into `sums`.
+void sumKineticEnergies(const WorldData& d, const ImplicitData& s, std::vector<double>& sums) {
+  sums.assign(d.ranges.size(), 0);
+  visitAngularMomenta(d, s, [&](int i, Lanes momentum) {
+    sums[s.bodyOf[2 * i]] += d.spheres.groups[i / 4].mass[i % 4] * vectorOf(d.spheres.velocity[i]).squaredNorm() +
+                             dotProduct(load(d.spheres.angularVelocity[i]), momentum);
+  });
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i)
+    sums[s.bodyOf[2 * d.spheres.count + i]] += d.nodes.mass[i] * vectorAt(d.nodes.velocity, i).squaredNorm();
+  for (double& sum : sums) sum *= 0.5;
+}
+
+void setKinetic(const WorldData& d, ImplicitData& s, double EnergyBalance::*kinetic) {
+  sumKineticEnergies(d, s, s.sums);
+  for (std::size_t b = 0; b < s.bodies.size(); ++b) s.bodies[b].*kinetic = s.sums[b];
+}
+
+// Returns the sum of all.
+double setElastic(const WorldData& d, ImplicitData& s, double EnergyBalance::*elastic) {
+  std::fill(s.sums.begin(), s.sums.end(), 0);
+  const double links = linkEnergy(d, &s.sums);
+  for (std::size_t b = 0; b < s.bodies.size(); ++b) s.bodies[b].*elastic = s.sums[b];
+  std::fill(s.sums.begin(), s.sums.end(), 0);
+  const double surfaces = surfaceEnergy(d, &s.sums);
+  for (std::size_t b = 0; b < s.bodies.size(); ++b) s.bodies[b].*elastic += s.sums[b];
+  return links + surfaces;
+}
+
+// What gravity, loads, contacts and paths give in the last stage, for the time of the whole step.
+void setGiven(const WorldData& d, ImplicitData& s) {
+  std::vector<double>& sums = s.sums;
+  sums = s.workOfPaths;
+  const Vector3d gravity = s.duration * vectorOf(d.gravity);
+  for (int i = 0; i < d.spheres.count; ++i)
+    sums[s.bodyOf[2 * i]] += d.spheres.groups[i / 4].mass[i % 4] * gravity.dot(vectorOf(s.motion[2 * i]));
+  for (int i = 0; i < d.nodes.dynamicEnd; ++i) {
+    const int quad = 2 * d.spheres.count + i;
+    sums[s.bodyOf[quad]] += d.nodes.mass[i] * gravity.dot(vectorOf(s.motion[quad]));
+  }
+  sumWorkOfLoads(s);
+  for (std::size_t b = 0; b < sums.size(); ++b)
+    s.bodies[b].given = d.substep / s.duration * (sums[b] + s.workOfLoads[b]);
+}
+
+int firstOf(const ImplicitData& s, int body) {
+  while (s.island[body] != body) body = s.island[body];
+  return body;
+}
+
+void joinIslands(ImplicitData& s) {
+  std::iota(s.island.begin(), s.island.end(), 0);
+  for (const LoadRow& row : s.rows) {
+    if (row.impulse == 0) continue;
+    for (int k = row.first; k < row.end; ++k) {
+      const int a = firstOf(s, bodyOf(s, row)), b = firstOf(s, s.bodyOf[s.rowQuad[k]]);
+      s.island[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  for (int& first : s.island) first = s.island[first];  // in rising order: that of an earlier body is final
+}
+
+void add(const EnergyBalance& own, EnergyBalance& to) {
+  for (double EnergyBalance::*part :
+       {&EnergyBalance::kineticBefore, &EnergyBalance::elasticBefore, &EnergyBalance::kinetic, &EnergyBalance::elastic,
+        &EnergyBalance::given, &EnergyBalance::chords, &EnergyBalance::mass, &EnergyBalance::most})
+    to.*part += own.*part;
+}
+
+// Of bodies into islands.
+void sumBalances(ImplicitData& s) {
+  s.islands.assign(s.bodies.size(), {});
+  for (std::size_t b = 0; b < s.bodies.size(); ++b) add(s.bodies[b], s.islands[s.island[b]]);
+}
+
+// J: what may be kinetic.
+double allowedOf(const EnergyBalance& e) {
+  return e.kineticBefore + e.elasticBefore + e.given - e.elastic;
+}
+
+Verdict judge(const ImplicitData& s, const EnergyBalance& e, bool twoStages) {
+  const double scale = e.kineticBefore + e.elasticBefore + std::abs(e.given), allowed = allowedOf(e);
+  // Order 2 swings about it.
+  if (twoStages) return e.kinetic <= allowed + 0.5 * scale ? Verdict::passes : Verdict::fails;
+  if (e.kinetic <= allowed) return Verdict::passes;
+  // At rest what the iteration leaves open has either sign: what rests stays.
+  if (std::max(e.kinetic, e.kineticBefore) < restEnergy(s, e.mass)) return Verdict::rests;
+  constexpr double kSlack = 1e-3, kRounding = 1e-13;
+  // After a shorter step than this one velocities along chords have more of it.
+  const bool little = e.kinetic <= allowed + kSlack * scale + e.chords && allowed > -kRounding * scale;
+  return little ? Verdict::slows : Verdict::fails;
+}
+
+// `visit(group)` of a body's nodes with a motion of their own.
+template <class Visit>
+void visitNodeGroups(const WorldData& d, int body, const Visit& visit) {
+  for (int g = d.ranges[body].firstNodeGroup; g < d.nodes.dynamicEnd / 4 && d.nodes.groupHosts[g].body == body; ++g)
+    visit(g);
+}
+
+void slowDown(WorldData& d, int body, double share) {
+  const Lanes kept = splat(share);
+  Spheres& s = d.spheres;
+  for (const int i : spheresOf(d.ranges[body]))
+    for (std::vector<Quad>* all : {&s.velocity, &s.angularVelocity, &s.angularMomentum})
+      store((*all)[i], kept * load((*all)[i]));
+  visitNodeGroups(d, body, [&](int g) { d.nodes.velocity[g] = kept * d.nodes.velocity[g]; });
+}
+
+void restore(WorldData& d, const StageStart& start, int body) {
+  Spheres& s = d.spheres;
+  const BodyRange& r = d.ranges[body];
+  for (const int i : spheresOf(r)) {
+    s.position[i] = start.position[i];
+    s.orientation[i] = start.orientation[i];
+    s.angularMomentum[i] = start.angularMomentum[i];
+    s.velocity[i] = start.motion[2 * i];
+    s.angularVelocity[i] = start.motion[2 * i + 1];
+  }
+  for (int k = r.firstLink; k < r.firstLink + r.linkCount; ++k)
+    d.links.unwoundTwist[k / 4].v[k % 4] = start.unwoundTwist[k / 4].v[k % 4];
+  visitNodeGroups(d, body, [&](int g) {
+    d.nodes.position[g] = start.nodePosition[g];
+    d.nodes.velocity[g] = gatherFour(start.motion, 2 * s.count + 4 * g);
+  });
+}
+
+void keepEnergyOf(WorldData& d, const ImplicitData& s, int body) {
+  const EnergyBalance& island = s.islands[s.island[body]];
+  if (s.verdicts[body] == Verdict::slows)
+    slowDown(d, body, std::sqrt(std::max(0.0, allowedOf(island)) / island.kinetic));
+  if (s.verdicts[body] == Verdict::rests) {
+    restore(d, s.before, body);
+    slowDown(d, body, 0);
+  }
+}
+
+// `visit(body)` of those whose island failed with more energy than its bodies ever had.
+template <class Visit>
+void visitBeyondMost(const WorldData& d, const ImplicitData& s, const Visit& visit) {
+  for (int b = 0; b < static_cast<int>(d.ranges.size()); ++b) {
+    const EnergyBalance& island = s.islands[s.island[b]];
+    if (hasFailed(s, b) && !(island.elastic <= island.most)) visit(b);
+  }
+}
+
+}  // namespace
+
+double kineticEnergy(const WorldData& d, ImplicitData& s) {
+  sumKineticEnergies(d, s, s.sums);
+  return std::accumulate(s.sums.begin(), s.sums.end(), 0.0);
+}
+
+void noteEnergyBefore(WorldData& d, ImplicitData& s) {
+  setKinetic(d, s, &EnergyBalance::kineticBefore);
+  s.elasticBefore = setElastic(d, s, &EnergyBalance::elasticBefore);
+  for (std::size_t b = 0; b < s.bodies.size(); ++b) {
+    EnergyBalance& e = s.bodies[b];
+    e.mass = s.bodyMass[b];
+    e.most = d.mostEnergy[b] = std::max(d.mostEnergy[b], e.kineticBefore + e.elasticBefore);
+  }
+}
+
+bool keepEnergy(WorldData& d, ImplicitData& s, bool twoStages) {
+  setKinetic(d, s, &EnergyBalance::kinetic);
+  setElastic(d, s, &EnergyBalance::elastic);
+  setGiven(d, s);
+  joinIslands(s);
+  sumBalances(s);
+  EnergyBalance world;
+  for (const EnergyBalance& island : s.islands) add(island, world);
+  // Gains that small are put back for the sake of a world at rest, which is to stay the same to the bit.
+  const bool loses = judge(s, world, twoStages) == Verdict::passes;
+  for (std::size_t b = 0; b < s.bodies.size(); ++b) {
+    const Verdict own = judge(s, s.islands[s.island[b]], twoStages);
+    s.verdicts[b] = own == Verdict::rests && loses ? Verdict::passes : own;
+  }
+  if (std::count(s.verdicts.begin(), s.verdicts.end(), Verdict::fails) > 0) return false;
+  for (int b = 0; b < static_cast<int>(s.bodies.size()); ++b) keepEnergyOf(d, s, b);
+  return true;
+}
+
+// The last resort of a body so deformed that its forces are not the slope of its energy (links shorter than a
+// twentieth, or folded to 180 degrees): it moves without speed, as long as it has no more energy than it has ever had,
+// or stays; with it, what it pushes. Likewise frames that were a whole turn apart are so no longer.
+void creep(WorldData& d, ImplicitData& s) {
+  visitBeyondMost(d, s, [&](int b) { restore(d, s.before, b); });
+  for (int b = 0; b < static_cast<int>(s.bodies.size()); ++b) {
+    keepEnergyOf(d, s, b);
+    if (!hasFailed(s, b)) continue;
+    slowDown(d, b, 0);
+    d.creep.bodies[b] = d.creepsNow = true;
+  }
+  std::vector<Quad>& orientation = s.start.orientation;  // of no more use in this step
+  orientation = d.spheres.orientation;
+  runStage(d, evaluateForces);
+  for (int b = 0; b < static_cast<int>(s.bodies.size()); ++b)
+    if (hasFailed(s, b)) dropWholeTurns(d, b);
+  runStage(d, evaluateForces);
+  setElastic(d, s, &EnergyBalance::elastic);
+  sumBalances(s);
+  visitBeyondMost(d, s, [&](int b) {
+    for (const int i : spheresOf(d.ranges[b])) d.spheres.orientation[i] = orientation[i];
+  });
+}
+
+void restore(WorldData& d, const StageStart& start) {
+  for (int b = 0; b < static_cast<int>(d.ranges.size()); ++b) restore(d, start, b);
+}
+
+}  // namespace medulla

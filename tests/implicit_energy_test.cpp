@@ -1,0 +1,95 @@
+#include <gtest/gtest.h>
+
+#include "physics/dynamics/world_data.h"
+#include "tests/contact_bodies.h"
+#include "tests/dynamics_states.h"
+#include "tests/identified_model.h"
+
+// Implicit steps that fail at every length, because a body's energy grows whatever they do: it creeps, and only it.
+namespace medulla {
+
+using namespace states;
+
+namespace {
+
+constexpr double kGravity = 9.81;  // m/s2
+
+struct Failing {
+  LinkModel links;
+  int order;
+  double step;  // s
+  std::uint64_t seed;
+};
+
+WorldSettings settingsOf(const Failing& f) {
+  WorldSettings s;
+  s.integrator = Integrator::implicit;
+  s.order = f.order;
+  s.gravity = {0, -kGravity, 0};
+  s.frameDuration = f.step;
+  s.substeps = 1;
+  return s;
+}
+
+BodyDescription tube(LinkModel links) {
+  BodyDescription b = synthetic::body(synthetic::shortTube(), 6e3);
+  if (links == LinkModel::identified)
+    b = synthetic::identifiedBody(synthetic::withNetwork(*b.model, {.held = {}, .uneven = 0.1}), 6e3);
+  return b;
+}
+
+// With its links folded, crossed and shorter than they may be.
+void tangle(WorldData& d, std::uint64_t seed) {
+  shake(d, seed, 3, 0.05, 5);
+}
+
+// m: how far a thrown ball ends from its parabola.
+double strayOf(World& world, int body, const Vector3d& velocity, double duration) {
+  const Quad& place = world.data().spheres.position[world.data().ranges[body].firstSphere];
+  const Vector3d start = vectorOf(place);
+  synthetic::throwBody(world, body, velocity);
+  while (world.time() < duration - 1e-9) world.advance({});
+  const double t = world.time();
+  return (vectorOf(place) - start - t * velocity - 0.5 * t * t * Vector3d(0, -kGravity, 0)).norm();
+}
+
+}  // namespace
+
+TEST(ImplicitEnergy, WhatFliesBesideAFailingBodyFliesOn) {
+  const Vector3d velocity(1, 2, 0.3);
+  const BodyDescription ball = synthetic::ball("ball", 0.01, {1, 0, 0});
+  for (const Failing& f : {Failing{LinkModel::beam, 1, 0.02, 2}, Failing{LinkModel::identified, 1, 0.005, 2},
+                           Failing{LinkModel::identified, 2, 0.05, 4}}) {
+    World alone(settingsOf(f), {ball}), beside(settingsOf(f), {tube(f.links), ball});
+    WorldData& d = beside.data();
+    const int sphere = d.ranges[1].firstSphere;
+    tangle(d, f.seed);  // the ball, too
+    for (std::vector<Quad>* turning : {&d.spheres.angularMomentum, &d.spheres.angularVelocity}) (*turning)[sphere] = {};
+    d.spheres.position[sphere] = alone.data().spheres.position[0];
+    const double expected = strayOf(alone, 0, velocity, 0.5), stray = strayOf(beside, 1, velocity, 0.5);
+    EXPECT_GT(beside.creep().substeps, 0) << f.step;
+    EXPECT_TRUE(beside.creep().bodies[0]);
+    EXPECT_FALSE(beside.creep().bodies[1]);
+    EXPECT_EQ(alone.creep().substeps, 0);
+    EXPECT_LT(stray, 1e-5 + expected) << f.step;  // the shortest parts of order 2 are of order 1
+  }
+}
+
+// A contact that pushes hands energy on: what it joins is judged together.
+TEST(ImplicitEnergy, WhatPushesAFailingBodyCreepsWithIt) {
+  const Failing f{LinkModel::beam, 1, 0.02, 4};
+  WorldSettings settings = settingsOf(f);
+  settings.contact = ContactMode::balls;
+  World world(settings,
+              {tube(f.links), synthetic::ball("near", 0.01, {0.5, 0, 0}), synthetic::ball("far", 0.01, {1, 0, 0})});
+  WorldData& d = world.data();
+  tangle(d, f.seed);
+  const int near = d.ranges[1].firstSphere, far = d.ranges[2].firstSphere;
+  d.spheres.position[near] = quadOf(vectorOf(d.spheres.position[0]) + Vector3d(0.005, 0, 0));
+  d.spheres.velocity[near] = d.spheres.velocity[0];
+  d.spheres.position[far] = quadOf({1, 0, 0});
+  for (int k = 0; k < 20; ++k) world.advance({});
+  EXPECT_EQ(world.creep().bodies, (std::vector<bool>{true, true, false}));
+}
+
+}  // namespace medulla
