@@ -84,6 +84,21 @@ TEST_F(RunNotes, AToolThatBeginsClosedInTissueHoldsItAtRest) {
   EXPECT_NE(r.out.find("impulse_mismatch 0 %"), std::string::npos) << r.out;
 }
 
+// Led so hard that its links fold, whatever the step.
+TEST_F(RunNotes, ABodyThatCrept) {
+  std::string text = read("own/organ.xml");
+  const std::string fix = "<fix spheres=\"1\"/>", gravity = "gravity=\"0 0 0\"";
+  text.replace(
+      text.find(fix), fix.size(),
+      fix + R"(<drive sphere="5" dof="all" axis="0 1 0" amplitude="0.2" frequency="20" phase="0" velocity="0 0 0"/>)");
+  text.replace(text.find(gravity), gravity.size(), gravity + " integrator=\"implicit\"");
+  folder.write("own/organ.xml", text);
+  Notes notes = complaints(run({"replay", "own/organ.xml"}));
+  std::erase(notes, "note: tool 'probe' touched nothing in its whole motion");
+  ASSERT_EQ(notes.size(), 1);
+  EXPECT_EQ(notes[0].find("note: 'organ' crept on without speed where implicit steps failed, in "), 0) << notes[0];
+}
+
 TEST_F(RunNotes, ABodyOfWhichEveryNodeIsHeld) {
   std::string text = read("own/organ.xml");
   text.replace(text.find("spheres=\"1\""), 11, "sphere=\"1 2 4 5\"");

@@ -124,9 +124,8 @@ static void printNotes(const LoadedScene& loaded, const RunTotals& totals, const
   for (std::size_t b = 0; b < creep.bodies.size(); ++b)
     if (creep.bodies[b]) names.push_back(fmt::format("'{}'", loaded.scene.bodies[b].name));
   fmt::print(stderr,
-             "note: no step held in {}, where {} crept on without speed: deformed beyond what steps follow, for what "
-             "acts there\n",
-             creep.substeps == 1 ? "1 substep" : fmt::format("{} substeps", creep.substeps), fmt::join(names, ", "));
+             "note: {} crept on without speed where implicit steps failed, in {}: deformed beyond what they follow\n",
+             fmt::join(names, ", "), creep.substeps == 1 ? "1 substep" : fmt::format("{} substeps", creep.substeps));
 }
 
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
