@@ -30,9 +30,11 @@ constexpr double kBetaTimesStep = kOmegaTimesStep / (2 * kDampingRatio + kOmegaT
 constexpr double kGammaTimesMass = 1 / (kOmegaTimesStep * (2 * kDampingRatio + kOmegaTimesStep));
 
 // Impulses start from those of the substep before and are passed over until they change by little; what is left is
-// taken up in the next substep.
-constexpr int kPasses = 4;
-constexpr double kSettled = 1e-2;  // of the largest impulse
+// taken up in the next substep. Little is meant of the contact's own impulse, or as a speed: by the largest impulse
+// anywhere, what lies on top of a stack or beside a heavy body is never settled, and its friction creeps.
+constexpr int kPasses = 8;
+constexpr double kSettled = 1e-2;  // of its own impulse
+constexpr double kStill = 1e-5;    // m/s
 
 // Spheres as contacts see them, at the momenta of this substep.
 void prepareSpheres(WorldData& d) {
@@ -220,20 +222,16 @@ double settle(WorldData& d, Contact& c) {
 // everywhere in its first pass; what remains is local, and its cost must not be that of passing over all.
 void settleAll(WorldData& d) {
   ContactData& c = d.contact;
-  double largest = 0;  // of all impulses so far
-  for (const Contact& contact : c.contacts) largest = std::max(largest, contact.normalImpulse);
   c.changedInPass.assign(c.spheres.size(), -1);
   bool changed = true;
   for (signed char pass = 0; pass < kPasses && changed; ++pass) {
     changed = false;
-    const double little = kSettled * largest;
     for (Contact& contact : c.contacts) {
       signed char last = -1;
       for (int e = 0; e < contact.ends; ++e) last = std::max(last, c.changedInPass[contact.sphere[e]]);
       if (last < pass - 1) continue;
       const double change = settle(d, contact);
-      largest = std::max(largest, contact.normalImpulse);
-      if (!(change > little)) continue;
+      if (!(change > std::max(kSettled * contact.normalImpulse, kStill * contact.inverseNormal))) continue;
       for (int e = 0; e < contact.ends; ++e) c.changedInPass[contact.sphere[e]] = pass;
       changed = true;
     }
