@@ -166,8 +166,8 @@ TEST(Contact, ATripodSticksBelowTheFrictionAngleAndSlidesAbove) {
   }
 }
 
-// Plates of balls, each ball on that of the plate below, well inside of the friction angle, beside a ball of 33 kg: what
-// is left unsettled in light contacts, if measured by heavy ones, lets the stack creep down.
+// Plates of balls, each ball on that of the plate below, well inside of the friction angle, beside a ball of 33 kg:
+// what is left unsettled in light contacts, if measured by heavy ones, lets the stack creep down.
 TEST(Contact, AStackOnASlopeDoesNotCreep) {
   constexpr int kPlates = 4, kRow = 4;
   std::vector<synthetic::BallAndRadius> balls;

@@ -126,6 +126,7 @@ TEST(ImplicitContact, AThrownHeapComesToRest) {
 // every iteration, and steps were halved: 31 systems a step, 22 since.
 TEST(ImplicitContact, ASlidingHeapIsSolvedInFewIterations) {
   std::vector<BodyDescription> bodies;
+  bodies.reserve(12);
   for (int k = 0; k < 12; ++k)
     bodies.push_back(raft("raft " + std::to_string(k), {0.013 * (k % 3), 0.03 + 0.025 * k, 0.011 * (k % 4)}, 0.4));
   World world(contactSettings(1), bodies, {floorOf(0.4)});
