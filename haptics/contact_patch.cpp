@@ -7,8 +7,10 @@
 
 namespace medulla {
 
-// Pushes so far count `factor` (0 to 1) times as much.
-static void fade(double factor, ContactPatch& patch) {
+constexpr double kWayPerRadius = 0.1;  // of the tool: a slide by so much forgets all but 1/e
+
+// Shares so far count `factor` (0 to 1) times as much, places `ofPlaces` times.
+static void fade(double factor, double ofPlaces, ContactPatch& patch) {
   // Of the largest share: a spring that is not worth its time, unless it has just begun: frames as short as a tick add
   // less to it than that.
   constexpr double least = 0.02;
@@ -16,37 +18,40 @@ static void fade(double factor, ContactPatch& patch) {
   patch.isTouched = false;
   double largest = 0;
   for (ContactPatch::Entry& entry : patch.entries) {
-    entry.weights *= factor;
+    entry.weights *= ofPlaces;
+    entry.placed *= ofPlaces;
     entry.share *= factor;
     largest = std::max(largest, entry.share);
   }
   std::erase_if(patch.entries, [&](const ContactPatch::Entry& e) { return !e.isTouched && e.share < least * largest; });
-  patch.total = 0;
-  for (ContactPatch::Entry& entry : patch.entries) {
-    patch.total += entry.share;
-    entry.isTouched = false;
-  }
+  for (ContactPatch::Entry& entry : patch.entries) entry.isTouched = false;
+}
+
+static Eigen::Vector3d placeOf(const BlendedSurface& surface, double alpha, const ContactPatch::Entry& entry) {
+  return pointAt(surface.triangle(entry.triangle, alpha), entry.weights / entry.placed);
+}
+
+static bool hasComeOff(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius,
+                       const ContactPatch::Entry& entry) {
+  constexpr double kOff =
+      0.06;  // of the tool's radius; at 0.02 gaps of the chatter itself, at 20 Hz, are taken for slides
+  return (proxy.centre - placeOf(surface, alpha, entry)).norm() > proxy.radius + kOff * toolRadius;
 }
 
 void fadePatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius, double way,
                double duration, ContactPatch& patch) {
   constexpr double kShort = 0.05, kLong = 1;  // s
-  constexpr double
-      kWayPerRadius = 0.1,
-      kOff = 0.06;  // of the tool's radius; at 0.02 gaps of the chatter itself, at 20 Hz, are taken for slides
   const double shortest = duration / kShort,
                fading = std::min(shortest, duration / kLong + way / (kWayPerRadius * toolRadius));
-  const double off = proxy.radius + kOff * toolRadius, rest = std::exp(fading - shortest);
-  for (ContactPatch::Entry& entry : patch.entries) {
-    const Eigen::Vector3d point = pointAt(surface.triangle(entry.triangle, alpha), entry.weights / entry.share);
-    if ((proxy.centre - point).norm() <= off) continue;
-    entry.weights *= rest;
-    entry.share *= rest;
-  }
-  fade(std::exp(-fading), patch);
+  const double rest = std::exp(fading - shortest);
+  for (ContactPatch::Entry& entry : patch.entries)
+    if (hasComeOff(surface, alpha, proxy, toolRadius, entry)) entry.share *= rest;
+  fade(std::exp(-fading), std::exp(-duration / kLong), patch);
 }
 
-void addContacts(const Proxy& proxy, double push, ContactPatch& patch) {
+void addContacts(const Proxy& proxy, double toolRadius, double push, double way, ContactPatch& patch) {
+  const double kept = std::exp(-way / (kWayPerRadius * toolRadius));
+  for (ContactPatch::Entry& entry : patch.entries) entry.left += way;
   for (int k = 0; k < proxy.contactCount; ++k) {
     const ProxyContact& contact = proxy.contacts[k];
     const double share = push * contact.share;
@@ -57,34 +62,39 @@ void addContacts(const Proxy& proxy, double push, ContactPatch& patch) {
       if (patch.entries.size() == kContactPatchCapacity) {
         const auto least = std::min_element(patch.entries.begin(), patch.entries.end(),
                                             [](const auto& a, const auto& b) { return a.share < b.share; });
-        patch.total -= least->share;
         patch.entries.erase(least);
       }
-      entry = patch.entries.insert(patch.entries.end(), {contact.triangle, Eigen::Vector3d::Zero(), 0, false});
+      entry = patch.entries.insert(patch.entries.end(), {.triangle = contact.triangle});
     }
-    entry->weights += share * contact.weights;
+    entry->weights = kept * entry->weights + share * contact.weights;
+    entry->placed = kept * entry->placed + share;
     entry->share += share;
-    patch.total += share;
+    entry->left = 0;
     entry->isTouched = patch.isTouched = true;
   }
 }
 
-void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ContactPatch& patch,
-                   std::vector<ProxyContact>& out) {
+void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius,
+                   const ContactPatch& patch, std::vector<ProxyContact>& out) {
   out.clear();
   if (!patch.isTouched) return;
+  double sum = 0;
   for (const ContactPatch::Entry& entry : patch.entries) {
     ProxyContact contact;
     contact.triangle = entry.triangle;
-    contact.weights = entry.weights / entry.share;
-    contact.share = entry.share / patch.total;
-    contact.point = pointAt(surface.triangle(entry.triangle, alpha), contact.weights);
+    contact.weights = entry.weights / entry.placed;
+    contact.point = placeOf(surface, alpha, entry);
+    contact.share = entry.share;
+    if (hasComeOff(surface, alpha, proxy, toolRadius, entry))
+      contact.share *= std::exp(-entry.left / (kWayPerRadius * toolRadius));
     const Eigen::Vector3d outward = proxy.centre - contact.point;
     const double distance = outward.norm();
-    if (!(distance > 0)) continue;  // the point lies in the proxy's centre: no direction to push it
+    if (!(distance > 0 && contact.share > 0)) continue;  // in the proxy's centre: no direction to push it
     contact.normal = shadedNormal(surface, alpha, entry.triangle, contact.weights, outward / distance);
+    sum += contact.share;
     out.push_back(contact);
   }
+  for (ProxyContact& contact : out) contact.share /= sum;
 }
 
 }  // namespace medulla

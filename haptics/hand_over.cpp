@@ -87,7 +87,7 @@ static double makeUpFor(const Proxy& proxy, const Path& path, const std::vector<
 // Each is limited to its part of forceMax in the ratio of the pressures, s_i / C.
 static void handOverContacts(const BlendedSurface& surface, double alpha, const ServoTool& tool, const Path& path,
                              std::vector<ProxyContact>& contacts, Loads& out) {
-  patchContacts(surface, alpha, tool.proxy, tool.patch, contacts);
+  patchContacts(surface, alpha, tool.proxy, tool.settings.radius, tool.patch, contacts);
   Vector3d push = Vector3d::Zero();
   for (const ProxyContact& contact : contacts) push += contact.share * contact.normal;
   constexpr double leastCosine = 0.5, leastSum = 0.05;  // opposite walls push with no more than 20 times the whole

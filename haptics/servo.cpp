@@ -261,7 +261,8 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
   followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
   followLeaving(surface, alphaBefore, alpha, tool);
   record(contactForce(surface, alpha, way, tool), tool, state);
-  addContacts(tool.proxy, (tool.proxy.centre - tool.device.position).norm(), tool.patch);
+  addContacts(tool.proxy, tool.settings.radius, (tool.proxy.centre - tool.device.position).norm(), way.norm(),
+              tool.patch);
 }
 
 void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
