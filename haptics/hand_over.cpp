@@ -47,6 +47,7 @@ static void handOverContact(const BlendedSurface& surface, const ServoTool& tool
   Vector3d drag = tangential(part.across, contact.normal);
   const double limit = settings.staticFriction * std::max(0.0, -stretch);
   if (drag.norm() > limit) drag *= limit / drag.norm();
+  if (tool.sticks) drag += tangential(tool.leadWhereItStuck, contact.normal);
   const auto& nodes = surface.triangles[contact.triangle];
   const int body = surface.bodyOfNode[nodes[0]], first = surface.firstNode[body];
   ToolSpring& spring = out.toolSprings.emplace_back();

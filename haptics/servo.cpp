@@ -116,8 +116,10 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   tool.estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
   const double push = pushKeptToTissue(surface, alpha, normal, tissue, tool);
   Vector3d drag = proxy.inContact() ? Vector3d(tool.settings.stiffness * tangential(pull, normal)) : Vector3d::Zero();
-  if (!proxy.slipping)
-    drag += tangential(motion, normal);
+  if (proxy.slipping || !tool.sticks) tool.leadWhereItStuck = tangential(tissue.lead, normal);
+  tool.sticks = !proxy.slipping;
+  if (tool.sticks)
+    drag += tangential(motion - tool.settings.stiffness * tool.leadWhereItStuck, normal);
   else if (spring > 0)
     drag *= push / spring;
   return withinCone(push * normal + dragKeptToTissue(surface, alpha, normal, tissue, tool, drag), normal,
@@ -165,6 +167,7 @@ static void followLeaving(const BlendedSurface& surface, double alphaBefore, dou
     tool.lastFelt = tool.proxy.feltNormal();
     if (!tool.isLeaving) {
       tool.largestPush = 0;
+      tool.sticks = false;
       beginContact(surface, alphaBefore, tool.lastContact, tool.lastFelt, tool.settings.stiffness, tool.motion);
     }
     tool.isLeaving = true;

@@ -23,8 +23,11 @@ struct ServoTool {
   ContactPatch patch;
   ProxyContact lastContact;                            // while isLeaving: in contact, or not yet clear of it
   Eigen::Vector3d lastFelt = Eigen::Vector3d::Zero();  // unit; along which it was felt
-  double largestPush = 0;                              // N, of the coupling's spring during this contact
-  DeviceMotion motion;                                 // in this contact or grip
+  // m, across: how far what the contact sticks to was ahead of the late surface when it began to. There it was touched.
+  Eigen::Vector3d leadWhereItStuck = Eigen::Vector3d::Zero();
+  bool sticks = false;
+  double largestPush = 0;  // N, of the coupling's spring during this contact
+  DeviceMotion motion;     // in this contact or grip
   // N, by how much the tissue's force changed over the frame up to the surface's `to`, and up to its `from`.
   std::array<double, 2> change{};
   std::optional<Eigen::Vector3d> pathEnd;  // m, of the device's path as handed over since the frame began

@@ -248,6 +248,24 @@ TEST(ProxyFigures, CreasesOfTheMeshDoNotChangeFriction) {
   expectReached("the same, still: less by", 0.2 - least, 0.025);
 }
 
+// A tool comes down on a plate that moves sideways, and moves along with it: nothing is dragged, though the surface
+// that the tool sees is a frame late.
+TEST(ProxyFigures, WhatMovesAlongIsNotDragged) {
+  constexpr double speed = 0.02, late = 0.02;  // m/s, s
+  ProxyRun r;
+  r.shape = plate(10, 0.03, 0.01, 5);
+  r.tool.staticFriction = r.tool.dynamicFriction = 0.5;
+  r.motion = [](const Vector3d& x, double t) { return Vector3d(x.x() + speed * t, x.y(), x.z()); };
+  r.device = [](double t) {
+    return Vector3d(0.001 + speed * t, 0.010 - 0.004 * std::clamp((t - 0.1) / 0.1, 0.0, 1.0), 0.002);
+  };
+  double drag = 0;
+  r.run([&](double, const ToolState& tool, const BlendedSurface&, double) {
+    drag = std::max(drag, std::abs(tool.force.x()));
+  });
+  expectReached("moves along with what it touches, drag (N)", drag, 0.1 * r.tool.stiffness * speed * late);
+}
+
 // Over an ellipsoid of 468 triangles, 3 mm deep: along it, around it and across, as fast as 0.1 m/s.
 TEST(ProxyFigures, ACoarseMeshFeelsSmooth) {
   ProxyRun r;
