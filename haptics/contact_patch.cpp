@@ -31,11 +31,10 @@ static Eigen::Vector3d placeOf(const BlendedSurface& surface, double alpha, cons
   return pointAt(surface.triangle(entry.triangle, alpha), entry.weights / entry.placed);
 }
 
-static bool hasComeOff(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius,
-                       const ContactPatch::Entry& entry) {
-  constexpr double kOff =
-      0.06;  // of the tool's radius; at 0.02 gaps of the chatter itself, at 20 Hz, are taken for slides
-  return (proxy.centre - placeOf(surface, alpha, entry)).norm() > proxy.radius + kOff * toolRadius;
+static bool hasComeOff(const Proxy& proxy, double toolRadius, const Eigen::Vector3d& point) {
+  // Of the tool's radius; at 0.02 gaps of the chatter itself, at 20 Hz, are taken for slides.
+  constexpr double kOff = 0.06;
+  return (proxy.centre - point).norm() > proxy.radius + kOff * toolRadius;
 }
 
 void fadePatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius, double way,
@@ -45,7 +44,7 @@ void fadePatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, 
                fading = std::min(shortest, duration / kLong + way / (kWayPerRadius * toolRadius));
   const double rest = std::exp(fading - shortest);
   for (ContactPatch::Entry& entry : patch.entries)
-    if (hasComeOff(surface, alpha, proxy, toolRadius, entry)) entry.share *= rest;
+    if (hasComeOff(proxy, toolRadius, placeOf(surface, alpha, entry))) entry.share *= rest;
   fade(std::exp(-fading), std::exp(-duration / kLong), patch);
 }
 
@@ -85,7 +84,7 @@ void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& pro
     contact.weights = entry.weights / entry.placed;
     contact.point = placeOf(surface, alpha, entry);
     contact.share = entry.share;
-    if (hasComeOff(surface, alpha, proxy, toolRadius, entry))
+    if (hasComeOff(proxy, toolRadius, contact.point))
       contact.share *= std::exp(-entry.left / (kWayPerRadius * toolRadius));
     const Eigen::Vector3d outward = proxy.centre - contact.point;
     const double distance = outward.norm();
