@@ -8,6 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "haptics/force_shading.h"
 #include "haptics/tool_input.h"
 #include "physics/dynamics/simd.h"
 #include "physics/sort_unique.h"
@@ -228,7 +229,9 @@ Buckets::Buckets(const std::vector<TouchableBody>& bodies, double largestRadius,
   surface.to.resize(surface.bodyOfNode.size());
   copyNodes(rest, surface.from);
   copyNodes(rest, surface.to);
-  surface.trianglesOfNodes = trianglesOfVertices({surface.from, surface.triangles});
+  const TriangleMesh restMesh{surface.from, surface.triangles};
+  surface.trianglesOfNodes = trianglesOfVertices(restMesh);
+  surface.isCrease = nodesOnCreases(restMesh);
   for (auto& step : surface.steps) step.assign(surface.from.size(), Vector3d::Zero());
   for (std::size_t k = 0; k < data_->buckets.size(); ++k) {
     Bucket& bucket = data_->buckets[k];

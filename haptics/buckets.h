@@ -29,6 +29,7 @@ struct BlendedSurface {
   std::vector<int> firstNode;  // of each body
   std::vector<NodeGive> give;  // per node: TouchableBody::give
   IndexLists trianglesOfNodes;
+  std::vector<char> isCrease;             // per node: nodesOnCreases()
   std::vector<Eigen::Vector3d> from, to;  // m, world, per node
   // m, what each node moved from `from` to `to`, in the frame before and in the one before that
   std::array<std::vector<Eigen::Vector3d>, 3> steps;

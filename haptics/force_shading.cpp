@@ -12,6 +12,20 @@ static Vector3d doubleArea(const Triangle& t) {
   return (t.b - t.a).cross(t.c - t.a);
 }
 
+std::vector<char> nodesOnCreases(const TriangleMesh& rest) {
+  constexpr double cosineOfEdge = 0.36;  // 69 degrees: a tube of six sides is still round, a box is not, by far
+  std::vector<char> isCrease(rest.vertices.size(), 0);
+  std::vector<Vector3d> normals;
+  for (const std::array<int, 3>& nodes : rest.triangles) normals.push_back(areaVector(rest, nodes).stableNormalized());
+  const std::vector<std::array<int, 3>> adjacent = adjacentTriangles(rest);
+  for (std::size_t t = 0; t < rest.triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      if (adjacent[t][k] < 0 || normals[t].dot(normals[adjacent[t][k]]) > cosineOfEdge) continue;
+      isCrease[rest.triangles[t][k]] = isCrease[rest.triangles[t][(k + 1) % 3]] = 1;
+    }
+  return isCrease;
+}
+
 // Weighted by area; unit, or zero where all triangles are degenerate.
 static Vector3d nodeNormal(const BlendedSurface& surface, double alpha, int node) {
   Vector3d sum = Vector3d::Zero();
@@ -29,8 +43,9 @@ Vector3d shadedNormal(const BlendedSurface& surface, double alpha, int triangle,
   face *= side;
   Vector3d sum = Vector3d::Zero();
   for (int k = 0; k < 3; ++k) {
-    const Vector3d corner = side * nodeNormal(surface, alpha, surface.triangles[triangle][k]);
-    sum += weights[k] * (corner.dot(face) > kCosineOfCrease ? corner : normal);
+    const int node = surface.triangles[triangle][k];
+    const Vector3d corner = side * nodeNormal(surface, alpha, node);
+    sum += weights[k] * (!surface.isCrease[node] && corner.dot(face) > kCosineOfCrease ? corner : normal);
   }
   sum = sum.stableNormalized();
   return sum.dot(normal) > kCosineOfCrease ? sum : normal;

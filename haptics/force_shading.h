@@ -6,9 +6,14 @@
 // smooth surface that it stands for, by normals interpolated between its nodes.
 namespace medulla {
 
+// Per node of a surface at rest: whether the triangles at one of its edges stand more than 69 degrees apart. Asked of
+// each triangle alone, by its nodes' mean normals, an unevenly meshed edge is a crease on its one side and smooth on
+// the other.
+std::vector<char> nodesOnCreases(const TriangleMesh& rest);
+
 // The smooth surface's unit normal at a point of a triangle, given by its barycentric weights, where a sphere is
-// touched along the unit `normal` (from the point to the sphere's centre). At a crease, where a node's normal is more
-// than 0.75 rad off its triangle's, the node has `normal` instead: a box stays a box.
+// touched along the unit `normal` (from the point to the sphere's centre). On a crease, and where its normal is more
+// than 0.75 rad off the triangle's, as on a spike, a node has `normal` instead: a box stays a box.
 Eigen::Vector3d shadedNormal(const BlendedSurface& surface, double alpha, int triangle, const Eigen::Vector3d& weights,
                              const Eigen::Vector3d& normal);
 

@@ -266,6 +266,39 @@ TEST(ProxyFigures, WhatMovesAlongIsNotDragged) {
   expectReached("moves along with what it touches, drag (N)", drag, 0.1 * r.tool.stiffness * speed * late);
 }
 
+// Around the edge of a box, whose top's triangles are three times as large as its side's: nodes' mean normals are near
+// the one and far from the other.
+TEST(ProxyFigures, AnEdgeOfUnevenTrianglesIsFeltAsAnEdge) {
+  constexpr double depth = 0.001, degree = std::numbers::pi / 180;
+  std::vector<Vector3d> nodes;
+  std::vector<std::array<int, 3>> triangles;
+  for (int i = 0; i <= 10; ++i) {
+    const double z = 0.006 * (i - 5);
+    nodes.insert(nodes.end(), {{0.03, 0, z}, {0, 0, z}, {0, -0.01, z}});
+  }
+  for (int i = 0; i < 10; ++i)
+    for (const int a : {3 * i, 3 * i + 1}) {
+      triangles.push_back({a, a + 1, a + 4});
+      triangles.push_back({a, a + 4, a + 3});
+    }
+  ProxyRun r;
+  r.shape = shapeOf(nodes, triangles);
+  const auto outward = [=](double t) {
+    const double angle = degree * (5 + 80 * std::clamp(t - 0.2, 0.0, 1.0));
+    return Vector3d(-std::sin(angle), std::cos(angle), 0);
+  };
+  r.device = [=](double t) -> Vector3d {
+    return (r.tool.radius + 0.001 - (0.001 + depth) * std::min(1.0, t / 0.1)) * outward(t) + Vector3d(0, 0, 0.001);
+  };
+  r.duration = 1.4;
+  double off = 0;
+  r.run([&](double t, const ToolState& tool, const BlendedSurface&, double) {
+    if (t < 0.15) return;
+    off = std::max(off, (tool.force - r.tool.stiffness * depth * outward(t)).norm());
+  });
+  expectReached("around an edge of uneven triangles: force off by (N)", off, 0.001);
+}
+
 // Over an ellipsoid of 468 triangles, 3 mm deep: along it, around it and across, as fast as 0.1 m/s.
 TEST(ProxyFigures, ACoarseMeshFeelsSmooth) {
   ProxyRun r;
