@@ -261,11 +261,13 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
   tickGrip(surface, alpha, state.force, before, tickDuration, tool);
   if (feelGrip(surface, alpha, tickDuration, tool, state)) return;
   tool.motion.velocity = way / tickDuration;  // of what has slipped out it was another
+  const Vector3d carried = tool.proxy.centre;
   followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
   followLeaving(surface, alphaBefore, alpha, tool);
   record(contactForce(surface, alpha, way, tool), tool, state);
-  addContacts(tool.proxy, tool.settings.radius, (tool.proxy.centre - tool.device.position).norm(), way.norm(),
-              tool.patch);
+  const double push = (tool.proxy.centre - tool.device.position).norm();
+  const double slid = tangential(tool.proxy.centre - carried, tool.lastFelt).norm();
+  addContacts(tool.proxy, tool.settings.radius, push, std::max(way.norm(), slid), tool.patch);
 }
 
 void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {

@@ -340,33 +340,37 @@ TEST(Servo, SlidingDragsTheTissueByFrictionOnly) {
   }
 }
 
-// On a plate as good as rigid the push is that of the depth, however fast the tool slides: what it has left behind, by
-// five of its radii in the 50 ms that pushes count for, has no part in it.
+// On a plate as good as rigid the push is that of the depth, however fast the tool slides on it, or the plate under the
+// tool: what it has left behind, by five of its radii in the 50 ms that pushes count for, has no part in it.
+static void slideOnPlate(double radius, double speed, bool plateMoves) {
+  ToolRun run{SpringBody(plate(12, 0.03, 0.01, 6)), frictionless(), {}, 24, 1.0 / 1200, {}};
+  run.body.ground = 1e5;
+  run.body.groundDamping = 20;
+  run.tool.radius = radius;
+  constexpr double kDepth = 0.0005;
+  const auto slid = [=](double t) { return speed * std::max(0.0, t - 0.2); };
+  run.device = [=](double t) {
+    const double x = plateMoves ? 0.015 : -0.02 + slid(t);
+    return deviceAt({x, 0.006 + radius - (0.001 + kDepth) * ease(t, 0, 0.1), 0.002});
+  };
+  const double push = run.tool.stiffness * kDepth;
+  double sum = 0, least = push;
+  int ticks = 0;
+  run.run(0.2 + 0.035 / speed, [&](double t, const ToolState& tool) {
+    if (plateMoves && t > 0.2) run.body.carriedAt.x() = speed;
+    if (t < 0.15) return;
+    sum += tool.force.y();
+    least = std::min(least, tool.force.y());
+    ++ticks;
+  });
+  EXPECT_NEAR(sum / ticks, push, 0.02 * push) << radius << " m, " << speed << " m/s, plate moves: " << plateMoves;
+  EXPECT_GT(least, 0.8 * push) << radius << " m, " << speed << " m/s, plate moves: " << plateMoves;
+}
+
 TEST(Servo, ASlideAtSpeedPushesAsHardAsASlowOne) {
-  for (const double radius : {0.001, 0.003}) {
-    for (const double speed : {0.02, 0.1}) {
-      ToolRun run{SpringBody(plate(12, 0.03, 0.01, 6)), frictionless(), {}, 24, 1.0 / 1200, {}};
-      run.body.ground = 1e5;
-      run.body.groundDamping = 20;
-      run.tool.radius = radius;
-      constexpr double kDepth = 0.0005;
-      run.device = [=](double t) {
-        return deviceAt(
-            {-0.02 + speed * std::max(0.0, t - 0.2), 0.006 + radius - (0.001 + kDepth) * ease(t, 0, 0.1), 0.002});
-      };
-      const double push = run.tool.stiffness * kDepth;
-      double sum = 0, least = push;
-      int ticks = 0;
-      run.run(0.2 + 0.035 / speed, [&](double t, const ToolState& tool) {
-        if (t < 0.15) return;
-        sum += tool.force.y();
-        least = std::min(least, tool.force.y());
-        ++ticks;
-      });
-      EXPECT_NEAR(sum / ticks, push, 0.02 * push) << radius << " m, " << speed << " m/s";
-      EXPECT_GT(least, 0.8 * push) << radius << " m, " << speed << " m/s";
-    }
-  }
+  for (const double radius : {0.001, 0.003})
+    for (const double speed : {0.02, 0.1})
+      for (const bool plateMoves : {false, true}) slideOnPlate(radius, speed, plateMoves);
 }
 
 TEST(Servo, AJumpInContactLeavesTheTissueWhole) {

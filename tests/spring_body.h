@@ -10,13 +10,15 @@
 namespace medulla {
 
 // A stand-in for a soft body in tests of the servo: masses on the nodes, each tied to its rest position and to its
-// neighbours, all damped. It takes loads as physics/dynamics/loads.h says.
+// neighbours, all damped. The rest positions may be carried along. It takes loads as physics/dynamics/loads.h says.
 struct SpringBody {
   TouchShape shape;
   double mass = 0.002, ground = 25, edge = 150, groundDamping = 0.4, edgeDamping = 0.3;  // kg, N/m, N/m, N s/m, N s/m
   std::vector<Eigen::Vector3d> position, velocity, force;
   std::vector<std::array<int, 2>> edges;
   double time = 0;
+  Eigen::Vector3d carriedAt = Eigen::Vector3d::Zero();  // m/s, of the rest positions
+  Eigen::Vector3d carried = Eigen::Vector3d::Zero();    // m, so far
 
   explicit SpringBody(TouchShape touched) : shape(std::move(touched)), position(shape->restNodes) {
     velocity.assign(position.size(), Eigen::Vector3d::Zero());
@@ -30,7 +32,7 @@ struct SpringBody {
 
   void addElasticForces() {
     for (std::size_t n = 0; n < position.size(); ++n)
-      force[n] = ground * (shape->restNodes[n] - position[n]) - groundDamping * velocity[n];
+      force[n] = ground * (shape->restNodes[n] + carried - position[n]) - groundDamping * (velocity[n] - carriedAt);
     for (const auto& [a, b] : edges) {
       const Eigen::Vector3d d = position[b] - position[a];
       const double rest = (shape->restNodes[b] - shape->restNodes[a]).norm();
@@ -80,6 +82,7 @@ struct SpringBody {
     Eigen::Vector3d impulse = Eigen::Vector3d::Zero();
     const double h = duration / substeps;
     for (int s = 0; s < substeps; ++s) {
+      carried += h * carriedAt;
       addElasticForces();
       impulse += h * addToolForces(loads, duration - (s + 1) * h);
       for (std::size_t n = 0; n < position.size(); ++n) {
