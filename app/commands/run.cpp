@@ -9,6 +9,7 @@
 
 #include "app/commands/rest_watch.h"
 #include "app/commands/run_recorders.h"
+#include "app/files/text.h"
 #include "app/interrupt.h"
 
 namespace medulla {
@@ -125,7 +126,7 @@ static void printNotes(const LoadedScene& loaded, const RunTotals& totals, const
     if (creep.bodies[b]) names.push_back(fmt::format("'{}'", loaded.scene.bodies[b].name));
   fmt::print(stderr,
              "note: {} crept on without speed where implicit steps failed, in {}: deformed beyond what they follow\n",
-             fmt::join(names, ", "), creep.substeps == 1 ? "1 substep" : fmt::format("{} substeps", creep.substeps));
+             joined(names, ", "), creep.substeps == 1 ? "1 substep" : fmt::format("{} substeps", creep.substeps));
 }
 
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
