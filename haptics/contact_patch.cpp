@@ -20,6 +20,7 @@ static void fade(double factor, double ofPlaces, ContactPatch& patch) {
   for (ContactPatch::Entry& entry : patch.entries) {
     entry.weights *= ofPlaces;
     entry.placed *= ofPlaces;
+    entry.normal *= ofPlaces;
     entry.share *= factor;
     largest = std::max(largest, entry.share);
   }
@@ -67,6 +68,7 @@ void addContacts(const Proxy& proxy, double toolRadius, double push, double way,
     }
     entry->weights = kept * entry->weights + share * contact.weights;
     entry->placed = kept * entry->placed + share;
+    entry->normal = kept * entry->normal + share * contact.normal;
     entry->share += share;
     entry->left = 0;
     entry->isTouched = patch.isTouched = true;
@@ -86,10 +88,8 @@ void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& pro
     contact.share = entry.share;
     if (hasComeOff(proxy, toolRadius, contact.point))
       contact.share *= std::exp(-entry.left / (kWayPerRadius * toolRadius));
-    const Eigen::Vector3d outward = proxy.centre - contact.point;
-    const double distance = outward.norm();
-    if (!(distance > 0 && contact.share > 0)) continue;  // in the proxy's centre: no direction to push it
-    contact.normal = shadedNormal(surface, alpha, entry.triangle, contact.weights, outward / distance);
+    if (!(contact.share > 0)) continue;
+    contact.normal = shadedNormal(surface, alpha, entry.triangle, contact.weights, entry.normal.normalized());
     sum += contact.share;
     out.push_back(contact);
   }

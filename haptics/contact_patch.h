@@ -15,7 +15,8 @@ struct ContactPatch {
   struct Entry {
     int triangle = -1;
     Eigen::Vector3d weights = Eigen::Vector3d::Zero();  // barycentric times share, summed over ticks
-    double placed = 0;                                  // shares in `weights`
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();   // of the contacts, likewise
+    double placed = 0;                                  // shares in both
     double share = 0;                                   // summed over ticks
     double left = 0;                                    // m, that the tool has gone since
     bool isTouched = false;                             // in this frame
@@ -34,15 +35,16 @@ constexpr int kContactPatchCapacity = 64;  // triangles; beyond, a new one takes
 void fadePatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius, double way,
                double duration, ContactPatch& patch);
 
-// Adds the proxy's contacts of one tick, each by its share of `push` (N, >= 0). `way` (m): what the device went, or what
-// the proxy slid on the tissue where that is more, as on tissue that moves along under a still tool.
+// Adds the proxy's contacts of one tick, each by its share of `push` (N, >= 0). `way` (m): what the device went, or
+// what the proxy slid on the tissue where that is more, as on tissue that moves along under a still tool.
 void addContacts(const Proxy& proxy, double toolRadius, double push, double way, ContactPatch& patch);
 
 // The patch as contacts of the surface at alpha, shares summing to 1, with the shaded normals along which the hand
-// feels them; none if nothing was touched in this frame. What has come off the proxy counts the less the farther the
-// tool has gone since it touched it: e^-1 per tenth of its radius. Pushes that trail behind by the 50 ms took a tool of
-// 4 mm, 1 mm deep at 0.1 m/s, 28 % of its push on a flat plate, and one of 1 mm nearly all. `out` is cleared and
-// filled.
+// feels them; of an edge that of the touch, since from a place that trails behind, the way to the proxy leans forward,
+// and a tool without friction that slid in a groove dragged it by 6 % of its push; none if nothing was touched in this
+// frame. What has come off the proxy counts the less the farther the tool has gone since it touched it: e^-1 per tenth
+// of its radius. Pushes that trail behind by the 50 ms took a tool of 4 mm, 1 mm deep at 0.1 m/s, 28 % of its push on a
+// flat plate, and one of 1 mm nearly all. `out` is cleared and filled.
 void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius,
                    const ContactPatch& patch, std::vector<ProxyContact>& out);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -201,34 +202,42 @@ static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& tou
   proxy.device = device;
 }
 
-// Where the device would draw the proxy if there were no friction, along the planes alone that stop it right here.
-// False where none does. The triangles touched a tick ago do not tell: a proxy that slid off one is within kTouching of
-// it for a tenth of a millimetre more, and their normal leans by then.
-static bool freeOfTouched(const Buckets& buckets, double alpha, Proxy proxy, const Vector3d& device, Vector3d& free) {
+static double sumOf(const std::array<double, 3>& pressure, int count) {
+  return std::accumulate(pressure.begin(), pressure.begin() + count, 0.0);
+}
+
+// Where the device would draw the proxy if there were no friction, along the planes alone that stop it right here, and
+// what then presses on these, summed (m). False where none does. The triangles touched a tick ago do not tell: a proxy
+// that slid off one is within kTouching of it for a tenth of a millimetre more, and their normal leans by then.
+static bool freeOfTouched(const Buckets& buckets, double alpha, Proxy proxy, const Vector3d& device, Vector3d& free,
+                          double& pressed) {
   const Vector3d way = device - proxy.centre;
   constexpr double kNear = 2e-5;  // m: of several touched surfaces that move apart only their mean is kept up with
   const double step = std::min(1.0, kNear / way.norm());
   const TouchedPlanes touched = slideTo(buckets, alpha, proxy.centre + step * way, proxy);
   std::array<double, 3> pressure;
-  return touched.count > 0 && nearestInHalfSpaces(device, touched.planes.data(), touched.count, free, pressure) &&
-         (free - device).norm() > kArrived;
+  if (touched.count == 0 || !nearestInHalfSpaces(device, touched.planes.data(), touched.count, free, pressure))
+    return false;
+  pressed = sumOf(pressure, touched.count);
+  return (free - device).norm() > kArrived;
 }
 
 // Coulomb friction as a change of the goal. Without friction the proxy would slide from where it is to `free`, pressed
-// by the depth |free - device|. It may trail behind `free` by up to mu times that depth. Stick: the goal is pulled back
-// onto the line through the proxy along the contact normal; slip: by exactly mu_d depth. Solving again towards the new
-// goal, rather than moving `free` back, keeps grooves and bumps right.
+// by the depth |free - device|: on what it touches by `pressed` in all, in a groove more than that. It may trail behind
+// `free` by up to mu times `pressed`. Stick: the goal is pulled back onto the line through the proxy along the contact
+// normal; slip: by exactly mu_d `pressed`. Solving again towards the new goal, rather than moving `free` back, keeps
+// grooves and bumps right.
 //
 // `free` lies on the planes touched now, not on those met on the way: a proxy that sticks by the normal of the next
 // triangle while it lies on this one is pushed on by depth times the angle between them each tick, as far as the next
 // crease of the mesh, however slight.
-static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& free, const Vector3d& device,
+static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& free, double pressed, const Vector3d& device,
                              const Vector3d& advance, Proxy& proxy) {
   constexpr double kStill = 1e-8;  // m per tick, 12 um/s: what slips no farther sticks, else it would slip at rest
-  const double depth = (free - device).norm(), least = tool.dynamicFriction * depth;
-  const Vector3d slide = tangential(free - proxy.centre, (free - device) / depth);
+  const double least = tool.dynamicFriction * pressed;
+  const Vector3d slide = tangential(free - proxy.centre, (free - device).normalized());
   const double length = slide.norm();
-  if (length > (proxy.slipping ? least + kStill : tool.staticFriction * depth)) {
+  if (length > (proxy.slipping ? least + kStill : tool.staticFriction * pressed)) {
     proxy.slipping = true;
     proxy.slideDirection = slide / length;
     return device - least * proxy.slideDirection;
@@ -246,14 +255,19 @@ void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool
                   Proxy& proxy) {
   const Vector3d start = proxy.centre, advance = device - proxy.device - proxy.surfaceMotion;
   Vector3d free, goal = device;
-  const bool isHeld = tool.staticFriction > 0 && freeOfTouched(buckets, alpha, proxy, device, free);
+  double pressed = 0;
+  const bool isHeld = tool.staticFriction > 0 && freeOfTouched(buckets, alpha, proxy, device, free, pressed);
   TouchedPlanes touched = slideTo(buckets, alpha, device, proxy);
   shade(buckets, alpha, touched, device, proxy);
-  if (!isHeld) free = proxy.centre;
+  if (!isHeld) {
+    free = proxy.centre;
+    pressed = sumOf(touched.pressure, touched.count);
+  }
   const bool isPressed = touched.count > 0 && (proxy.centre - device).norm() > kArrived;
   if (isPressed && tool.staticFriction > 0) {
     proxy.centre = start;
-    goal = frictionGoal(tool, free, device, advance, proxy);
+    goal = frictionGoal(tool, free, pressed, device, advance, proxy);
+    proxy.wedging = std::max(1.0, pressed / (free - device).norm());
     touched = slideTo(buckets, alpha, goal, proxy);
   }
   proxy.shading = proxy.felt.isZero(0) ? Vector3d::Zero() : Vector3d(proxy.felt - (proxy.centre - goal));

@@ -22,6 +22,7 @@ struct Proxy {
   // The tool's radius; less while surfaces leave no room for it: a squeezed proxy shrinks rather than tunnels.
   double radius = 0;
   bool slipping = true;
+  double wedging = 1;  // what presses on what it touches, summed, over their common push: more than 1 in a groove
   Eigen::Vector3d slideDirection = Eigen::Vector3d::Zero();  // unit, in which it slipped last in this contact, or zero
   // m; as if by the smooth surface that the mesh stands for (force_shading.h), the proxy is felt at centre + shading.
   Eigen::Vector3d shading = Eigen::Vector3d::Zero();

@@ -123,7 +123,7 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   else if (spring > 0)
     drag *= push / spring;
   return withinCone(push * normal + dragKeptToTissue(surface, alpha, normal, tissue, tool, drag), normal,
-                    tool.settings.staticFriction);
+                    tool.settings.staticFriction * proxy.wedging);
 }
 
 // N, `of` each held node the force of all, mean: the springs share the tool's stiffness equally.

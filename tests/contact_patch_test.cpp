@@ -12,6 +12,7 @@ static Proxy touching(int triangle) {
   proxy.contactCount = 1;
   proxy.contacts[0].triangle = triangle;
   proxy.contacts[0].weights = {0.5, 0.25, 0.25};
+  proxy.contacts[0].normal = Eigen::Vector3d::UnitZ();
   proxy.contacts[0].share = 1;
   return proxy;
 }
@@ -76,6 +77,26 @@ TEST(ContactPatch, WhatBeginsGrowsToItsShareHoweverShortTheFrames) {
   }
   ASSERT_EQ(patch.entries.size(), 2U);
   EXPECT_NEAR(patch.entries[1].share / (patch.entries[0].share + patch.entries[1].share), 0.5, 0.01);
+}
+
+// Along an edge, by a tool of 5 mm.
+TEST(ContactPatch, WhatTrailsBehindPushesAlongTheNormalOfItsTouch) {
+  BlendedSurface surface = pile(1);
+  surface.trianglesOfNodes = trianglesOfVertices({surface.from, surface.triangles});
+  surface.isCrease.assign(3, 1);
+  ContactPatch patch;
+  Proxy proxy = touching(0);
+  for (int tick = 0; tick <= 20; ++tick) {
+    const double along = tick / 20.0;
+    proxy.contacts[0].weights = {1 - along, along, 0};
+    proxy.centre = {0.004 * along, 0, 0.005};
+    addContacts(proxy, 0.005, 1, 0.0002, patch);
+  }
+  std::vector<ProxyContact> contacts;
+  patchContacts(surface, 0, proxy, 0.005, patch, contacts);
+  ASSERT_EQ(contacts.size(), 1U);
+  EXPECT_NEAR(contacts[0].point.x(), 0.0036, 0.0001);  // by a tenth of the radius behind
+  EXPECT_LT((contacts[0].normal - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
 }
 
 }  // namespace medulla

@@ -144,17 +144,23 @@ TEST(ProxyFigures, RestsInACornerWithoutJitter) {
   expectReached("corner of three planes, jitter (m)", jitter, 1e-9);
 }
 
+// Along x, open towards z, its edge at the origin.
+static TouchShape grooveOf(double half) {
+  const double height = 0.05, length = 0.04, s = height * std::tan(half);
+  return shapeOf({{-length, 0, 0},
+                  {length, 0, 0},
+                  {-length, s, height},
+                  {length, s, height},
+                  {-length, -s, height},
+                  {length, -s, height}},
+                 {{0, 1, 3}, {0, 3, 2}, {0, 4, 5}, {0, 5, 1}});
+}
+
 TEST(ProxyFigures, FollowsTheBottomOfAGroove) {
   for (const double degrees : {90.0, 40.0, 20.0, 10.0}) {
-    const double half = degrees * std::numbers::pi / 360, height = 0.05, length = 0.04, s = height * std::tan(half);
+    const double half = degrees * std::numbers::pi / 360;
     ProxyRun r;
-    r.shape = shapeOf({{-length, 0, 0},
-                       {length, 0, 0},
-                       {-length, s, height},
-                       {length, s, height},
-                       {-length, -s, height},
-                       {length, -s, height}},
-                      {{0, 1, 3}, {0, 3, 2}, {0, 4, 5}, {0, 5, 1}});
+    r.shape = grooveOf(half);
     const double bottom = r.tool.radius / std::sin(half);
     r.device = [=](double t) {
       return Vector3d(0.003 + 0.01 * std::clamp((t - 0.3) / 0.2, 0.0, 1.0), 0.002,
@@ -173,6 +179,28 @@ TEST(ProxyFigures, FollowsTheBottomOfAGroove) {
     const std::string what = "groove of " + std::to_string(int(degrees)) + " degrees, ";
     expectReached((what + "off by (m)").c_str(), off, 1e-6);
     expectReached((what + "jitter (m)").c_str(), jitter, 1e-9);
+  }
+}
+
+// Friction is that of what presses on the walls, 1 / sin(half the angle) of what presses the tool down.
+TEST(ProxyFigures, BothWallsOfAGrooveHoldBack) {
+  for (const double degrees : {120.0, 90.0, 60.0}) {
+    const double half = degrees * std::numbers::pi / 360;
+    ProxyRun r;
+    r.shape = grooveOf(half);
+    r.tool.staticFriction = 0.3;
+    r.tool.dynamicFriction = 0.2;
+    const double bottom = r.tool.radius / std::sin(half);
+    r.device = [=](double t) {
+      return Vector3d(0.01 * std::clamp(t - 0.3, 0.0, 1.0), 0, bottom + 0.001 - 0.003 * std::min(1.0, t / 0.2));
+    };
+    r.duration = 1.3;
+    double off = 0;
+    r.run([&](double t, const ToolState& tool, const BlendedSurface&, double) {
+      if (t > 0.6) off = std::max(off, std::abs(-tool.force.x() / tool.force.z() * std::sin(half) - 0.2));
+    });
+    expectReached(("friction of 0.2 in a groove of " + std::to_string(int(degrees)) + " degrees, off by").c_str(), off,
+                  1e-3);
   }
 }
 
