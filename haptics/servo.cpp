@@ -75,13 +75,14 @@ static Vector3d givenForce(const BlendedSurface& surface, double alpha, const Se
 
 // A push along the normal, as far as the dynamics can have it by now: what the tissue gave some frames ago, give or
 // take what it can have changed since. Where a stiff tool meets limp tissue, a place that is off by a tenth of a
-// millimetre is several times the force.
+// millimetre is several times the force. Downward twice as much: what lags behind a device that withdraws hands it
+// energy.
 static double pushKeptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal,
                                const TissueMotion& tissue, const ServoTool& tool) {
   if (surface.toolForce[0].empty()) return tool.estimate;
   const double given = std::max(0.0, -givenForce(surface, alpha, tool).dot(normal));
   const double since = pushSince(surface, alpha, tissue, normal, tool.settings, tool.motion);
-  return std::clamp(tool.estimate, std::max(0.0, given - since), given + since);
+  return std::clamp(tool.estimate, std::max(0.0, given - 2 * since), given + since);
 }
 
 // Likewise across it: a proxy on the late surface slips, or sticks, where the tissue itself does not.

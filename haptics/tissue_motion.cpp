@@ -23,7 +23,6 @@ void startFrame(const Vector3d& lag, double duration, DeviceMotion& device) {
   device.sinceBefore = device.since;
   device.earlyBefore = device.early;
   device.since = 0;
-  ++device.frames;
   device.early.setZero();
 }
 
@@ -98,11 +97,7 @@ double partSeen(const DeviceMotion& device) {
   const auto& seen = device.seen;
   const double bySteps = (seen.stepChange + kLeast * device.followsAtOnce) / (seen.wayChange + kLeast);
   const double byForce = 1 - kSafe * (seen.forceLength + kLeast * (1 - device.followsAtOnce)) / (seen.length + kLeast);
-  // What is pushed starts late and looks stiff at first; a free ball that is poked has gone by the fourth frame. Then
-  // it is no bound: a slab's surface resisted with 800 N/m where its give says 520, and the hand lagged behind by 13
-  // ms.
-  constexpr int kUnsure = 3;  // frames
-  return std::clamp(std::max(bySteps, byForce), device.frames <= kUnsure ? device.followsAtOnce : 0, 1.0);
+  return std::clamp(std::max(bySteps, byForce), device.followsAtOnce, 1.0);
 }
 
 // `change`, m: by how much the step up to the surface's `to` differs from the one before.

@@ -185,9 +185,8 @@ TEST(TissueMotion, HowFarHeldTissueFollowsIsSeenFromItsSteps) {
   EXPECT_NEAR(followedAfter(0.9, 0.5, 0), 0.5, 1e-12);  // by its give
   EXPECT_NEAR(followedAfter(0.9, 0.5, 40), 0.9, 1e-3);
   EXPECT_NEAR(followedAfter(0.9, 0, 40), 0.9, 1e-3);
-  EXPECT_NEAR(followedAfter(0.3, 0.5, 3), 0.5, 1e-12);  // at first not less than by its give
-  EXPECT_NEAR(followedAfter(0.3, 0.5, 40), 0.3, 1e-3);
-  EXPECT_NEAR(followedAfter(1.2, 0.5, 40), 1, 1e-12);  // not beyond the device
+  EXPECT_NEAR(followedAfter(0.3, 0.5, 40), 0.5, 1e-12);  // not less than what it gives at once
+  EXPECT_NEAR(followedAfter(1.2, 0.5, 40), 1, 1e-12);    // nor beyond the device
 }
 
 // Tissue that swings on its own, and that a way of 0.1 mm more presses by so much of the tool's stiffness more.
@@ -209,8 +208,7 @@ static double followedByForce(double series, double atOnce, int frames) {
 TEST(TissueMotion, HowFarTouchedTissueFollowsIsSeenFromItsForce) {
   EXPECT_NEAR(followedByForce(0.01, 0.5, 0), 0.5, 1e-12);
   EXPECT_NEAR(followedByForce(0.01, 0.5, 20), 0.985, 3e-3);  // half as much again, to be safe
-  EXPECT_NEAR(followedByForce(0.8, 0.5, 3), 0.5, 1e-12);     // at first not less than by its give
-  EXPECT_LT(followedByForce(0.8, 0.5, 20), 0.2);             // by its force, safely
+  EXPECT_NEAR(followedByForce(0.8, 0.5, 20), 0.5, 1e-12);    // not less than what it gives at once
 }
 
 }  // namespace medulla
