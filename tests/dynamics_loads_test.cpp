@@ -237,6 +237,46 @@ TEST(Loads, AtRestTheForceIsStiffnessTimesDistance) {
   }
 }
 
+// What lies on a floor is stopped by it after the loads, which must not yield to the velocity that the floor takes
+// away.
+TEST(Loads, AtRestOnAFloorTheForceIsStiffnessTimesDistance) {
+  for (const double damping : {0.0, 1.0, 20.0}) {
+    BodyDescription b = synthetic::body(synthetic::shortTube(), 6e3);
+    b.surface = SurfaceMode::skin;
+    b.tissue.damping = 1;
+    StaticShape floor;
+    const FillingSphere& middle = b.model->spheres[2];
+    floor.worldFromShape.translation() = middle.restBallCentre;
+    floor.worldFromShape.translation().y() -= middle.radius;
+    WorldSettings settings;
+    settings.gravity.setZero();
+    settings.contact = ContactMode::balls;
+    World world(settings, {b}, {floor});
+    const auto heightOf = [&](int t) {
+      double sum = 0;
+      for (const int node : b.model->triangles[t]) sum += b.model->restNodes[node].y() / 3;
+      return sum - 0.2 * std::abs(b.model->restNodes[b.model->triangles[t][0]].x() - middle.restBallCentre.x());
+    };
+    int top = 0;
+    for (int t = 1; t < int(b.model->triangles.size()); ++t)
+      if (heightOf(t) > heightOf(top)) top = t;
+    Loads loads;
+    loads.toolSprings = {pushAt(world, top, 0.002)};
+    ToolSpring& s = loads.toolSprings[0];
+    s.outward = Vector3d::UnitY();
+    s.damping = damping;
+    std::vector<Vector3d> impulse;
+    for (int i = 0; i < 300; ++i) impulse = world.advance(loads);
+    DynamicsFrame frame;
+    world.readFrame(frame);
+    double y = 0;
+    for (int k = 0; k < 3; ++k) y += s.weights[k] * frame.bodies[0].nodes[s.nodes[k]].y();
+    const double expected = s.stiffness * (s.anchor.y() - y) * settings.frameDuration;
+    EXPECT_LT(expected, -1e-3) << damping;
+    EXPECT_NEAR(impulse[0].y() / expected, 1, 1e-3) << damping;
+  }
+}
+
 TEST(Loads, APushingSpringNeverPulls) {
   World world = tubeWorld(SurfaceMode::full, true);
   Loads loads;

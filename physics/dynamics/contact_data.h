@@ -88,6 +88,11 @@ struct alignas(64) ContactSphere {
   Quad inverseInertia[3];  // columns, 1/(kg m2); zero where rotation is fixed
 };
 
+// Of a sphere, in a substep.
+struct MomentumChange {
+  Quad velocity, angularMomentum;  // m/s, kg m2/s
+};
+
 struct ContactData {
   ContactMode mode = ContactMode::none;
   // Constants.
@@ -123,8 +128,10 @@ struct ContactData {
   // State: the impulses that the last substep ended with, ascending in key; the next one starts from them.
   std::vector<CarriedImpulse> carried;
   std::vector<CarriedImpulse> resting;  // those of contacts of bodies that sleep, likewise
-  std::vector<HeldFriction> held;       // of implicit steps: of every contact that pushed in the last one, likewise
-  bool listsAreOld = true;              // whatever the balls have moved: bodies fell asleep or woke, or none yet
+  // Per sphere, of the last substep with loads: what contacts made of its momenta; the loads of the next count on it.
+  std::vector<MomentumChange> change;
+  std::vector<HeldFriction> held;  // of implicit steps: of every contact that pushed in the last one, likewise
+  bool listsAreOld = true;         // whatever the balls have moved: bodies fell asleep or woke, or none yet
 
   PenetrationReport penetration;
   std::vector<BodyOverlap> startOverlaps;

@@ -166,6 +166,7 @@ void noteStartOverlaps(ContactData& c) {
 void layOutContact(WorldData& d, const std::vector<StaticShape>& statics) {
   ContactData& c = d.contact;
   c.mode = d.settings.contact;
+  c.change.resize(d.spheres.position.size());
   if (c.mode == ContactMode::none) return;
   decideWhoCollides(d);
   addStatics(c, statics);

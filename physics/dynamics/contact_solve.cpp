@@ -95,9 +95,14 @@ MEDULLA_INLINE void apply(WorldData& d, const Contact& c, Lanes impulse) {
 void returnImpulse(WorldData& d, const Contact& c, Lanes impulse) {
   for (int e = 0; e < c.ends; ++e) {
     const std::uint32_t i = c.sphere[e];
-    const Lanes twist = crossProduct(leverOf(d.contact.arm[i], c, e), splat(c.weight[e]) * impulse);
+    const Lanes share = splat(c.weight[e]) * impulse, twist = crossProduct(leverOf(d.contact.arm[i], c, e), share);
     Quad& l = d.spheres.angularMomentum[i];
-    store(l, fma(splat(d.spheres.groups[i / 4].freeToTurn[i % 4]), twist, load(l)));
+    const Lanes turned = splat(d.spheres.groups[i / 4].freeToTurn[i % 4]) * twist;
+    store(l, load(l) + turned);
+    if (!d.loadForces.empty()) {
+      addTo(d.contact.change[i].velocity, splat(d.contact.spheres[i].velocity.v[3]) * share);
+      addTo(d.contact.change[i].angularMomentum, turned);
+    }
     d.spheres.velocity[i] = d.contact.spheres[i].velocity;
     d.spheres.velocity[i].v[3] = 0;
   }
@@ -270,6 +275,7 @@ void notePenetration(ContactData& c) {
 
 void solveContacts(WorldData& d) {
   ContactData& c = d.contact;
+  if (!d.loadForces.empty()) std::fill(c.change.begin(), c.change.end(), MomentumChange{});
   if (c.contacts.empty()) {
     c.carried.clear();
     return;

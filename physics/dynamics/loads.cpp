@@ -1,8 +1,10 @@
 #include "physics/dynamics/loads.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "physics/dynamics/node_motion.h"
 #include "physics/dynamics/point_spring.h"
@@ -26,8 +28,9 @@ void add(Quad& q, const Vector3d& a) {
 // Angular velocity after stepVelocities: new momentum, orientation of the substep's beginning.
 Vector3d angularVelocity(const WorldData& d, int sphere) {
   const Eigen::Matrix3d r = quaternionOf(d.spheres.orientation[sphere]).toRotationMatrix();
-  return r * (inverseInertiaOf(d.spheres.groups[sphere / 4], sphere % 4) *
-              (r.transpose() * vectorOf(d.spheres.angularMomentum[sphere])));
+  const Vector3d momentum =
+      vectorOf(d.spheres.angularMomentum[sphere]) + vectorOf(d.contact.change[sphere].angularMomentum);
+  return r * (inverseInertiaOf(d.spheres.groups[sphere / 4], sphere % 4) * (r.transpose() * momentum));
 }
 
 void addImpulse(WorldData& d, int sphere, const Vector3d& linear, const Vector3d& angular) {
@@ -36,12 +39,16 @@ void addImpulse(WorldData& d, int sphere, const Vector3d& linear, const Vector3d
   add(d.spheres.angularMomentum[sphere], g.freeToTurn[sphere % 4] * angular);
 }
 
+// On a skin, with what contacts will presumably make of it: as much as a substep ago. Contacts come after the loads,
+// and a damper, and the spring at the substep's end, would yield to a velocity that they take away: a grip at rest on
+// what lies on a floor gave down to a tenth of its spring's force.
 Vector3d nodeVelocity(const WorldData& d, int node, const HostPoint& host) {
   if (host.count == 0) return vectorAt(d.nodes.velocity, node);
   Vector3d sum = Vector3d::Zero();
   for (int k = 0; k < host.count; ++k) {
-    sum += host.force[k].transpose() * vectorOf(d.spheres.velocity[host.spheres[k]]);
-    sum += host.torque[k].transpose() * angularVelocity(d, host.spheres[k]);
+    const int i = host.spheres[k];
+    sum += host.force[k].transpose() * (vectorOf(d.spheres.velocity[i]) + vectorOf(d.contact.change[i].velocity));
+    sum += host.torque[k].transpose() * angularVelocity(d, i);
   }
   return sum;
 }
@@ -162,6 +169,23 @@ PointSpring pointSpring(const WorldData& d, const Loads& loads, std::size_t k, d
     p.forceMax = held.forceMax;
   }
   return p;
+}
+
+// A tool that stays where it is goes on with the force that it had: on a skin that lies on something, whose contacts
+// answer a substep late, it would take several substeps to come to it again.
+void carryLoadForces(WorldData& d, const Loads& loads) {
+  std::vector<Vector3d>& before = d.loadForcesBefore;
+  std::swap(before, d.loadForces);
+  if (before.empty()) std::fill(d.contact.change.begin(), d.contact.change.end(), MomentumChange{});
+  d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Vector3d::Zero());
+  for (std::size_t k = 0; k < d.loadForces.size(); ++k) {
+    const PointSpring now = pointSpring(d, loads, k, 0);
+    const auto same = std::find_if(d.settling.begin(), d.settling.end(), [&](const SettlingSpring& s) {
+      return s.spring.tool == now.tool && s.spring.count == now.count && s.spring.nodes == now.nodes;
+    });
+    const auto j = static_cast<std::size_t>(same - d.settling.begin());
+    if (j < before.size() && j < d.settling.size()) d.loadForces[k] = before[j];
+  }
 }
 
 void applyLoads(WorldData& d, const Loads& loads, double remaining, std::vector<Vector3d>& toolImpulse) {

@@ -31,6 +31,8 @@ void applyDeadLoads(WorldData&, double time);
 double shareAt(const WorldData&, const NodeForce& load, double time);
 // driven.cpp: driven spheres get the velocity that takes them within `duration` (s) to their path at `time` (s).
 void driveSpheres(WorldData&, double time, double duration);
+// loads.cpp, at a frame's start: WorldData::loadForces, from those of the frame before.
+void carryLoadForces(WorldData&, const Loads& loads);
 // loads.cpp: tool springs and held nodes, implicitly against the velocities of this substep, so that their stiffness
 // does not bound the step. Adds N s to `toolImpulse`.
 void applyLoads(WorldData&, const Loads& loads, double remaining, std::vector<Eigen::Vector3d>& toolImpulse);

@@ -222,7 +222,7 @@ std::vector<Eigen::Vector3d> World::advance(const Loads& loads) {
   int tools = 0;
   visitLoadedNodes(loads, [&tools](const auto& load, int) { tools = std::max(tools, load.tool + 1); });
   std::vector<Eigen::Vector3d> toolImpulse(tools, Eigen::Vector3d::Zero());
-  d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Eigen::Vector3d::Zero());
+  carryLoadForces(d, loads);
   dropCostlyTurns(d);
   wakeLoaded(d, loads);
   moveLoadedParts(d, loads);
@@ -333,6 +333,12 @@ std::uint64_t World::stateHash() const {
       add(quadOf(vectorAt(d.nodes.position, i)), 3);
       add(quadOf(vectorAt(d.nodes.velocity, i)), 3);
     }
+  }
+  for (const Eigen::Vector3d& force : d.loadForces) add(quadOf(force), 3);
+  for (const MomentumChange& change : d.contact.change) {
+    if (d.loadForces.empty()) break;  // nothing starts from it
+    add(change.velocity, 3);
+    add(change.angularMomentum, 3);
   }
   for (const std::vector<CarriedImpulse>* impulses : {&d.contact.carried, &d.contact.resting}) {
     for (const CarriedImpulse& c : *impulses) {

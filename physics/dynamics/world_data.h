@@ -365,9 +365,10 @@ struct WorldData {
   CreepReport creep;
   bool creepsNow = false;  // some body, in the present substep
 
-  // Force of each tool load in the current substep, tool springs first, then held nodes; zero at the frame's start.
+  // Force of each tool load in the current substep, tool springs first, then held nodes.
   std::vector<Eigen::Vector3d> loadForces;
-  std::vector<SettlingSpring> settling;  // the loads of the current substep
+  std::vector<Eigen::Vector3d> loadForcesBefore;  // of the frame before; carryLoadForces() alone uses them
+  std::vector<SettlingSpring> settling;           // the loads of the current substep
 
   Quad gravity;
   int substeps = 1;
