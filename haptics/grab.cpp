@@ -15,9 +15,8 @@ static double heldGive(const BlendedSurface& surface, const Grip& grip) {
   return 1 / stiffness;
 }
 
-static void holdPatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
-                      double gripRadius, Grip& grip) {
-  const ProxyContact& contact = proxy.mainContact();
+static void holdPatch(const BlendedSurface& surface, double alpha, const ProxyContact& contact,
+                      const ToolSample& device, double gripRadius, Grip& grip) {
   const std::array<int, 3>& touched = surface.triangles[contact.triangle];
   const int body = surface.bodyOfNode[touched[0]];
   const Eigen::Quaterniond toolFromWorld = device.worldFromTool.conjugate();
@@ -31,14 +30,14 @@ static void holdPatch(const BlendedSurface& surface, double alpha, const Proxy& 
   grip.give = heldGive(surface, grip);
 }
 
-void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
+void updateGrip(const BlendedSurface& surface, double alpha, const ProxyContact* contact, const ToolSample& device,
                 double gripRadius, Grip& grip) {
   const bool closes = device.grip > kGripCloses;
   if (closes == grip.closed) return;
   grip.closed = closes;
   grip.slipped = false;
   grip.held.clear();
-  if (closes && proxy.inContact()) holdPatch(surface, alpha, proxy, device, gripRadius, grip);
+  if (closes && contact != nullptr) holdPatch(surface, alpha, *contact, device, gripRadius, grip);
 }
 
 }  // namespace medulla

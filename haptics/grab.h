@@ -20,11 +20,11 @@ struct Grip {
   double give = 0;               // m/N, of what is held, by the nodes' own; 0 where a node does not give
 };
 
-// Opens or closes by the sample's grip (closed above kGripCloses). Closing in contact, also at a run's first tick,
+// Opens or closes by the sample's grip (closed above kGripCloses). Closing on `contact`, also at a run's first tick,
 // holds every node of the touched body within gripRadius of the contact point, and at least the three of the touched
-// triangle, where they are: the springs are slack then. `grip.held` must have room for every node of the surface:
-// nothing is allocated here.
-void updateGrip(const BlendedSurface& surface, double alpha, const Proxy& proxy, const ToolSample& device,
+// triangle, where they are: the springs are slack then. Null: nothing is touched. `grip.held` must have room for every
+// node of the surface: nothing is allocated here.
+void updateGrip(const BlendedSurface& surface, double alpha, const ProxyContact* contact, const ToolSample& device,
                 double gripRadius, Grip& grip);
 
 // The tissue tears away: the grip holds nothing until it opens and closes again.

@@ -202,13 +202,19 @@ static Vector3d heldVelocity(const ServoTool& tool, const ToolSample& before, do
   return meanOverHeld(tool.grip, way) / tickDuration;
 }
 
+// What jaws would close on: also what is felt still, while the late surface has come off the proxy already.
+static const ProxyContact* contactToHold(const ServoTool& tool, const Vector3d& felt) {
+  if (tool.proxy.inContact()) return &tool.proxy.mainContact();
+  return tool.isLeaving && !felt.isZero(0) ? &tool.lastContact : nullptr;
+}
+
 // Opens or closes. The targets of what it takes hold of are measured where the nodes are by now, and then shifted so
 // that the springs, with what motion adds, start with the force `felt` so far (N): neither hand nor tissue is jerked.
 static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d& felt, const ToolSample& before,
                      double tickDuration, ServoTool& tool) {
   Grip& grip = tool.grip;
   const bool wasHolding = !grip.held.empty();
-  updateGrip(surface, alpha, tool.proxy, tool.device, tool.settings.gripRadius, grip);
+  updateGrip(surface, alpha, contactToHold(tool, felt), tool.device, tool.settings.gripRadius, grip);
   if (!grip.held.empty()) tool.motion.velocity = heldVelocity(tool, before, tickDuration);
   if (wasHolding == !grip.held.empty()) return;
   if (wasHolding) {

@@ -132,6 +132,25 @@ TEST(Grab, WhatItComesUponInTheVeryTickOfClosingIsHeldWithoutForceStep) {
   EXPECT_LT(first, 1.2 * run.tool.stiffness * kSpeed * run.tickDuration);  // what a tick of the way adds
 }
 
+// At 20 Hz a withdrawing tool comes off the late surface while the tissue still pushes it.
+TEST(Grab, JawsHoldWhatIsStillFelt) {
+  for (int k = 0; k < 25; ++k) {
+    const double closing = 1 + 0.008 * k;
+    ToolRun run = grabbing();
+    run.ticksPerFrame = 60;
+    run.device = [=](double t) {
+      const double up = 0.1 * std::max(0.0, t - 1);
+      return deviceAt(approach(t) + up * Vector3d::UnitZ(), t > closing ? 1 : 0);
+    };
+    ToolState before;
+    run.run(closing + 0.01, [&](double t, const ToolState& tool) {
+      const bool closesNow = t > closing && t - run.tickDuration <= closing;
+      if (closesNow) EXPECT_EQ(tool.holding, before.inContact) << closing << " s, " << before.force.norm() << " N";
+      before = tool;
+    });
+  }
+}
+
 TEST(Grab, PullingTakesTheTissueAlongAndReleaseLetsItGo) {
   ToolRun run = grabbing();
   run.device = [](double t) {
