@@ -84,13 +84,14 @@ TEST_F(RunNotes, AToolThatBeginsClosedInTissueHoldsItAtRest) {
   EXPECT_NE(r.out.find("impulse_mismatch 0 %"), std::string::npos) << r.out;
 }
 
-// Led so hard that its links fold, whatever the step.
+// Led so hard that its links fold, whatever the step. The tool is out of its way: what folds when is chance.
 TEST_F(RunNotes, ABodyThatCrept) {
+  folder.write("own/organ.csv", "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,0,0,0.5,1,0,0,0,0\n0.4,0,0,0.5,1,0,0,0,0\n");
   std::string text = read("own/organ.xml");
   const std::string fix = "<fix spheres=\"1\"/>", gravity = "gravity=\"0 0 0\"";
   text.replace(
       text.find(fix), fix.size(),
-      fix + R"(<drive sphere="5" dof="all" axis="0 1 0" amplitude="0.2" frequency="20" phase="0" velocity="0 0 0"/>)");
+      fix + R"(<drive sphere="5" dof="all" axis="0 1 0" amplitude="0.2" frequency="40" phase="0" velocity="0 0 0"/>)");
   text.replace(text.find(gravity), gravity.size(), gravity + " integrator=\"implicit\"");
   folder.write("own/organ.xml", text);
   Notes notes = complaints(run({"replay", "own/organ.xml"}));
