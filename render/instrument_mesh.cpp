@@ -108,6 +108,10 @@ void addShaft(Builder& b, float facing) {
   constexpr float kSpacing = 0.006f;
   for (int k = 1; k <= int((kShaftEnd - kShaftStart) / kSpacing); ++k)
     sheath.push_back({kShaftStart + kSpacing * float(k), r});
+  // Its end, closed, with an edge that is a little round.
+  const float end = sheath.back().z;
+  for (const Ring& ring : {Ring{0.0002f, r - 0.00006f}, {0.00034f, r - 0.0002f}, {0.0004f, r - 0.0004f}, {0.0004f, 0}})
+    sheath.push_back({end + ring.z, ring.radius});
   lathe(b, sheath, kSheath, facing);
 }
 

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
+#include "render/instrument_mesh.h"
+
 namespace medulla {
 namespace {
 
@@ -32,6 +36,19 @@ SceneMesh sheet(std::uint32_t cells, float spacing) {
 
 std::size_t middleOf(const SceneMesh& mesh) {
   return mesh.position.size() / 2;
+}
+
+// Seen along its axis from behind, the shaft is a full disc.
+TEST(Instrument, TheShaftIsClosedAtItsEnd) {
+  SceneMesh mesh;
+  appendInstrument({}, {}, 720, mesh);
+  float area = 0;
+  for (std::size_t i = 0; i < mesh.index.size(); i += 3) {
+    const vec3 &a = mesh.position[mesh.index[i]], &b = mesh.position[mesh.index[i + 1]],
+               &c = mesh.position[mesh.index[i + 2]];
+    if (std::min({a.z, b.z, c.z}) > 0.9f * kShaftEnd) area += 0.5f * glm::cross(b - a, c - a).z;
+  }
+  EXPECT_NEAR(area / (std::numbers::pi_v<float> * kShaftRadius * kShaftRadius), 1, 0.03);
 }
 
 TEST(Touch, StretchPalesAndSqueezeReddens) {
