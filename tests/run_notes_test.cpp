@@ -64,6 +64,31 @@ TEST_F(RunNotes, AMotionThatDoesNotFitTheScene) {
   EXPECT_EQ(complaints(still), Notes{});
 }
 
+TEST_F(RunNotes, AToolThatStartsInsideABodyIsNamedWithItsDepth) {
+  const auto startOf = [&](double z, int grip) {
+    const std::string rest = fmt::format(",-0.0525,-0.0385,{},1,0,0,0,{}\n", z, grip);
+    folder.write("own/organ.csv", "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0" + rest + "0.4" + rest);
+    const ProgramResult r = run({"check", "own/organ.xml"});
+    EXPECT_EQ(r.exitCode, 0) << r.err;
+    return complaints(r);
+  };
+  const auto depthOf = [](const Notes& notes) {
+    const std::string words = "warning: tool 'probe' reaches ";
+    if (notes.size() != 1 || !notes[0].starts_with(words)) return 0.;
+    EXPECT_NE(notes[0].find(" mm into body 'organ' at the start"), std::string::npos) << notes[0];
+    return std::stod(notes[0].substr(words.size()));
+  };
+  EXPECT_EQ(startOf(0.05, 0), Notes{});
+  const Notes deep = startOf(0.012, 0);
+  EXPECT_GT(depthOf(deep), 2);
+  EXPECT_GT(depthOf(deep), depthOf(startOf(0.015, 0)));
+  EXPECT_EQ(startOf(0.012, 1), Notes{});  // closed, it holds what it is in
+  startOf(0.012, 0);
+  for (const auto& words : {std::vector<std::string>{"replay", "own/organ.xml"},
+                            {"render", "own/organ.xml", "--still", "0", "--size", "64x48", "-o", "still.png"}})
+    EXPECT_EQ(complaints(run(words)), deep) << words[0];
+}
+
 TEST_F(RunNotes, ShippedScenesHaveNone) {
   const std::string scenes = std::string(MEDULLA_SOURCE_DIR) + "/scenes";
   for (const auto& entry : std::filesystem::recursive_directory_iterator(scenes)) {

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <optional>
 #include <set>
 
@@ -11,6 +14,8 @@
 #include "app/commands/run_recorders.h"
 #include "app/files/text.h"
 #include "app/interrupt.h"
+#include "physics/model/mesh_topology.h"
+#include "physics/model/surface_queries.h"
 
 namespace medulla {
 
@@ -88,12 +93,44 @@ static void printUnplayed(const LoadedScene& loaded, bool isExcerpt) {
   }
 }
 
+// m; how far a ball reaches into a closed surface, below 0 where it does not touch it.
+static double reachInto(const TriangleMesh& surface, const Eigen::Vector3d& centre, double radius) {
+  double nearest = std::numeric_limits<double>::infinity(), angle = 0;
+  for (const std::array<int, 3>& t : surface.triangles) {
+    const std::array<Eigen::Vector3d, 3> corners{surface.vertices[t[0]], surface.vertices[t[1]],
+                                                 surface.vertices[t[2]]};
+    nearest = std::min(nearest, (centre - closestOnTriangle(centre, corners)).norm());
+    angle += solidAngle(corners[0], corners[1], corners[2], centre);
+  }
+  return radius + (angle > 2 * std::numbers::pi ? nearest : -nearest);
+}
+
+// The tissue pushes such a tool out at once, with all the force of its spring. A closed one holds what it is in.
+static void printBuriedTools(const LoadedScene& loaded, const World& world) {
+  constexpr double kLeast = 0.01;  // of the tool's radius: one that just touches
+  DynamicsFrame frame;
+  world.readFrame(frame);
+  for (std::size_t k = 0; k < loaded.trajectories.size(); ++k) {
+    const ToolSample start = sampleTrajectory(loaded.trajectories[k], 0);
+    const double radius = loaded.scene.tools[k].settings.radius;
+    for (std::size_t b = 0; b < frame.bodies.size() && start.grip <= kGripCloses; ++b) {
+      const SceneBody& body = loaded.scene.bodies[b];
+      const double depth = reachInto({frame.bodies[b].nodes, body.model->triangles}, start.position, radius);
+      if (depth > kLeast * radius)
+        fmt::print(stderr,
+                   "warning: tool '{}' reaches {:.2g} mm into body '{}' at the start and is pushed out at once\n",
+                   loaded.scene.tools[k].name, 1e3 * depth, body.name);
+    }
+  }
+}
+
 void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world) {
   const Scene& scene = loaded.scene;
   printUnplayed(loaded, options.isExcerpt);
   for (const BodyOverlap& o : world.startOverlaps())
     fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n", scene.bodies[o.body0].name,
                scene.bodies[o.body1].name, 1e3 * o.depth);
+  printBuriedTools(loaded, world);
   for (const SceneBody& body : scene.bodies)
     if (std::set<int>(body.fixedNodes.begin(), body.fixedNodes.end()).size() == body.model->restNodes.size())
       fmt::print(stderr, "note: every node of body '{}' is held\n", body.name);
