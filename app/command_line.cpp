@@ -71,6 +71,10 @@ void usageError(const std::string& option, const std::string& value, const std::
   throw CLI::ValidationError(value.empty() ? option : option + " " + value, "expected " + expected);
 }
 
+void requireEnding(const std::string& option, const std::string& path, const std::string& ending) {
+  if (!path.empty() && !path.ends_with(ending)) usageError(option, path, "a file that ends in " + ending);
+}
+
 template <typename T>
 static CLI::Validator within(double low, double high, const std::string& what) {
   const std::string expected =
@@ -120,6 +124,9 @@ RunOptions runOptions(const RunArguments& a) {
   }
   options.trajectories = filesByTool("--trajectory", a.trajectories);
   options.records = filesByTool("--record", a.records);
+  for (const auto& [tool, path] : options.records) requireEnding("--record", path, ".csv");
+  requireEnding("--log", a.log, ".csv");
+  requireEnding("--frame-times", a.frameTimes, ".csv");
   options.logPath = a.log;
   options.logEveryTick = a.logRate == "tick";
   if (options.logEveryTick && a.log.empty()) usageError("--log-rate", a.logRate, "--log FILE with it");
@@ -127,7 +134,7 @@ RunOptions runOptions(const RunArguments& a) {
   for (const auto& request : a.surfaces) {
     SurfaceRequest r;
     r.path = request.at(1);
-    if (!r.path.ends_with(".obj")) usageError("--surface-at", r.path, "a file that ends in .obj");
+    requireEnding("--surface-at", r.path, ".obj");
     if (request[0] != "end") {
       r.time = parseNumber<double>(request[0]);
       if (!r.time) usageError("--surface-at", request[0], "a time in seconds or \"end\"");

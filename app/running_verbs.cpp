@@ -31,19 +31,19 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
                   "how Embree runs: isa=sse2|sse4.2|avx|avx2|avx512, threads=N; the results are the same")
       ->type_name("KEY=VALUE,...");
   command.add_option("--log", a.log, "write a CSV row per dynamics frame: tools, forces, volume, energies")
-      ->type_name("FILE");
+      ->type_name("FILE.csv");
   command.add_option("--log-rate", a.logRate, "rows of the log: per dynamics frame or per servo tick")
       ->check(CLI::IsMember({"frame", "tick"}))
       ->capture_default_str();
   command
       .add_option("--frame-times", a.frameTimes,
                   "write what servo and dynamics took, ms per dynamics frame (CSV); for medulla plot")
-      ->type_name("FILE");
+      ->type_name("FILE.csv");
   command
       .add_option("--record", a.records,
                   "write a tool's motion and force, tick by tick, as a trajectory; read back by --trajectory it gives "
                   "the same hash (repeatable)")
-      ->type_name("[TOOL=]FILE")
+      ->type_name("[TOOL=]FILE.csv")
       ->allow_extra_args(false);
   command
       .add_option("--surface-at", a.surfaces, "write the bodies' surfaces at time T (s) or \"end\" as OBJ (repeatable)")
@@ -228,7 +228,7 @@ Verb addReplay(CLI::App& app) {
   addRunOptions(*c, a->run);
   c->add_option("--cache", a->cache,
                 "write what every picture shows, for medulla render --cache; not the ticks of --show force")
-      ->type_name("FILE");
+      ->type_name("FILE.cache");
   c->add_flag("--realtime", a->realtime,
               "run against the clock: the servo in a thread of its own at its rate, the dynamics in another; tells CPU "
               "times of ticks, and which came late");
@@ -239,6 +239,7 @@ Verb addReplay(CLI::App& app) {
   return {c, [a] {
             RunOptions options = runOptions(a->run);
             options.untilRest = a->untilRest;
+            requireEnding("--cache", a->cache, ".cache");
             options.cacheToWrite = a->cache;
             options.realtime = a->realtime;
             if (a->realtime && !a->cache.empty())

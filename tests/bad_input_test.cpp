@@ -84,6 +84,23 @@ TEST_F(BadInput, APipeIsReadToItsEnd) {
   EXPECT_EQ(readTextFile(path), text);
 }
 
+TEST_F(BadInput, OutputsThatAreCalledAsAnotherKindOfFileAreWrongUsage) {
+  const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
+  const std::string victim = read("own/organ.xml");
+  for (const auto& [option, ending] :
+       {std::pair("--log", ".csv"), {"--frame-times", ".csv"}, {"--record", ".csv"}, {"--cache", ".cache"}})
+    expectRefused(run({"replay", "own/organ.xml", option, "own/organ.xml"}),
+                  fmt::format("{} own/organ.xml: expected a file that ends in {}", option, ending), 2);
+  expectRefused(run({"replay", "own/organ.xml", "--record", "probe=own/organ.xml"}), "ends in .csv", 2);
+  expectRefused(run({"render", "own/organ.xml", "--log", "{scene}.txt", "-o", "a.mp4"}), "--log {scene}.txt: expected",
+                2);
+  expectRefused(run({"replay", "own/organ.xml", "--surface-at", "end", "own/organ.xml"}), "ends in .obj", 2);
+  expectRefused(run({"build", mesh, "-o", "own/organ.ply"}), "-o own/organ.ply: expected a file that ends in .xml", 2);
+  expectRefused(run({"build", mesh, "-o", "m.xml", "--report", "own/organ.xml"}), "--report own/organ.xml: exp", 2);
+  EXPECT_EQ(read("own/organ.xml"), victim);
+  EXPECT_EQ(folder.contents(), std::vector<std::string>{"own"});
+}
+
 TEST_F(BadInput, DevicesAndPipesAreNoFiles) {
   expectRefused(run({"check", "/dev/zero"}), "/dev/zero: is a device, expected a file or a pipe");
   expectRefused(run({"replay", "own/organ.xml", "--trajectory", "/dev/zero"}), "/dev/zero: is a device");

@@ -211,8 +211,8 @@ double farthest(const std::string& from, const std::string& to) {
 TEST_F(LoadCase, ARunUntilRestEndsWhenNothingMoves) {
   const std::string load = fmt::format("{}<load plane='0 1 0 -0.06' force='0 0 1e-2' to='0.5'/>", kHeld);
   const std::string path = scene(load, "40"), end = folder / "end.obj", later = folder / "later.obj";
-  const ProgramResult run = runProgram(
-      {"replay", path, "--until-rest", "--surface-at", "end", end, "--surface-at", "39", later, "--log", folder / "l"});
+  const ProgramResult run = runProgram({"replay", path, "--until-rest", "--surface-at", "end", end, "--surface-at",
+                                        "39", later, "--log", folder / "l.csv"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   ASSERT_TRUE(run.out.starts_with("rest_at ")) << run.out;
   const double time = std::stod(run.out.substr(8));

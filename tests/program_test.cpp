@@ -388,12 +388,12 @@ TEST(ProgramRefuses, BadTrajectories) {
   expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "none.csv"}), 1, {"none.csv"});
   expectRefusal(runProgram({"replay", kScene, "--trajectory", "hook=" + folder / "nan.csv"}), 1, {"hook"});
   folder.write("unit.xml", "<recording file='r.txt' map='sofa'><units length='meter'/></recording>");
-  folder.write("short.xml", "<recording file='r.txt' map='jigsaws' part='slave_left'/>");
-  folder.write("r.txt", "1 2 3\n");
+  folder.write("short.xml", "<recording file='r.csv' map='jigsaws' part='slave_left'/>");
+  folder.write("r.csv", "1 2 3\n");
   expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "unit.xml"}), 1, {"unit.xml:1", "\"m\""});
-  expectRefusal(runProgram({"check", kScene, "--trajectory", folder / "short.xml"}), 1, {"r.txt:1", "76"});
-  expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "short.xml", "--log", folder / "r.txt"}), 1,
-                {"r.txt:1"});
+  expectRefusal(runProgram({"check", kScene, "--trajectory", folder / "short.xml"}), 1, {"r.csv:1", "76"});
+  expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "short.xml", "--log", folder / "r.csv"}), 1,
+                {"r.csv:1"});
 }
 
 TEST(ProgramRefuses, OutputsThatCannotBeWritten) {
@@ -410,8 +410,8 @@ TEST(ProgramRefuses, OutputsThatCannotBeWritten) {
 
 TEST(ProgramRefuses, OneFileForTwoPurposes) {
   const TemporaryFolder folder;
-  const std::string csv = folder / "x.csv", obj = folder / "x.obj", video = folder / "v.mp4";
-  expectRefusal(runProgram(command({"replay", kScene, "--log", obj, "--surface-at", "end", obj})), 1, {"x.obj", "two"});
+  const std::string csv = folder / "x.csv", video = folder / "v.mp4";
+  expectRefusal(runProgram(command({"replay", kScene, "--log", csv, "--frame-times", csv})), 1, {"x.csv", "two"});
   expectRefusal(runProgram(command({"render", kScene, "-o", video, "-o", video})), 1, {"v.mp4", "two"});
   expectRefusal(runProgram(command({"replay", kScene, "--log", csv, "--record", csv})), 1, {"x.csv", "two"});
   folder.write("r.xml", "<recording file='r.csv'><columns rate='30' position='1 2 3'/></recording>");
@@ -420,7 +420,7 @@ TEST(ProgramRefuses, OneFileForTwoPurposes) {
                 1, {"r.csv", "input"});
   folder.write("scene.xml", readFile(kScene));
   folder.write("m.obj", readFile(std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj"));
-  expectRefusal(runProgram({"build", folder / "m.obj", "-o", folder / "m.obj"}), 1, {"m.obj", "input"});
+  expectRefusal(runProgram({"build", folder / "scene.xml", "-o", folder / "scene.xml"}), 1, {"scene.xml", "input"});
   EXPECT_EQ(folder.contents().size(), 4u);
 }
 

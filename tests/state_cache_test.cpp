@@ -170,7 +170,7 @@ TEST_F(CacheOfScene, OfAnotherMotionItIsRefusedOfAnotherPictureNot) {
   folder.write("own/organ.csv", "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,-0.0525,-0.0385,0.06,1,0,0,0,0\n");
   expectRefused(render({"-o", "x"}), "organ.cache: is of another scene or stale");
   expectRefused(render({"--log", "x.csv"}), "--log", 2);
-  expectRefused(run({"replay", "own/organ.xml", "--cache", "own/organ.csv"}), "over an input");
+  expectRefused(run({"replay", "own/organ.xml", "--record", "own/organ.csv"}), "over an input");
   EXPECT_FALSE(std::filesystem::exists(folder / "x"));
 }
 
