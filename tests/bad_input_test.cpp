@@ -31,6 +31,22 @@ TEST_F(BadInput, AMeshThatIsFarTooLargeIsRefusedInOneLine) {
   expectRefused(run({"build", "m.obj", "-o", "m.xml"}), "is the unit right?");
 }
 
+TEST_F(BadInput, AMeshThatIsDrawnMuchSmallerThanItIsIsNoted) {
+  folder.write("m.obj",
+               "v 0.1 0 0\nv -0.1 0 0\nv 0 0.1 0\nv 0 -0.1 0\nv 0 0 0.1\nv 0 0 -0.1\nf 1 3 5\nf 3 2 5\nf 2 4 5\n"
+               "f 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n");
+  const auto noteOf = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {"build", "m.obj", "-o", "m.xml", "--spheres", "1"});
+    const ProgramResult r = run(words);
+    EXPECT_EQ(r.exitCode, 0) << r.err;
+    EXPECT_NE(r.out.find("drawn_inside_max "), std::string::npos);
+    const std::size_t at = r.err.find("m.obj: note: the drawn surface lies up to ");
+    return at == std::string::npos ? "" : r.err.substr(at, r.err.find('\n', at) - at);
+  };
+  EXPECT_NE(noteOf({}).find("medulla build --fine m.obj"), std::string::npos);
+  EXPECT_EQ(noteOf({"--fine", "m.obj"}), "");
+}
+
 TEST_F(BadInput, CheckWarnsOfWhatRunsWarnOf) {
   EXPECT_EQ(run({"check", "own/organ.xml"}).err, "");
   add(fmt::format("<body name='twin' tissue='t' look='liver' model='{}/assets/gallbladder/gallbladder.model.xml'/>",

@@ -44,6 +44,23 @@ TEST(BuildReport, TellsOfEdgesLongerThanTheBodyIsThick) {
     EXPECT_FALSE(edges(assetMesh(organ))) << organ;
 }
 
+// A sphere's limit surface is one, smaller by what its mesh is coarse.
+TEST(BuildReport, TellsHowFarTheDrawnSurfaceLiesInside) {
+  const auto inside = [](int levels) {
+    BuildReport report;
+    const TriangleMesh mesh = ellipsoidMesh(levels, {0.05, 0.05, 0.05});
+    const SoftBodyModel model = buildModel(asRepaired(mesh), nullptr, {}, report);
+    double least = 0.05;  // m, from the centre
+    for (const auto& [x, y, z] : model.renderSurface.restPosition) least = std::min(least, Vector3d(x, y, z).norm());
+    EXPECT_LE(report.drawnInsideMax, 100 * (0.05 - least) / report.diagonal + 1e-4);
+    return report.drawnInsideMax;
+  };
+  const double coarse = inside(0), fine = inside(2);
+  EXPECT_GT(coarse, 5);
+  EXPECT_LT(fine, 1);
+  EXPECT_GT(fine, 0.1);
+}
+
 TEST(RenderSurface, FineMeshesAreNotDividedByThemselves) {
   EXPECT_EQ(renderLevelsFor(12500), 2);
   EXPECT_EQ(renderLevelsFor(12501), 1);

@@ -98,7 +98,7 @@ TEST(ReportFile, HoldsEveryFigureOfABuildWithItsUnit) {
             "0,\nlinks,0,\ngap_max,2.5,%\n"
             "gap_mean,0,%\ngap_cones_max,0,%\novershoot_max,0,%\ncover,0,%\ncover_cones,0,%\n"
             "mass_error,0,%\ncentre_error,0,%\ninertia_error,0,%\ncomponents,0,\ncentres_outside,0,\n"
-            "attachments_crossing,0,\nattachment_max,0,%\ndegree_max,0,\nseconds,0.125,s\n");
+            "attachments_crossing,0,\nattachment_max,0,%\ndegree_max,0,\ndrawn_inside_max,0,%\nseconds,0.125,s\n");
 }
 
 }  // namespace

@@ -97,6 +97,18 @@ void warnOfShape(const BuildJob& job) {
         job.meshPath, job.report.hollowLinks, job.report.links);
 }
 
+// Loop subdivision draws a coarse mesh much rounder than it is.
+void warnOfDrawnSurface(const BuildJob& job) {
+  constexpr double kSeen = 2;  // %
+  if (job.report.drawnInsideMax <= kSeen) return;
+  fmt::print(
+      stderr,
+      "{}: note: the drawn surface lies up to {:.2g} % of the diagonal inside the mesh, so that tools seem to "
+      "press on air; use a finer mesh{}\n",
+      job.meshPath, job.report.drawnInsideMax,
+      job.finePath.empty() ? ", or, where no corner is sharp, medulla build --fine " + shellWord(job.meshPath) : "");
+}
+
 // Of what the scene will get: links of the network, or of the beams' formulas.
 void warnOfErrors(const BuildJob& job) {
   constexpr double kLinks = 10, kElements = 5;  // %, RMS
@@ -277,6 +289,7 @@ int runBuild(const BuildOptions& options) {
   for (const BuildJob& job : jobs) writeModel(job.modelPath, job.model);
   for (const BuildJob& job : jobs) warnOfCover(job);
   for (const BuildJob& job : jobs) warnOfShape(job);
+  for (const BuildJob& job : jobs) warnOfDrawnSurface(job);
   for (const BuildJob& job : jobs) warnOfErrors(job);
   if (!options.reportPath.empty()) writeReport(options.reportPath, results);
   printResults(results);

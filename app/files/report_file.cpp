@@ -42,6 +42,7 @@ std::vector<Result> buildResults(const BuildReport& r) {
           {"attachments_crossing", numberText(r.attachmentsCrossing), ""},
           {"attachment_max", numberText(r.attachmentMax), "%"},
           {"degree_max", numberText(r.degreeMax), ""},
+          {"drawn_inside_max", numberText(r.drawnInsideMax), "%"},
           {"seconds", numberText(r.seconds), "s"}};
 }
 

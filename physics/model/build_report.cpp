@@ -88,6 +88,18 @@ void measureMasses(const SoftBodyModel& model, const MassProperties& exact, doub
   report.inertiaError = (inertia(total.secondMoment) - expected).norm() / expected.norm() * 100;
 }
 
+// Where hollows are smoothed out, the drawn surface lies outside, which nobody takes for air.
+void measureDrawnSurface(const SoftBodyModel& model, const TriangleMesh& mesh, double diagonal, BuildReport& report) {
+  TriangleMesh drawn{{}, model.renderSurface.triangles};
+  if (drawn.triangles.empty()) return;
+  for (const auto& [x, y, z] : model.renderSurface.restPosition) drawn.vertices.emplace_back(x, y, z);
+  const SurfaceTree tree = makeSurfaceTree(drawn);
+  for (const Vector3d& p : gapPoints(mesh)) {
+    const double distance = closestPoint(tree, p).distance / diagonal * 100;
+    if (distance > report.drawnInsideMax && !isInside(tree, p)) report.drawnInsideMax = distance;
+  }
+}
+
 void measureGraph(const SoftBodyModel& model, BuildReport& report) {
   SphereLinks links;
   std::vector<int> degree(model.spheres.size(), 0);
@@ -121,6 +133,7 @@ BuildReport measureModel(const SoftBodyModel& model) {
   measureCover(model, balls, voxels, report);
   measureMasses(model, exact, diagonal, report);
   measureGraph(model, report);
+  measureDrawnSurface(model, mesh, diagonal, report);
   for (const FillingSphere& s : model.spheres) {
     const double sticksOut = s.radius - inscribedRadius(tree, s.restBallCentre);
     report.overshootMax = std::max(report.overshootMax, sticksOut / diagonal * 100);
