@@ -12,7 +12,8 @@ namespace medulla {
 
 namespace {
 
-constexpr double kWindow = 5;  // s
+constexpr double kWindow = 5;           // s
+constexpr double kSmallestRange = 0.2;  // N
 
 // Linear RGB, bright on tissue and on the chart's dark paper, told apart by lightness too.
 constexpr glm::vec4 kColours[] = {
@@ -24,12 +25,8 @@ glm::vec4 colourOf(std::size_t tool) {
 
 }  // namespace
 
-ForceView::ForceView(const LoadedScene& loaded) : loaded_(&loaded), sizes_(loaded.scene.tools.size()) {
-  double softest = 1e300;
-  for (const SceneTool& tool : loaded.scene.tools)
-    softest = std::min(softest, tool.settings.stiffness * tool.settings.radius);
-  range_ = nextRoundNumber(sizes_.empty() ? 1 : 0.5 * softest);
-}
+ForceView::ForceView(const LoadedScene& loaded)
+    : loaded_(&loaded), sizes_(loaded.scene.tools.size()), range_(kSmallestRange) {}
 
 void ForceView::afterFrame(const Simulation& simulation) {
   const ServoRecord& record = simulation.record();

@@ -9,9 +9,9 @@
 namespace medulla {
 
 // The force on the hand as the viewer of a picture sees it: an arrow at each tool's proxy, and a strip chart of its
-// size over the last five seconds. Both have one range, which only grows: it begins at the force of a device that is
-// one tool radius beyond the surface. An arrow of the whole range is a fifth of the picture high at the camera's
-// target.
+// size over the last five seconds. Both have one range, a round number that follows the largest force so far and never
+// shrinks: small forces are seen as well as large ones. An arrow of the whole range is a fifth of the picture high at
+// the camera's target.
 class ForceView {
  public:
   explicit ForceView(const LoadedScene& loaded);
@@ -26,7 +26,7 @@ class ForceView {
   const LoadedScene* loaded_;
   std::vector<std::vector<float>> sizes_;  // N, [tool][tick], from time 0
   std::size_t seen_ = 0;                   // ticks that the range covers
-  double range_ = 0;                       // N
+  double range_;                           // N
 };
 
 }  // namespace medulla
