@@ -94,6 +94,9 @@ TEST(TrajectoryFile, EveryMistakeIsNamedWithItsLine) {
                   "file.csv:1: ", "columns are separated by semicolons, expected commas");
   expectComplaint("t[s]\tx[m]\ty[m]\tz[m]\tqw\tqx\tqy\tqz\tgrip\n", "file.csv:1: ", "separated by tabs");
   expectComplaint("0,0,0,0,1,0,0,0,0\n" + good, "file.csv:1: ", "column t[s] is missing");
+  expectComplaint("t[s],x[mm],y[mm],z[mm],qw,qx,qy,qz,grip\n" + good,
+                  "file.csv:1: ", "column x[m] is missing, found 'x[mm]': a <recording>");
+  expectComplaint("t[ms],x[m],y[m],z[m],qw,qx,qy,qz,grip\n" + good, "file.csv:1: ", "found 't[ms]': a <recording>");
   expectComplaint(header + "0,0,0,0,1,0,0,0\n", "file.csv:2: ", "8 columns");
   expectComplaint(header + good + "1,0,nan,0,1,0,0,0,0\n", "file.csv:3: ", "column y[m] is 'nan'");
   expectComplaint(header + good + "1,0,inf,0,1,0,0,0,0\n", "file.csv:3: ", "column y[m] is 'inf'");

@@ -27,10 +27,29 @@ static std::string requiredHeader() {
   return joined(std::span(columnNames).first<requiredColumns>(), ",");
 }
 
+// Which column holds the same in another unit; empty: none.
+static std::string_view inAnotherUnit(const std::vector<std::string_view>& cells, std::string_view column) {
+  const std::string_view quantity = column.substr(0, column.find('[') + 1);
+  const auto found = std::find_if(cells.begin(), cells.end(),
+                                  [&](std::string_view cell) { return cell.starts_with(quantity) && cell != column; });
+  return found == cells.end() || quantity.empty() ? std::string_view() : *found;
+}
+
+static void requireColumn(const std::vector<std::string_view>& cells, std::string_view column, const std::string& name,
+                          int line) {
+  if (std::find(cells.begin(), cells.end(), column) != cells.end()) return;
+  const std::string_view found = inAnotherUnit(cells, column);
+  throw inputError(
+      name, line,
+      found.empty()
+          ? fmt::format("column {} is missing, expected {}", column, requiredHeader())
+          : fmt::format("column {} is missing, found {}: a <recording> that names this file reads other units, by its "
+                        "<units> (scenes/recording.xsd)",
+                        column, inQuotes(found)));
+}
+
 static void checkHeader(const std::vector<std::string_view>& cells, const std::string& name, int line) {
-  for (std::size_t k = 0; k < requiredColumns; ++k)
-    if (std::find(cells.begin(), cells.end(), columnNames[k]) == cells.end())
-      throw inputError(name, line, fmt::format("column {} is missing, expected {}", columnNames[k], requiredHeader()));
+  for (std::size_t k = 0; k < requiredColumns; ++k) requireColumn(cells, columnNames[k], name, line);
   for (std::size_t k = 0; k < std::min(cells.size(), columnNames.size()); ++k)
     if (cells[k] != columnNames[k])
       throw inputError(
