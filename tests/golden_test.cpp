@@ -153,6 +153,9 @@ TEST_F(OwnGolden, AFolderThatCannotBeMadeIsSaidBeforeAnyPicture) {
 TEST_F(OwnGolden, WhatCannotBeComparedIsSaid) {
   expectRefused(golden({"--dir", "own"}), "own: no golden image here names its scene");
   expectRefused(golden({"--dir", "pictures", "--update", "organ_11"}), "organ.xml has no such moment");
+  EXPECT_NE(golden({"own/organ.xml", "--dir", "none"})
+                .out.find("none/organ_8.png does not exist: --update own/organ.xml stores it\n"),
+            std::string::npos);
   expectRefused(golden({"--dir", "pictures", "--update", "liver"}), "--update liver: no such scene");
   expectRefused(golden({"own/organ.xml", "./own/organ.xml", "--dir", "pictures"}), "two scenes of the name organ");
   const ProgramResult twice = golden({"--dir", "pictures", "--update", "own/organ.xml", "--update", "own/organ.xml"});

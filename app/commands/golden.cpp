@@ -116,11 +116,13 @@ std::vector<std::string> namesOf(const std::vector<Moment>& moments) {
   return names;
 }
 
-GoldenResult compare(const Moment& moment, const std::string& goldenPath, const std::string& renderedWith) {
+GoldenResult compare(const Moment& moment, const std::string& scene, const std::string& goldenPath,
+                     const std::string& renderedWith) {
   GoldenResult r;
   r.name = moment.name;
+  r.scene = scene;
   if (!fs::exists(goldenPath)) {
-    r.verdict = goldenPath + " does not exist";
+    r.verdict = fmt::format("{} does not exist: --update {} stores it", goldenPath, shellWord(scene));
     return r;
   }
   std::vector<PngText> texts;
@@ -266,8 +268,7 @@ void compareScene(const std::string& path, const GoldenOptions& options, Compari
   }
   const std::string folder = goldenFolderOf(path, options);
   for (const Moment& m : moments) {
-    GoldenResult r = compare(m, fmt::format("{}/{}.png", folder, m.name), comparison.renderedWith);
-    r.scene = path;
+    GoldenResult r = compare(m, path, fmt::format("{}/{}.png", folder, m.name), comparison.renderedWith);
     writeFailure(r, m.image, options.failures);
     add(std::move(r), comparison);
   }
