@@ -108,13 +108,14 @@ TEST_F(BadInput, OutputsThatAreCalledAsAnotherKindOfFileAreWrongUsage) {
     expectRefused(run({"replay", "own/organ.xml", option, "own/organ.xml"}),
                   fmt::format("{} own/organ.xml: expected a file that ends in {}", option, ending), 2);
   expectRefused(run({"replay", "own/organ.xml", "--record", "probe=own/organ.xml"}), "ends in .csv", 2);
-  expectRefused(run({"render", "own/organ.xml", "--log", "{scene}.txt", "-o", "a.mp4"}), "--log {scene}.txt: expected",
+  expectRefused(run({"render", "own/organ.xml", "--log", "{scene}.obj", "-o", "a.mp4"}), "--log {scene}.obj: expected",
                 2);
   expectRefused(run({"replay", "own/organ.xml", "--surface-at", "end", "own/organ.xml"}), "ends in .obj", 2);
   expectRefused(run({"build", mesh, "-o", "own/organ.ply"}), "-o own/organ.ply: expected a file that ends in .xml", 2);
   expectRefused(run({"build", mesh, "-o", "m.xml", "--report", "own/organ.xml"}), "--report own/organ.xml: exp", 2);
   EXPECT_EQ(read("own/organ.xml"), victim);
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"own"});
+  EXPECT_EQ(run({"replay", "own/organ.xml", "--log", "own/log.txt"}).exitCode, 0);
 }
 
 TEST_F(BadInput, DevicesAndPipesAreNoFiles) {
