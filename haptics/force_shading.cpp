@@ -44,8 +44,8 @@ Vector3d shadedNormal(const BlendedSurface& surface, double alpha, int triangle,
   Vector3d sum = Vector3d::Zero();
   for (int k = 0; k < 3; ++k) {
     const int node = surface.triangles[triangle][k];
-    const Vector3d corner = side * nodeNormal(surface, alpha, node);
-    sum += weights[k] * (!surface.isCrease[node] && corner.dot(face) > kCosineOfCrease ? corner : normal);
+    const Vector3d corner = surface.isCrease[node] ? normal : Vector3d(side * nodeNormal(surface, alpha, node));
+    sum += weights[k] * (corner.dot(face) > kCosineOfCrease ? corner : normal);
   }
   sum = sum.stableNormalized();
   return sum.dot(normal) > kCosineOfCrease ? sum : normal;

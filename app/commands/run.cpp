@@ -3,10 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <optional>
 #include <set>
 
@@ -14,7 +11,6 @@
 #include "app/commands/run_recorders.h"
 #include "app/files/text.h"
 #include "app/interrupt.h"
-#include "physics/model/mesh_topology.h"
 #include "physics/model/surface_queries.h"
 
 namespace medulla {
@@ -95,14 +91,9 @@ static void printUnplayed(const LoadedScene& loaded, bool isExcerpt) {
 
 // m; how far a ball reaches into a closed surface, below 0 where it does not touch it.
 static double reachInto(const TriangleMesh& surface, const Eigen::Vector3d& centre, double radius) {
-  double nearest = std::numeric_limits<double>::infinity(), angle = 0;
-  for (const std::array<int, 3>& t : surface.triangles) {
-    const std::array<Eigen::Vector3d, 3> corners{surface.vertices[t[0]], surface.vertices[t[1]],
-                                                 surface.vertices[t[2]]};
-    nearest = std::min(nearest, (centre - closestOnTriangle(centre, corners)).norm());
-    angle += solidAngle(corners[0], corners[1], corners[2], centre);
-  }
-  return radius + (angle > 2 * std::numbers::pi ? nearest : -nearest);
+  const SurfaceTree tree = makeSurfaceTree(surface);
+  const double distance = closestPoint(tree, centre).distance;
+  return radius + (isInside(tree, centre) ? distance : -distance);
 }
 
 // The tissue pushes such a tool out at once, with all the force of its spring. A closed one holds what it is in.
