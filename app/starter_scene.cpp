@@ -154,13 +154,14 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
   out += "  <!-- what it lies before; a mesh of yours is shape=\"mesh\" mesh=\"FILE\" -->\n";
   out += fmt::format("  <static shape=\"plane\" position=\"{}\" normal=\"0 0 1\" look=\"wall\" contact=\"false\"/>\n",
                      vectorText({centre.x(), centre.y(), l.box.min().z() - 0.15 * l.size}));
+  // Three times as stiff as what the tool touches, at its size: as organs' scenes have it.
   out += fmt::format(
       "  <tool name=\"{}\" trajectory=\"{}.csv\" radius=\"{:.3g}\" stiffness=\"{:.3g}\" damping=\"{:.3g}\" "
       "friction=\"0.3 0.2\"\n        force_max=\"{:.3g}\" grip_force_max=\"{:.3g}\" "
       "grip_radius=\"{:.3g}\"/>\n",
-      name == "grasper" ? "tool" : "grasper", name, 0.03 * l.grain, 0.6 * tissue.young * l.size,
-      std::sqrt(stiffer) * std::pow(scale, 2.5), stiffer * 8 * std::pow(scale, 3), stiffer * 8 * std::pow(scale, 3),
-      0.08 * l.grain);
+      name == "grasper" ? "tool" : "grasper", name, 0.03 * l.grain, 0.2 * tissue.young * l.size,
+      0.4 * std::sqrt(stiffer) * std::pow(scale, 2.5), stiffer * 8 * std::pow(scale, 3),
+      stiffer * 8 * std::pow(scale, 3), 0.08 * l.grain);
   out += fmt::format("  <camera position=\"{}\" target=\"{}\" fov=\"{}\"/>\n",
                      vectorText(centre + distance * Vector3d::UnitZ()), vectorText(centre), fov);
   out += fmt::format("  <light offset=\"{}\" reference_distance=\"{:.3g}\"/>\n",

@@ -22,7 +22,7 @@ struct ContactPatch {
     bool isTouched = false;                             // in this frame
   };
   std::vector<Entry> entries;  // in order of first touch; capacity is reserved, ticks allocate nothing
-  bool isTouched = false;      // in this frame
+  bool isTouched = false;      // in this frame, or not yet left
 };
 
 constexpr int kContactPatchCapacity = 64;  // triangles; beyond, a new one takes the place of the least share
@@ -42,9 +42,9 @@ void addContacts(const Proxy& proxy, double toolRadius, double push, double way,
 // The patch as contacts of the surface at alpha, shares summing to 1, with the shaded normals along which the hand
 // feels them; of an edge that of the touch, since from a place that trails behind, the way to the proxy leans forward,
 // and a tool without friction that slid in a groove dragged it by 6 % of its push; none if nothing was touched in this
-// frame. What has come off the proxy counts the less the farther the tool has gone since it touched it: e^-1 per tenth
-// of its radius. Pushes that trail behind by the 50 ms took a tool of 4 mm, 1 mm deep at 0.1 m/s, 28 % of its push on a
-// flat plate, and one of 1 mm nearly all. `out` is cleared and filled.
+// frame and what was before has been left. What has come off the proxy counts the less the farther the tool has gone
+// since it touched it: e^-1 per tenth of its radius. Pushes that trail behind by the 50 ms took a tool of 4 mm, 1 mm
+// deep at 0.1 m/s, 28 % of its push on a flat plate, and one of 1 mm nearly all. `out` is cleared and filled.
 void patchContacts(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius,
                    const ContactPatch& patch, std::vector<ProxyContact>& out);
 

@@ -99,7 +99,7 @@ static Vector3d dragKeptToTissue(const BlendedSurface& surface, double alpha, co
 // Across, a slipping contact is dragged by friction alone, which the proxy's position already holds; one that sticks by
 // the coupling and the motion. Neither by more than friction carries.
 static Vector3d contactForce(const BlendedSurface& surface, double alpha, const Vector3d& way, ServoTool& tool) {
-  tool.estimate = 0;
+  tool.estimate = tool.push = 0;
   if (!tool.isLeaving) return Vector3d::Zero();
   const Proxy& proxy = tool.proxy;
   const ProxyContact& last = tool.lastContact;
@@ -115,7 +115,7 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   const TissueMotion tissue = contactMotion(surface, alpha, touchedContacts(tool), normal, tool.motion);
   const Vector3d motion = motionForce(tool, tissue);
   tool.estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
-  const double push = pushKeptToTissue(surface, alpha, normal, tissue, tool);
+  const double push = tool.push = pushKeptToTissue(surface, alpha, normal, tissue, tool);
   Vector3d drag = proxy.inContact() ? Vector3d(tool.settings.stiffness * tangential(pull, normal)) : Vector3d::Zero();
   if (proxy.slipping || !tool.sticks) tool.leadWhereItStuck = tangential(tissue.lead, normal);
   tool.sticks = !proxy.slipping;
@@ -160,8 +160,10 @@ static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const 
 }
 
 // In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
-// contact is therefore handed over until the tool is clear of the point by its radius: a spring that only pushes does
-// no harm where nothing is pushed, and without it the tissue would jump free and knock against the tool.
+// contact is therefore handed over until the tool is clear of the point by its radius: springs that only push do no
+// harm where nothing is pushed, and without them the tissue would jump free and knock against the tool. All of the
+// patch: with the last triangle alone, the nodes around it did so, and a tool that left a limp organ felt up to three
+// times what it had just held.
 static void followLeaving(const BlendedSurface& surface, double alphaBefore, double alpha, ServoTool& tool) {
   if (tool.proxy.inContact()) {
     tool.lastContact = tool.proxy.mainContact();
@@ -275,6 +277,7 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
   const double push = (tool.proxy.centre - tool.device.position).norm();
   const double slid = tangential(tool.proxy.centre - carried, tool.lastFelt).norm();
   addContacts(tool.proxy, tool.settings.radius, push, std::max(way.norm(), slid), tool.patch);
+  if (tool.isLeaving) tool.patch.isTouched = true;
 }
 
 void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {

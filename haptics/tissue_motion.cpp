@@ -23,6 +23,7 @@ void startFrame(const Vector3d& lag, double duration, DeviceMotion& device) {
   device.sinceBefore = device.since;
   device.earlyBefore = device.early;
   device.since = 0;
+  ++device.frames;
   device.early.setZero();
 }
 
@@ -91,13 +92,23 @@ Vector3d heldStep(const BlendedSurface& surface, const Grip& grip, int framesAgo
   return meanOverHeld(grip, [&](const HeldOffset& held) { return surface.steps[framesAgo][held.node]; });
 }
 
+// What gives so much may resist half as much again: a slab of 20 kPa did with 800 N/m where its give says 520, and a
+// stiff tool that left it lagged behind by 13 ms. But what is pushed starts late, and looks stiff at first: a free ball
+// that is poked has gone by the fourth frame.
+double leastPart(const DeviceMotion& device) {
+  constexpr int kUnsure = 3;  // frames
+  constexpr double kStiffer = 1.5;
+  const double part = device.followsAtOnce;
+  return device.frames <= kUnsure ? part : part / (part + kStiffer * (1 - part));
+}
+
 double partSeen(const DeviceMotion& device) {
   constexpr double kLeast = 1e-12;  // m2, of 1 um: less is as if the device stood still
   constexpr double kSafe = 1.5;     // forces follow the ways late; at 1, strokes of a live run give 4 mJ
   const auto& seen = device.seen;
   const double bySteps = (seen.stepChange + kLeast * device.followsAtOnce) / (seen.wayChange + kLeast);
   const double byForce = 1 - kSafe * (seen.forceLength + kLeast * (1 - device.followsAtOnce)) / (seen.length + kLeast);
-  return std::clamp(std::max(bySteps, byForce), device.followsAtOnce, 1.0);
+  return std::clamp(std::max(bySteps, byForce), leastPart(device), 1.0);
 }
 
 // `change`, m: by how much the step up to the surface's `to` differs from the one before.

@@ -29,6 +29,7 @@ struct DeviceMotion {
   // The fraction of the device's displacement that touched or held tissue follows: at once, by its compliance; and as
   // observed up to the surface's `to` and `from`.
   double followsAtOnce = 0;
+  int frames = 0;  // that began since it touches or holds
   std::array<double, 2> follows{};
   // m2, sums over frames, of which older ones fade: step's change times the change of the way that it answers, and the
   // latter's square; and what the tissue's force changed by, over the tool's stiffness, times the length that tissue or

@@ -78,8 +78,8 @@ TEST(StarterScene, AToolThatHoldsStillFeelsAForceThatDoes) {
   const TemporaryFolder folder;
   const std::string mesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/liver/liver.obj", log = folder / "log.csv";
   ASSERT_EQ(runProgram({"new", mesh, "-o", folder / "mine", "--spheres", "25"}).exitCode, 0);
-  const ProgramResult run = runProgram(
-      {"replay", folder / "mine/liver.xml", "--set", "clock.duration=2.4", "--log", log, "--log-rate", "tick"});
+  const ProgramResult run = runProgram({"replay", folder / "mine/liver.xml", "--set", "clock.duration=2.4", "--set",
+                                        "tool.grasper.stiffness=2540", "--log", log, "--log-rate", "tick"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const LogTable table = readLog(log);
   const auto column = [&](const std::string& name) {
