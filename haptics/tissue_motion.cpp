@@ -13,7 +13,8 @@ using Eigen::Vector3d;
 void startFrame(const Vector3d& lag, double duration, DeviceMotion& device) {
   constexpr double kMemory = 0.1;  // s; a half or two and a half times as long feels the same within a few per cent
   const double kept = std::exp(-duration / kMemory);
-  for (double* sum : {&device.seen.stepChange, &device.seen.wayChange, &device.seen.forceLength, &device.seen.length})
+  for (double* sum : {&device.seen.stepChange, &device.seen.wayChange, &device.seen.forceLength, &device.seen.length,
+                      &device.swung.ofLast, &device.swung.square})
     *sum *= kept;
   device.way[0] -= lag;
   std::rotate(device.way.begin(), device.way.end() - 1, device.way.end());
@@ -42,12 +43,18 @@ Vector3d latestWay(const DeviceMotion& device, double alpha) {
   return device.way[0] + late * (device.way[1] - device.earlyBefore) + early * device.earlyBefore;
 }
 
-// m: what BlendedSurface::nodeStep() and nodeLead(), of the same frames in the same way, answer.
+// m: the next step at alpha, of the last ones that swing so; `of(k)` the step k frames before the surface's last.
+template <class Of>
+Vector3d nextStep(const std::array<double, 2>& swing, double alpha, const Of& of) {
+  return blendPoint(swing[1] * of(1) - of(2), swing[0] * of(0) - of(1), alpha);
+}
+
+// m: what BlendedSurface::nodeStep() and the steps of nextStep(), of the same frames in the same way, answer.
 Vector3d wayOfStep(const DeviceMotion& device, double alpha) {
   return blendPoint(device.way[2], device.way[1], alpha);
 }
 Vector3d wayOfLead(const DeviceMotion& device, double alpha) {
-  return blendPoint(2 * device.way[2] - device.way[3], 2 * device.way[1] - device.way[2], alpha);
+  return nextStep(device.swing, alpha, [&](int k) { return device.way[k + 1]; });
 }
 
 Vector3d meanOver(const BlendedSurface& surface, const ProxyContact& contact, const std::vector<Vector3d>& ofNodes) {
@@ -118,6 +125,16 @@ void seeStep(const Vector3d& change, DeviceMotion& device) {
   device.seen.wayChange += way.squaredNorm();
 }
 
+// `last`, m: the steps up to the surface's `to`, the newest first. What the device's ways make of them is no swing.
+void seeSwing(const std::array<Vector3d, 3>& last, DeviceMotion& device) {
+  constexpr double kLeast = 1e-12;  // m2, as above
+  const auto own = [&](int k) -> Vector3d { return last[k] - device.follows[0] * device.way[k + 1]; };
+  device.swung.ofLast += (own(0) + own(2)).dot(own(1));
+  device.swung.square += own(1).squaredNorm();
+  const double now = (device.swung.ofLast + 2 * kLeast) / (device.swung.square + kLeast);
+  device.swing = {std::clamp(now, -2.0, 2.0), device.swing[0]};
+}
+
 double followsNow(const DeviceMotion& device, double alpha) {
   return (1 - alpha) * device.follows[1] + alpha * device.follows[0];
 }
@@ -177,8 +194,11 @@ void learnFollowing(const BlendedSurface& surface, std::span<const ProxyContact>
 }
 
 void learnFollowing(const BlendedSurface& surface, const Grip& grip, DeviceMotion& device) {
-  seeStep(heldStep(surface, grip, 0) - heldStep(surface, grip, 1), device);
+  const std::array<Vector3d, 3> last{heldStep(surface, grip, 0), heldStep(surface, grip, 1),
+                                     heldStep(surface, grip, 2)};
+  seeStep(last[0] - last[1], device);
   device.follows = {partSeen(device), device.follows[0]};
+  seeSwing(last, device);
 }
 
 TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
@@ -226,7 +246,7 @@ TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip&
   const double part = followsNow(device, alpha);
   const Vector3d beyond = latestWay(device, alpha) - wayOfLead(device, alpha);
   const Vector3d faster = device.velocity - wayOfStep(device, alpha) / surface.duration;
-  const Vector3d lead = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeLead(h.node, alpha); });
+  const Vector3d lead = nextStep(device.swing, alpha, [&](int k) { return heldStep(surface, grip, k); });
   const Vector3d step = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeStep(h.node, alpha); });
   return {lead + part * beyond, step / surface.duration + part * faster, step, part};
 }

@@ -190,6 +190,29 @@ TEST(TissueMotion, HowFarHeldTissueFollowsIsSeenFromItsSteps) {
   EXPECT_NEAR(followedAfter(1.2, 0.5, 40), 1, 1e-12);    // nor beyond the device
 }
 
+// With four frames to its period twice the last step less the one before is 2.2 times as large, a quarter late.
+TEST(TissueMotion, WhatVibratesInAStillGripIsFeltWhereItIs) {
+  for (const double turn : {0.2, 0.7, 1.6, 2.8}) {
+    BlendedSurface surface;
+    surface.duration = 0.02;
+    for (auto& steps : surface.steps) steps.assign(1, Vector3d::Zero());
+    Grip grip;
+    grip.held = {{0, Vector3d::Zero()}};
+    DeviceMotion device;
+    beginHold(surface, 1, grip, 400, device);
+    const auto step = [&](int frame) {
+      return Vector3d(1e-4 * std::cos(turn * frame), 2e-4 * std::sin(turn * frame), 0);
+    };
+    for (int frame = 0; frame < 40; ++frame) {
+      startFrame(Vector3d::Zero(), surface.duration, device);
+      surface.steps = {{{step(frame)}, surface.steps[0], surface.steps[1]}};
+      learnFollowing(surface, grip, device);
+    }
+    EXPECT_LT((heldMotion(surface, 1, grip, device).lead - step(40)).norm(), 1e-7) << turn;
+    EXPECT_LT((heldMotion(surface, 0, grip, device).lead - step(39)).norm(), 1e-7) << turn;
+  }
+}
+
 // Tissue that swings on its own, and that a way of 0.1 mm more presses by so much of the tool's stiffness more.
 static double followedByForce(double series, double atOnce, int frames) {
   auto [surface, contact] = touchedTriangle(atOnce / (1 - atOnce) / 400);
