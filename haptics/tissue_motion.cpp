@@ -13,9 +13,13 @@ using Eigen::Vector3d;
 void startFrame(const Vector3d& lag, double duration, DeviceMotion& device) {
   constexpr double kMemory = 0.1;  // s; a half or two and a half times as long feels the same within a few per cent
   const double kept = std::exp(-duration / kMemory);
+  auto& swung = device.swung;
+  auto& bent = device.bent;
   for (double* sum : {&device.seen.stepChange, &device.seen.wayChange, &device.seen.forceLength, &device.seen.length,
-                      &device.swung.ofLast, &device.swung.square})
+                      &swung.frames, &swung.square, &swung.product, &bent.offSquare, &bent.roundSquare, &bent.product})
     *sum *= kept;
+  swung.last *= kept;
+  swung.both *= kept;
   device.way[0] -= lag;
   std::rotate(device.way.begin(), device.way.end() - 1, device.way.end());
   device.way[0] = lag;
@@ -43,10 +47,10 @@ Vector3d latestWay(const DeviceMotion& device, double alpha) {
   return device.way[0] + late * (device.way[1] - device.earlyBefore) + early * device.earlyBefore;
 }
 
-// m: the next step at alpha, of the last ones that swing so; `of(k)` the step k frames before the surface's last.
+// m: the next step at alpha, drift apart, of the last ones; `of(k)` is the step k frames before the surface's last.
 template <class Of>
-Vector3d nextStep(const std::array<double, 2>& swing, double alpha, const Of& of) {
-  return blendPoint(swing[1] * of(1) - of(2), swing[0] * of(0) - of(1), alpha);
+Vector3d nextStep(const std::array<DeviceMotion::Swing, 2>& swing, double alpha, const Of& of) {
+  return blendPoint(swing[1].turn * of(1) - of(2), swing[0].turn * of(0) - of(1), alpha);
 }
 
 // m: what BlendedSurface::nodeStep() and the steps of nextStep(), of the same frames in the same way, answer.
@@ -95,6 +99,9 @@ Vector3d meanOverShares(std::span<const ProxyContact> contacts, const Of& of) {
   return sum / shares;
 }
 
+// Of how much a step grows: by so much the mean place of what speeds up evenly lies off its chord's middle.
+constexpr double kBend = 1.0 / 12;
+
 Vector3d heldStep(const BlendedSurface& surface, const Grip& grip, int framesAgo) {
   return meanOverHeld(grip, [&](const HeldOffset& held) { return surface.steps[framesAgo][held.node]; });
 }
@@ -129,10 +136,17 @@ void seeStep(const Vector3d& change, DeviceMotion& device) {
 void seeSwing(const std::array<Vector3d, 3>& last, DeviceMotion& device) {
   constexpr double kLeast = 1e-12;  // m2, as above
   const auto own = [&](int k) -> Vector3d { return last[k] - device.follows[0] * device.way[k + 1]; };
-  device.swung.ofLast += (own(0) + own(2)).dot(own(1));
-  device.swung.square += own(1).squaredNorm();
-  const double now = (device.swung.ofLast + 2 * kLeast) / (device.swung.square + kLeast);
-  device.swing = {std::clamp(now, -2.0, 2.0), device.swing[0]};
+  const Vector3d both = own(0) + own(2);
+  auto& sums = device.swung;
+  sums.frames += 1;
+  sums.square += own(1).squaredNorm();
+  sums.product += own(1).dot(both);
+  sums.last += own(1);
+  sums.both += both;
+  const double square = std::max(0.0, sums.square - sums.last.squaredNorm() / sums.frames),
+               product = sums.product - sums.last.dot(sums.both) / sums.frames,
+               turn = std::clamp((product + 2 * kLeast) / (square + kLeast), -2.0, 2.0);
+  device.swing = {{{turn, (sums.both - turn * sums.last) / sums.frames}, device.swing[0]}};
 }
 
 double followsNow(const DeviceMotion& device, double alpha) {
@@ -201,6 +215,20 @@ void learnFollowing(const BlendedSurface& surface, const Grip& grip, DeviceMotio
   seeSwing(last, device);
 }
 
+void learnBending(const BlendedSurface& surface, const Grip& grip, const Vector3d& off, DeviceMotion& device) {
+  constexpr double kLeast = 1e-16;  // m2, of 10 nm
+  auto& sums = device.bent;
+  // Of the frame before: by now it is known how it went on.
+  const Vector3d round = -0.5 * kBend * (heldStep(surface, grip, 0) - heldStep(surface, grip, 2));
+  sums.offSquare += sums.off.squaredNorm();
+  sums.roundSquare += round.squaredNorm();
+  sums.product += sums.off.dot(round);
+  sums.off = off;
+  // As far as one explains the other: when the device starts or stops, what shakes for a frame is no bend.
+  const double explained = sums.product * sums.product / ((sums.roundSquare + kLeast) * (sums.offSquare + kLeast));
+  device.bends = std::clamp(explained * sums.product / (sums.roundSquare + kLeast), 0.0, 1.0);
+}
+
 TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
                            const Vector3d& normal, const DeviceMotion& device) {
   assert(!contacts.empty());
@@ -246,9 +274,11 @@ TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip&
   const double part = followsNow(device, alpha);
   const Vector3d beyond = latestWay(device, alpha) - wayOfLead(device, alpha);
   const Vector3d faster = device.velocity - wayOfStep(device, alpha) / surface.duration;
-  const Vector3d lead = nextStep(device.swing, alpha, [&](int k) { return heldStep(surface, grip, k); });
+  const Vector3d lead = blendPoint(device.swing[1].drift, device.swing[0].drift, alpha) +
+                        nextStep(device.swing, alpha, [&](int k) { return heldStep(surface, grip, k); });
   const Vector3d step = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeStep(h.node, alpha); });
-  return {lead + part * beyond, step / surface.duration + part * faster, step, part};
+  const Vector3d all = lead + part * beyond;
+  return {all - kBend * device.bends * (all - step), step / surface.duration + part * faster, step, part};
 }
 
 }  // namespace medulla

@@ -37,13 +37,27 @@ struct DeviceMotion {
   struct {
     double stepChange = 0, wayChange = 0, forceLength = 0, length = 0;
   } seen{};
-  // How what a grip holds swings by itself: of a vibration by an angle theta per frame, each step and the one before
-  // the last make 2 cos(theta) times the last; 2 of what speeds up evenly. Least squares of that, over fading frames:
-  // m2, the two sums; and what they said, up to the surface's `to` and `from`.
+  // How what a grip holds swings by itself: of a vibration by an angle theta per frame about an even motion, a step and
+  // the one before the last make 2 cos(theta) times the last, and a constant; 2 and none is what speeds up evenly. Sums
+  // over fading frames for least squares of that: their number, squares of the last (m2), its products with the two
+  // (m2), the last and the two (m); and what they say, up to the surface's `to` and `from`.
   struct {
-    double ofLast = 0, square = 0;
+    double frames = 0, square = 0, product = 0;
+    Eigen::Vector3d last = Eigen::Vector3d::Zero(), both = Eigen::Vector3d::Zero();
   } swung{};
-  std::array<double, 2> swing{2, 2};
+  struct Swing {
+    double turn = 2;                                  // 2 cos(theta)
+    Eigen::Vector3d drift = Eigen::Vector3d::Zero();  // m
+  };
+  std::array<Swing, 2> swing{};
+  // How far what a grip holds goes round between frames' ends: 1 as what speeds up evenly, 0 along the chord, as what
+  // follows at once the path that the dynamics was given. Sums likewise (m2), of how it lay off the chords, of how it
+  // would have with 1, and of both; and how it lay in the frame up to `to` (m).
+  struct {
+    double offSquare = 0, roundSquare = 0, product = 0;
+    Eigen::Vector3d off = Eigen::Vector3d::Zero();
+  } bent{};
+  double bends = 0;
 };
 
 // Tissue that moved by itself begins to follow the device: its steps so far count as answers to ways of a device.
@@ -66,6 +80,12 @@ void startFrame(const Eigen::Vector3d& lag, double duration, DeviceMotion& devic
 void learnFollowing(const BlendedSurface& surface, std::span<const ProxyContact> contacts,
                     const Eigen::Vector3d& normal, double stiffness, double forceChange, DeviceMotion& device);
 void learnFollowing(const BlendedSurface& surface, const Grip& grip, DeviceMotion& device);
+
+// `off`, m: by how much the mean place of what is held, in the frame up to the surface's `to`, lay off the chord's
+// middle. A frame's path that speeds up by a bends a T^2 / 12 off it. What is heavy for the tool goes round so while
+// the chord is all that the surface shows: it was felt as k T^2 / 12 of mass more, and shaken at 5 Hz gave the hand
+// energy.
+void learnBending(const BlendedSurface& surface, const Grip& grip, const Eigen::Vector3d& off, DeviceMotion& device);
 
 struct TissueMotion {
   Eigen::Vector3d lead = Eigen::Vector3d::Zero();      // m, by now ahead of the blended surface
