@@ -125,8 +125,10 @@ struct Renderer::Data {
         fineWidth(s.width * s.supersample),
         fineHeight(s.height * s.supersample),
         framebuffer(fineWidth, fineHeight),
+        tissue(shadowSideFor(s.height)),
         model(s.height),
         post(s.width, s.height),
+        shadow(shadowSideFor(s.height)),
         seen(fineHeight) {
     if (s.supersample > 1) finePost.emplace(fineWidth, fineHeight);
     tissue.addLook(findLook("steel"));

@@ -125,19 +125,19 @@ float litAt(vec2 q, float z) {
   return mix(rows.x, rows.y, w.y);
 }
 
-// Taps on three turned squares and in the middle, evenly spread over the disc: on a ring, the shadows of shafts as thick
+// Taps on turned squares and in the middle, evenly spread over the disc: on a ring, the shadows of shafts as thick
 // as it is wide have a dark line along their middle. A rotation per
-// pixel would hide their steps better but leaves a pattern. Most pixels agree on the two widest squares and are done (on
-// one, the shadows of thin tools fell to pieces): llvmpipe runs both sides of a branch but leaves a loop when all its
-// pixels do, so the squares are a loop whose length the compiler cannot know.
+// pixel would hide their steps better but leaves a pattern. Most pixels agree on the widest squares and are done (of
+// three, on two: on one, the shadows of thin tools fell to pieces): llvmpipe runs both sides of a branch but leaves a
+// loop when all its pixels do, so the squares are a loop whose length the compiler cannot know.
 float softShadow(vec3 p, float r) {
   vec2 q = p.xy * SHADOW_HEIGHT;
   float sum = litAt(q, p.z), taps = 1.;
   for (int k = 0; k < squares; ++k) {
-    vec2 d = r * (k == 0 ? vec2(.82, .22) : k == 1 ? vec2(.52, .34) : vec2(.31, .10));
+    vec2 d = r * (SQUARE);
     sum += litAt(q + d, p.z) + litAt(q - d, p.z) + litAt(q + vec2(-d.y, d.x), p.z) + litAt(q + vec2(d.y, -d.x), p.z);
     taps += 4.;
-    if (k > 0 && (sum == 0. || sum == taps)) break;
+    if (k >= WIDEST && (sum == 0. || sum == taps)) break;
   }
   return sum / taps;
 }

@@ -1,6 +1,7 @@
 #include "render/shadow_map.h"
 
 #include <algorithm>
+#include <cassert>
 
 namespace medulla {
 namespace {
@@ -9,9 +10,10 @@ constexpr float kBehind = -1e9f, kFarAway = 1e6f;
 // Of the near plane, which only says how depths are spread: a shaft beside the lens casts its shadow from before it.
 constexpr float kNearest = 0.1f;
 
-void projectVertices(const SceneMesh& mesh, const LightView& light, std::vector<glm::vec3>& texel) {
+void projectVertices(const SceneMesh& mesh, const LightView& light, ShadowMap& s) {
+  std::vector<glm::vec3>& texel = s.texel;
   texel.resize(mesh.position.size());
-  const float half = 0.5f * kShadowSide;
+  const float half = 0.5f * float(s.map.side);
   for (std::size_t i = 0; i < texel.size(); ++i) {
     const glm::vec4 clip = light.clipFromWorld * glm::vec4(mesh.position[i], 1);
     const float inverse = 1 / std::max(clip.w, 1e-6f);
@@ -23,9 +25,10 @@ void projectVertices(const SceneMesh& mesh, const LightView& light, std::vector<
 }
 
 void buildBlocks(ShadowMap& s) {
-  constexpr int b = ShadowMap::kBlockSide, blocks = ShadowMap::kBlocks;
-  s.nearest.resize(blocks * blocks);
-  s.farthest.resize(blocks * blocks);
+  constexpr int b = ShadowMap::kBlockSide;
+  const int blocks = s.blocks;
+  s.nearest.resize(std::size_t(blocks) * blocks);
+  s.farthest.resize(std::size_t(blocks) * blocks);
   for (int j = 0; j < blocks; ++j)
     for (int i = 0; i < blocks; ++i) {
       float low[b], high[b];
@@ -45,8 +48,18 @@ void buildBlocks(ShadowMap& s) {
 
 }  // namespace
 
+int shadowSideFor(int pictureHeight) {
+  constexpr int kLines = 720, b = ShadowMap::kBlockSide;
+  const int side = (kShadowSide * pictureHeight / kLines + b - 1) / b * b;
+  return std::clamp(side, kShadowSide, kShadowSideMost);
+}
+
+ShadowMap::ShadowMap(int side) : map(side), blocks(side / kBlockSide) {
+  assert(side % kBlockSide == 0);
+}
+
 void renderShadowMap(const SceneMesh& mesh, const LightView& light, ShadowMap& s) {
-  projectVertices(mesh, light, s.texel);
+  projectVertices(mesh, light, s);
   s.map.clear();
   for (const MeshPart& part : mesh.parts) {
     if (!part.look->castsShadow) continue;
@@ -59,16 +72,17 @@ void renderShadowMap(const SceneMesh& mesh, const LightView& light, ShadowMap& s
 }
 
 Shade shadeOfTriangle(const ShadowMap& s, glm::vec3 a, glm::vec3 b, glm::vec3 c) {
-  constexpr float kMargin = 6;  // texels: the widest reach of the soft edge's taps
-  constexpr int side = ShadowMap::kBlockSide, last = ShadowMap::kBlocks - 1;
+  const float margin = 6 * s.fineness();  // texels: the widest reach of the soft edge's taps
+  constexpr int side = ShadowMap::kBlockSide;
+  const int last = s.blocks - 1;
   const auto block = [&](float texel) { return std::clamp(int(std::clamp(texel, -1e6f, 1e6f)) / side, 0, last); };
-  const int x0 = block(std::min({a.x, b.x, c.x}) - kMargin), x1 = block(std::max({a.x, b.x, c.x}) + kMargin);
-  const int y0 = block(std::min({a.y, b.y, c.y}) - kMargin), y1 = block(std::max({a.y, b.y, c.y}) + kMargin);
+  const int x0 = block(std::min({a.x, b.x, c.x}) - margin), x1 = block(std::max({a.x, b.x, c.x}) + margin);
+  const int y0 = block(std::min({a.y, b.y, c.y}) - margin), y1 = block(std::max({a.y, b.y, c.y}) + margin);
   float low = 1, high = 0;
   for (int y = y0; y <= y1; ++y)
     for (int x = x0; x <= x1; ++x) {
-      low = std::min(low, s.nearest[y * ShadowMap::kBlocks + x]);
-      high = std::max(high, s.farthest[y * ShadowMap::kBlocks + x]);
+      low = std::min(low, s.nearest[y * s.blocks + x]);
+      high = std::max(high, s.farthest[y * s.blocks + x]);
     }
   const float zLow = std::min({a.z, b.z, c.z}), zHigh = std::max({a.z, b.z, c.z});
   return zHigh <= low + 0.0005f ? Shade::lit : zLow > high + 0.002f ? Shade::dark : Shade::edge;

@@ -16,14 +16,20 @@ struct LightView {
   glm::mat4 clipFromWorld{1};
 };
 
-constexpr int kShadowSide = 1024;
-constexpr int kShadowStride = kShadowSide + DepthMap::kPadding;  // not a power of two: rows would share cache sets
+// Texels along the map's side: kShadowSide up to a picture of 720 lines, then so many more that a texel covers as many
+// pixels, or the map's texels show as teeth along every edge.
+constexpr int kShadowSide = 1024, kShadowSideMost = 4096;
+int shadowSideFor(int pictureHeight);
 
 struct ShadowMap {
-  DepthMap map{kShadowSide};
+  explicit ShadowMap(int side = kShadowSide);                              // a multiple of kBlockSide
+  float fineness() const { return float(map.side) / float(kShadowSide); }  // texels per one of the coarsest map's
+
+  DepthMap map;                  // its stride is no power of two: rows would share cache sets
   std::vector<glm::vec3> texel;  // every vertex of the mesh: texels and depth; x = y = -1e9 when behind the light
   std::vector<float> nearest, farthest;  // of blocks of kBlockSide^2 texels: whole triangles are judged by them
-  static constexpr int kBlockSide = 8, kBlocks = kShadowSide / kBlockSide;
+  static constexpr int kBlockSide = 8;
+  int blocks;  // along the side
 };
 
 void renderShadowMap(const SceneMesh& mesh, const LightView& light, ShadowMap& shadow);

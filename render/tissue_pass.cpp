@@ -4,6 +4,8 @@
 #include <GL/gl.h>
 #include <GL/glext.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/type_ptr.hpp>
@@ -50,24 +52,47 @@ std::vector<unsigned> makeDetail(const Look& look, int seed) {
   return levels;
 }
 
-unsigned makeShadowTexture() {
+unsigned makeShadowTexture(int side) {
   const unsigned texture = makeTexture(GL_NEAREST);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_R32F, kShadowStride, kShadowSide, 0, GL_RED, GL_FLOAT, nullptr);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_R32F, side + DepthMap::kPadding, side, 0, GL_RED, GL_FLOAT, nullptr);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   return texture;
 }
 
+// A corner of each square of taps, widest first, for a soft edge of radius 1. In a finer map an edge is more texels
+// wide, and three squares would show as steps: more of them, each with the same share of the disc, turned on by the
+// golden section of a quarter.
+std::vector<glm::vec2> shadowSquares(int shadowSide) {
+  const int n = 3 * ((shadowSide + kShadowSide - 1) / kShadowSide);
+  if (n == 3) return {{.82f, .22f}, {.52f, .34f}, {.31f, .10f}};
+  std::vector<glm::vec2> squares;
+  for (int k = 0; k < n; ++k) {
+    const float angle = 0.618f * 0.5f * std::numbers::pi_v<float> * float(k);
+    squares.push_back(0.9f * std::sqrt((float(n - k) - 0.5f) / float(n)) * glm::vec2(std::cos(angle), std::sin(angle)));
+  }
+  return squares;
+}
+
+// Of the map's size, and the squares as a choice by k.
+std::string shadowDefines(int shadowSide) {
+  const std::vector<glm::vec2> squares = shadowSquares(shadowSide);
+  std::string square;
+  for (std::size_t k = 0; k < squares.size(); ++k)
+    square += fmt::format("{}vec2({:.4f}, {:.4f})", k ? fmt::format(" : k == {} ? ", k) : "k == 0 ? ", squares[k].x,
+                          squares[k].y);
+  return fmt::format("#define SHADOW_WIDTH {}.\n#define SHADOW_HEIGHT {}.\n#define WIDEST {}\n#define SQUARE {}\n",
+                     shadowSide + DepthMap::kPadding, shadowSide, squares.size() / 3, square + " : vec2(0)");
+}
+
 }  // namespace
 
-TissuePass::Program TissuePass::makeProgram(Variant v) {
+TissuePass::Program TissuePass::makeProgram(Variant v, int shadowSide) {
   const bool dull = v == Variant::litDull || v == Variant::edgeDull;
   const int shade = v == Variant::dark ? 2 : v == Variant::edge || v == Variant::edgeDull ? 1 : 0;
   Program p;
   p.id = buildProgram("#define SHADE " + std::to_string(shade) + "\n" + (dull ? "#define DULL\n" : "") +
-                          "#define FILM_PEAK " + std::to_string(kFilmPeak) + "\n#define SHADOW_WIDTH " +
-                          std::to_string(kShadowStride) + ".\n#define SHADOW_HEIGHT " + std::to_string(kShadowSide) +
-                          ".\n",
+                          "#define FILM_PEAK " + std::to_string(kFilmPeak) + "\n" + shadowDefines(shadowSide),
                       kTissueVertexShader, kTissueFragmentShader);
   const auto uniform = [&p](const char* name) { return glGetUniformLocation(p.id, name); };
   p.clipFromWorld = uniform("clipFromWorld");
@@ -79,14 +104,14 @@ TissuePass::Program TissuePass::makeProgram(Variant v) {
   glUseProgram(p.id);
   glUniform1i(uniform("detail"), 0);
   glUniform1i(uniform("shadowMap"), 1);
-  glUniform1i(uniform("squares"), 3);
+  glUniform1i(uniform("squares"), int(shadowSquares(shadowSide).size()));
   return p;
 }
 
-TissuePass::TissuePass() {
-  for (int v = 0; v < kVariants; ++v) programs_[v] = makeProgram(static_cast<Variant>(v));
+TissuePass::TissuePass(int shadowSide) {
+  for (int v = 0; v < kVariants; ++v) programs_[v] = makeProgram(static_cast<Variant>(v), shadowSide);
   maskProgram_ = buildProgram("", kMaskVertexShader, kMaskFragmentShader);
-  shadowTexture_ = makeShadowTexture();
+  shadowTexture_ = makeShadowTexture(shadowSide);
 
   glGenVertexArrays(1, &vertexArray_);
   glGenBuffers(1, &vertices_);
@@ -148,7 +173,8 @@ void TissuePass::upload(const VertexLight& lit, const DrawLists& lists, const Sh
   if (!shadow) return;
   glActiveTexture(GL_TEXTURE1);
   glBindTexture(GL_TEXTURE_2D, shadowTexture_);
-  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, kShadowStride, kShadowSide, GL_RED, GL_FLOAT, shadow->map.depth.data());
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, shadow->map.stride, shadow->map.side, GL_RED, GL_FLOAT,
+                  shadow->map.depth.data());
   glActiveTexture(GL_TEXTURE0);
 }
 

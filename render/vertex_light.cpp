@@ -160,6 +160,8 @@ Shade shadeVertex(const ShadowMap& shadow, vec3 texel, float spacing, const Shad
   const float slope = std::min(std::sqrt(std::max(1 - cosine * cosine, 0.f)) / std::max(cosine, 0.12f), 4.f);
   const float range = light.farDistance * light.nearDistance / (light.farDistance - light.nearDistance);
   const float depthPerMetre = range / (v.lightDistance * v.lightDistance);
+  // How far to look and how wide an edge may be is told in texels of the coarsest map: in a finer one they are several.
+  const float fine = shadow.fineness();
   const float metresPerTexel = 2 * v.lightDistance * light.tangent / kShadowSide;
   // As far as a soft edge reaches beyond the middle between this vertex and the next ones, m apart. Seen from near they
   // stand far apart: wider rings then look between them.
@@ -169,8 +171,8 @@ Shade shadeVertex(const ShadowMap& shadow, vec3 texel, float spacing, const Shad
   float blockers = 0, blockerDepth = 0;
   const auto look = [&](float ring) {
     for (const Tap& tap : kTaps) {
-      const int x = int(texel.x + ring * tap.x), y = int(texel.y + ring * tap.y);
-      if (x < 0 || y < 0 || x >= kShadowSide || y >= kShadowSide) continue;
+      const int x = int(texel.x + fine * ring * tap.x), y = int(texel.y + fine * ring * tap.y);
+      if (x < 0 || y < 0 || x >= shadow.map.side || y >= shadow.map.side) continue;
       ++tried;
       const float bias = kMinimumBias + depthPerMetre * (0.5f + ring * tap.away) * metresPerTexel * (slope + kBend);
       const float depth = shadow.map.at(x, y);
@@ -191,9 +193,9 @@ Shade shadeVertex(const ShadowMap& shadow, vec3 texel, float spacing, const Shad
   out.shadowRadius = 2;
   if (blockers > 0) {
     const float gap = (texel.z - blockerDepth / blockers) / depthPerMetre;
-    out.shadowRadius = std::min(1.2f + 0.03f * std::max(gap, 0.f) / metresPerTexel, 7.f);
+    out.shadowRadius = std::min(1.2f + 0.03f * std::max(gap, 0.f) * fine / metresPerTexel, 7 * fine);
   }
-  out.shadowBias = 0.0007f + 1.8f * depthPerMetre * metresPerTexel * (out.shadowRadius + 0.7f) * slope;
+  out.shadowBias = 0.0007f + 1.8f * depthPerMetre * metresPerTexel / fine * (out.shadowRadius + 0.7f) * slope;
   if (cosine < kHorizon) return Shade::dark;
   return lit == tried ? Shade::lit : lit == 0 ? Shade::dark : Shade::edge;
 }
