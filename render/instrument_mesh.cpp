@@ -18,9 +18,22 @@ constexpr float kJawHalfWidth = 0.0021f, kJawHeight = 0.0021f;
 // Height above the bite's plane: of ridges and valleys, and of the rim that the outer side ends at. The rim lies above
 // the valleys, or the flank between them folds over and leaves holes.
 constexpr float kRidge = 0.00008f, kValley = 0.00055f, kJawRim = 0.0006f;
-constexpr int kAround = 18, kTeeth = 13;
+constexpr int kTeeth = 13;
 constexpr float kTau = 2 * std::numbers::pi_v<float>;
 constexpr vec3 kSteel(0.50f, 0.50f, 0.52f), kSheath(0.020f, 0.020f, 0.022f);
+
+// How finely round things are cut. A circle of n sides strays from the round one by pi^2 / 2n^2 of its radius: for the
+// same share of a pixel n grows with the root of the picture's height. Up to 720 lines it is as it was made for them.
+struct Cuts {
+  int around = 18, arc = 10;  // of the shaft; of a jaw's back
+  int perTooth = 1;           // along half a tooth
+};
+Cuts cutsFor(int pictureHeight) {
+  const Cuts coarse;
+  const float finer = std::sqrt(std::max(float(pictureHeight) / 720, 1.f));
+  const auto times = [finer](int cuts) { return int(std::lround(finer * float(cuts))); };
+  return {times(coarse.around), times(coarse.arc), times(coarse.perTooth)};
+}
 
 // Geometry in the tool frame, moved to the world as it is appended.
 class Builder {
@@ -72,25 +85,25 @@ struct Ring {
 // Surface of revolution about z; the normals follow the profile smoothly, so that a crease needs two close rings. Its
 // sides are laid out from `facing` on, rad from +x, where the eye is: turning with the tool, their vertices would pass
 // the lamp's streak one by one, and it would pulse.
-void lathe(Builder& b, const std::vector<Ring>& profile, vec3 albedo, float facing) {
+void lathe(Builder& b, const std::vector<Ring>& profile, vec3 albedo, float facing, int around) {
   std::uint32_t previous = 0;
   for (std::size_t k = 0; k < profile.size(); ++k) {
     const Ring &before = profile[k ? k - 1 : 0], &after = profile[k + 1 < profile.size() ? k + 1 : k];
     const float dz = after.z - before.z, dr = after.radius - before.radius;
     std::uint32_t first = 0;
-    for (int s = 0; s <= kAround; ++s) {
-      const float a = facing + kTau * float(s) / kAround, x = std::cos(a), y = std::sin(a);
+    for (int s = 0; s <= around; ++s) {
+      const float a = facing + kTau * float(s) / float(around), x = std::cos(a), y = std::sin(a);
       const std::uint32_t i =
           b.vertex({profile[k].radius * x, profile[k].radius * y, profile[k].z}, {dz * x, dz * y, -dr}, albedo);
       if (s == 0) first = i;
     }
-    for (std::uint32_t s = 0; k > 0 && s < kAround; ++s)
+    for (std::uint32_t s = 0; k > 0 && s < std::uint32_t(around); ++s)
       b.quad(previous + s, previous + s + 1, first + s + 1, first + s);
     previous = first;
   }
 }
 
-void addShaft(Builder& b, float facing) {
+void addShaft(Builder& b, float facing, int around) {
   const float r = kShaftRadius;
   // Clevis that holds the hinge, and the collar.
   lathe(b,
@@ -102,7 +115,7 @@ void addShaft(Builder& b, float facing) {
          {kHinge + 0.0048f, 0.0024f},
          {kShaftStart, 0.0025f},
          {kShaftStart + 0.0004f, 0.0025f}},
-        kSteel, facing);
+        kSteel, facing, around);
   // Light is computed per vertex and interpolated without perspective: rings stay close.
   std::vector<Ring> sheath = {{kShaftStart, 0.0023f}, {kShaftStart + 0.0001f, r - 0.0001f}, {kShaftStart + 0.0004f, r}};
   constexpr float kSpacing = 0.006f;
@@ -112,7 +125,7 @@ void addShaft(Builder& b, float facing) {
   const float end = sheath.back().z;
   for (const Ring& ring : {Ring{0.0002f, r - 0.00006f}, {0.00034f, r - 0.0002f}, {0.0004f, r - 0.0004f}, {0.0004f, 0}})
     sheath.push_back({end + ring.z, ring.radius});
-  lathe(b, sheath, kSheath, facing);
+  lathe(b, sheath, kSheath, facing, around);
 }
 
 // Half width and height of a jaw along its length, t = 0 at the hinge, 1 at the tip.
@@ -136,25 +149,26 @@ vec3 placeOnJaw(vec3 p, float side, float angle) {
 }
 
 // The outer side.
-void addJaw(Builder& b, float side, float angle) {
+void addJaw(Builder& b, float side, float angle, const Cuts& cuts) {
   const float c = std::cos(angle), s = std::sin(angle) * side;
   const auto place = [&](float x, float y, float z) { return placeOnJaw({x, y, z}, side, angle); };
   const auto turned = [&](vec3 n) { return vec3(n.x, c * n.y * side - s * n.z, s * n.y * side + c * n.z); };
-  constexpr int kSlices = 2 * kTeeth, kArc = 10;
+  const int slices = 2 * kTeeth * cuts.perTooth;
   std::uint32_t previous = 0;
-  for (int k = 0; k <= kSlices; ++k) {
-    const float t = float(k) / kSlices;
+  for (int k = 0; k <= slices; ++k) {
+    const float t = float(k) / float(slices);
     const JawSection j = jawSection(t);
     std::uint32_t first = 0;
-    for (int a = 0; a <= kArc; ++a) {  // outer side: a flattened half ellipse from +x over the back to -x
-      const float phi = 0.5f * kTau * float(a) / kArc, x = std::cos(phi), y = std::pow(std::sin(phi) + 1e-6f, 0.8f);
+    for (int a = 0; a <= cuts.arc; ++a) {  // outer side: a flattened half ellipse from +x over the back to -x
+      const float phi = 0.5f * kTau * float(a) / float(cuts.arc), x = std::cos(phi),
+                  y = std::pow(std::sin(phi) + 1e-6f, 0.8f);
       const float lean = t > 0.85f ? -0.9f * (t - 0.85f) / 0.15f : -0.05f;
       const std::uint32_t i =
           b.vertex(place(j.halfWidth * x, kJawRim + std::max(j.height - kJawRim / 2, 0.0001f) * y, j.z),
                    turned({x / j.halfWidth, std::sin(phi) / j.height, lean / j.height}), kSteel);
       if (a == 0) first = i;
     }
-    for (std::uint32_t a = 0; k > 0 && a < kArc; ++a)
+    for (std::uint32_t a = 0; k > 0 && a < std::uint32_t(cuts.arc); ++a)
       if (side > 0)
         b.quad(previous + a, first + a, first + a + 1, previous + a + 1);
       else
@@ -165,20 +179,26 @@ void addJaw(Builder& b, float side, float angle) {
 
 // The inner side: transverse ridges, flat faces; smooth near the hinge and at the very tip. teeth: 0..1, how far they
 // stand out.
-void addBite(Builder& b, float side, float angle, float teeth) {
+void addBite(Builder& b, float side, float angle, float teeth, int perTooth) {
   const float valleys = glm::mix(kRidge, kValley, teeth);
   const auto place = [&](float x, float y, float z) { return placeOnJaw({x, y, z}, side, angle); };
-  for (int k = 0; k < 2 * kTeeth; ++k) {
-    const float t0 = float(k) / (2 * kTeeth), t1 = float(k + 1) / (2 * kTeeth);
-    const auto depth = [valleys](float t, bool valley) { return valley && t > 0.2f && t < 0.97f ? valleys : kRidge; };
+  const auto profile = [valleys, teeth](int halfTooth) {
+    const float t = float(halfTooth) / (2 * kTeeth);
+    const float y = halfTooth % 2 == 0 && t > 0.2f && t < 0.97f ? valleys : kRidge;
+    return glm::vec2(y, (y < valleys ? 0.9f : glm::mix(0.9f, 0.3f, teeth)) * (0.4f + 0.6f * t));
+  };
+  // Height above the bite's plane and openness, straight from ridge to valley.
+  const auto cut = [&](int k) {
+    return glm::mix(profile(k / perTooth), profile(k / perTooth + 1), float(k % perTooth) / float(perTooth));
+  };
+  const int cuts = 2 * kTeeth * perTooth;
+  for (int k = 0; k < cuts; ++k) {
+    const float t0 = float(k) / float(cuts), t1 = float(k + 1) / float(cuts);
     const JawSection j0 = jawSection(t0), j1 = jawSection(t1);
-    const float y0 = depth(t0, k % 2 == 0), y1 = depth(t1, k % 2 == 1);
-    const vec3 p0 = place(-j0.halfWidth, y0, j0.z), p1 = place(j0.halfWidth, y0, j0.z),
-               q0 = place(-j1.halfWidth, y1, j1.z), q1 = place(j1.halfWidth, y1, j1.z);
-    const auto openness = [valleys, teeth](float t, float y) {
-      return (y < valleys ? 0.9f : glm::mix(0.9f, 0.3f, teeth)) * (0.4f + 0.6f * t);
-    };
-    const std::array<float, 2> open{openness(t0, y0), openness(t1, y1)};
+    const glm::vec2 c0 = cut(k), c1 = cut(k + 1);
+    const vec3 p0 = place(-j0.halfWidth, c0.x, j0.z), p1 = place(j0.halfWidth, c0.x, j0.z),
+               q0 = place(-j1.halfWidth, c1.x, j1.z), q1 = place(j1.halfWidth, c1.x, j1.z);
+    const std::array<float, 2> open{c0.y, c1.y};
     if (side > 0)
       b.face({p0, q0, q1, p1}, 0.5f * kSteel, {open[0], open[1], open[1], open[0]});
     else
@@ -204,14 +224,14 @@ void appendInstrument(const Instrument& instrument, const Viewpoint& view, int p
   part.firstVertex = std::uint32_t(mesh.position.size());
   part.firstIndex = std::uint32_t(mesh.index.size());
   Builder builder(instrument, mesh);
-  addJaw(builder, 1, instrument.jawAngle);
-  addJaw(builder, -1, instrument.jawAngle);
+  const Cuts cuts = cutsFor(pictureHeight);
+  for (const float side : {1.f, -1.f}) addJaw(builder, side, instrument.jawAngle, cuts);
   const vec3 toEye = glm::inverse(instrument.worldFromTool) * (view.position - instrument.tip);
-  addShaft(builder, std::atan2(toEye.y, toEye.x));
+  addShaft(builder, std::atan2(toEye.y, toEye.x), cuts.around);
   // Teeth of a few pixels would be specks that flicker.
   const float metresPerPixel = 2 * std::max(glm::length(toEye), 1e-3f) * view.tangent / float(pictureHeight);
   const float teeth = smoothStep(4, 9, instrument.scale * kHinge / kTeeth / metresPerPixel);
-  for (const float side : {1.f, -1.f}) addBite(builder, side, instrument.jawAngle, teeth);
+  for (const float side : {1.f, -1.f}) addBite(builder, side, instrument.jawAngle, teeth, cuts.perTooth);
   part.vertexCount = std::uint32_t(mesh.position.size()) - part.firstVertex;
   part.indexCount = std::uint32_t(mesh.index.size()) - part.firstIndex;
   mesh.parts.push_back(part);
