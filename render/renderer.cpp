@@ -18,6 +18,7 @@
 #include "render/model_view.h"
 #include "render/post_process.h"
 #include "render/surface_bake.h"
+#include "render/tessellation.h"
 #include "render/tissue_pass.h"
 #include "render/touch.h"
 
@@ -109,8 +110,9 @@ struct Renderer::Data {
   std::deque<bool> begun;  // of pictures not yet taken, the oldest first: whether they are round
   Image held;              // the older of two, read back
 
-  SceneMesh mesh;  // surfaces at their place in this picture, then instruments
-  SceneMesh rest;  // surfaces at rest, baked
+  SceneMesh mesh;   // surfaces at their place in this picture, then instruments
+  SceneMesh rest;   // surfaces at rest, baked
+  SceneMesh finer;  // `mesh` for a larger picture than it was made for
   bool baked = true;
   std::optional<HazeField> haze;
   LightView lightView;
@@ -140,6 +142,8 @@ struct Renderer::Data {
   }
   ~Data() { context->makeCurrent(); }
 
+  bool tessellates() const { return fineHeight > kLinesOfMeshes; }
+  const SceneMesh& drawn() const { return tessellates() ? finer : mesh; }
   const ShadowMap* shadowIfOn() const { return settings.shadows ? &shadow : nullptr; }
 
   void bake();
@@ -201,11 +205,13 @@ void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view)
   // The model view has a backdrop of its own.
   haze.reset();
   if (picture.light.haze && picture.view != ViewKind::model) haze.emplace(picture.light, picture.camera, picture.time);
-  lightView = makeLightView(picture.light, view, picture.camera, mesh);
-  if (settings.shadows) renderShadowMap(mesh, lightView, shadow);
-  findVisibleTriangles(mesh, view, picture.view == ViewKind::tissue, seen);
-  lightVertices(mesh, seen, view, picture.light, lightView, haze ? &*haze : nullptr, picture.time, shadowIfOn(), lit);
-  sortByVariant(mesh, seen, lit, shadowIfOn(), fineHeight, lists);
+  if (tessellates()) tessellate(mesh, view, settings.height, finer);
+  lightView = makeLightView(picture.light, view, picture.camera, drawn());
+  if (settings.shadows) renderShadowMap(drawn(), lightView, shadow);
+  findVisibleTriangles(drawn(), view, picture.view == ViewKind::tissue, seen);
+  lightVertices(drawn(), seen, view, picture.light, lightView, haze ? &*haze : nullptr, picture.time, shadowIfOn(),
+                lit);
+  sortByVariant(drawn(), seen, lit, shadowIfOn(), fineHeight, lists);
 }
 
 void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
@@ -229,10 +235,10 @@ void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
     opaque[p] = part.instrument || (picture.view != ViewKind::model && !skin);
     seenThrough[p] = skin;
   }
-  tissue.draw(mesh, lists, opaque, view, lightView, 1);
+  tissue.draw(drawn(), lists, opaque, view, lightView, 1);
   if (haze) background.draw(view, *haze);
   model.draw(view, picture.model, picture.view == ViewKind::model ? ModelPlace::backdrop : ModelPlace::scene);
-  if (picture.view == ViewKind::both) tissue.draw(mesh, lists, seenThrough, view, lightView, kSeenThroughOpacity);
+  if (picture.view == ViewKind::both) tissue.draw(drawn(), lists, seenThrough, view, lightView, kSeenThroughOpacity);
   model.drawFaint(view);
   if (!picture.overlay.empty()) glClear(GL_DEPTH_BUFFER_BIT);
   model.draw(view, picture.overlay, ModelPlace::overlay);

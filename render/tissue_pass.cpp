@@ -64,7 +64,7 @@ unsigned makeShadowTexture(int side) {
 // wide, and three squares would show as steps: more of them, each with the same share of the disc, turned on by the
 // golden section of a quarter.
 std::vector<glm::vec2> shadowSquares(int shadowSide) {
-  const int n = 3 * ((shadowSide + kShadowSide - 1) / kShadowSide);
+  const int n = (3 * shadowSide + kShadowSide / 2) / kShadowSide;
   if (n == 3) return {{.82f, .22f}, {.52f, .34f}, {.31f, .10f}};
   std::vector<glm::vec2> squares;
   for (int k = 0; k < n; ++k) {

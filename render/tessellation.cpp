@@ -1,0 +1,161 @@
+#include "render/tessellation.h"
+
+#include <algorithm>
+#include <array>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+namespace medulla {
+namespace {
+
+using glm::vec3;
+
+constexpr std::uint32_t kWhole = ~0u;  // of an edge: no midpoint
+constexpr int kMostHalvings = 16;
+
+// The mesh as it grows, and where its vertices are in the picture.
+struct Work {
+  const Viewpoint& view;
+  float height;  // px
+  SceneMesh& mesh;
+  std::vector<vec3> picture;                                   // pictureFromWorld
+  std::unordered_map<std::uint64_t, std::uint32_t> midpoints;  // of halved edges, by their ends, the smaller first
+};
+
+void appendVertices(const SceneMesh& from, const MeshPart& part, SceneMesh& to) {
+  const auto first = std::ptrdiff_t(part.firstVertex), last = first + std::ptrdiff_t(part.vertexCount);
+  const auto append = [&](auto array) {
+    (to.*array).insert((to.*array).end(), (from.*array).begin() + first, (from.*array).begin() + last);
+  };
+  for (const auto array : {&SceneMesh::position, &SceneMesh::normal, &SceneMesh::tangent, &SceneMesh::albedo})
+    append(array);
+  append(&SceneMesh::uv);
+  for (const auto array : {&SceneMesh::detail, &SceneMesh::openness, &SceneMesh::thinness, &SceneMesh::area,
+                           &SceneMesh::hollow, &SceneMesh::blanch})
+    append(array);
+}
+
+// From the middle of the edge to the surface. On a sphere of radius R the normals at the ends of a chord c have the
+// component c / 2R along it; with the sum of both, c/4 times that, halved, is the chord's height c^2 / 8R. (Phong
+// tessellation, Boubekeur and Alexa 2008, whose factor 3/4 would swell a sphere: 1/2 leaves it one.)
+vec3 bulge(const SceneMesh& mesh, std::uint32_t a, std::uint32_t b) {
+  const vec3 half = 0.5f * (mesh.position[b] - mesh.position[a]);
+  return 0.25f * (glm::dot(half, mesh.normal[b]) * mesh.normal[b] - glm::dot(half, mesh.normal[a]) * mesh.normal[a]);
+}
+
+std::uint32_t appendMidpoint(Work& work, std::uint32_t a, std::uint32_t b) {
+  SceneMesh& mesh = work.mesh;
+  const auto i = std::uint32_t(mesh.position.size());
+  const vec3 offset = bulge(mesh, a, b);
+  const auto mean = [&mesh, a, b](auto array) {
+    (mesh.*array).push_back(0.5f * ((mesh.*array)[a] + (mesh.*array)[b]));
+  };
+  for (const auto array : {&SceneMesh::position, &SceneMesh::normal, &SceneMesh::tangent, &SceneMesh::albedo})
+    mean(array);
+  mean(&SceneMesh::uv);
+  for (const auto array : {&SceneMesh::detail, &SceneMesh::openness, &SceneMesh::thinness, &SceneMesh::area,
+                           &SceneMesh::hollow, &SceneMesh::blanch})
+    mean(array);
+  mesh.position[i] += offset;
+  vec3 &n = mesh.normal[i], &t = mesh.tangent[i];
+  n = glm::normalize(glm::length(n) > 0.1f ? n : mesh.normal[a]);
+  const vec3 along = t - n * glm::dot(n, t);
+  t = glm::normalize(glm::length(along) > 0.1f ? along : mesh.tangent[a] - n * glm::dot(n, mesh.tangent[a]));
+  work.picture.push_back(pictureFromWorld(work.view, mesh.position[i]));
+  return i;
+}
+
+// Would the picture show that the edge is straight? Where its middle lies beside the surface by kOff, or light is
+// interpolated over kFarthest.
+bool isShown(const Work& work, std::uint32_t a, std::uint32_t b) {
+  constexpr float kOff = 0.2f, kFarthest = 80;  // px
+  const Viewpoint& v = work.view;
+  const vec3 p = work.picture[a], q = work.picture[b];
+  if (std::max(p.z, q.z) < v.nearPlane) return false;
+  const float halfWidth = 0.5f * v.aspect;
+  if (std::max(p.x, q.x) < -halfWidth || std::min(p.x, q.x) > halfWidth) return false;
+  if (std::max(p.y, q.y) < -0.5f || std::min(p.y, q.y) > 0.5f) return false;
+  const vec3 d = (q - p) * work.height;
+  if (d.x * d.x + d.y * d.y > kFarthest * kFarthest) return true;
+  const vec3 off = bulge(work.mesh, a, b);
+  const float scale = work.height / std::max(std::min(p.z, q.z), v.nearPlane);  // px per m, but for the lens
+  if (glm::dot(off, off) * scale * scale * (0.5f / v.tangent + 1) * (0.5f / v.tangent + 1) < kOff * kOff) return false;
+  const vec3 middle = 0.5f * (work.mesh.position[a] + work.mesh.position[b]);
+  const glm::vec2 moved = pictureFromWorld(v, middle + off) - pictureFromWorld(v, middle);
+  return glm::length(moved) * work.height > kOff;
+}
+
+std::uint32_t midpointOf(Work& work, std::uint32_t a, std::uint32_t b) {
+  if (a > b) std::swap(a, b);
+  if (!isShown(work, a, b)) return kWhole;
+  const auto [at, isNew] = work.midpoints.try_emplace(std::uint64_t(a) << 32 | b, 0);
+  if (isNew) at->second = appendMidpoint(work, a, b);
+  return at->second;
+}
+
+// The triangle cut at those of its edges' midpoints m (of ab, bc, ca) that there are.
+void cutTriangle(std::array<std::uint32_t, 3> t, std::array<std::uint32_t, 3> m, std::vector<std::uint32_t>& out) {
+  const auto add = [&out](std::uint32_t a, std::uint32_t b, std::uint32_t c) { out.insert(out.end(), {a, b, c}); };
+  const auto halved = 3 - std::count(m.begin(), m.end(), kWhole);
+  // Turned until one midpoint is m[0], of two m[0] and m[1].
+  while ((halved == 1 && m[0] == kWhole) || (halved == 2 && m[2] != kWhole)) {
+    std::rotate(t.begin(), t.begin() + 1, t.end());
+    std::rotate(m.begin(), m.begin() + 1, m.end());
+  }
+  if (halved == 0) return add(t[0], t[1], t[2]);
+  if (halved == 1) {
+    add(t[0], m[0], t[2]);
+    return add(m[0], t[1], t[2]);
+  }
+  add(m[0], t[1], m[1]);
+  if (halved == 2) {
+    add(t[0], m[0], m[1]);
+    return add(t[0], m[1], t[2]);
+  }
+  add(t[0], m[0], m[2]);
+  add(m[2], m[1], t[2]);
+  add(m[0], m[1], m[2]);
+}
+
+// Triangles of which no edge is shown go to `whole`, the others' pieces take their place in `index`. What is left whole
+// stays so: its edges do not change.
+void halveEdges(Work& work, std::vector<std::uint32_t>& index, std::vector<std::uint32_t>& whole) {
+  std::vector<std::uint32_t> pieces;
+  for (std::size_t k = 0; k < index.size(); k += 3) {
+    const std::array<std::uint32_t, 3> t{index[k], index[k + 1], index[k + 2]};
+    const std::array<std::uint32_t, 3> m{midpointOf(work, t[0], t[1]), midpointOf(work, t[1], t[2]),
+                                         midpointOf(work, t[2], t[0])};
+    const bool isWhole = m[0] == kWhole && m[1] == kWhole && m[2] == kWhole;
+    cutTriangle(t, m, isWhole ? whole : pieces);
+  }
+  index.swap(pieces);
+}
+
+}  // namespace
+
+void tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight, SceneMesh& out) {
+  out.resizeVertices(0);
+  out.index.clear();
+  out.parts.clear();
+  Work work{view, float(pictureHeight), out, {}, {}};
+  std::vector<std::uint32_t> index;
+  for (MeshPart part : mesh.parts) {
+    const auto first = std::uint32_t(out.position.size()), firstIndex = std::uint32_t(out.index.size());
+    index.clear();
+    for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; ++k)
+      index.push_back(mesh.index[k] - part.firstVertex + first);
+    appendVertices(mesh, part, out);
+    for (std::size_t i = first; i < out.position.size(); ++i)
+      work.picture.push_back(pictureFromWorld(view, out.position[i]));
+    for (int k = 0; k < kMostHalvings && !part.instrument && !index.empty(); ++k) halveEdges(work, index, out.index);
+    out.index.insert(out.index.end(), index.begin(), index.end());
+    part.firstVertex = first;
+    part.vertexCount = std::uint32_t(out.position.size()) - first;
+    part.firstIndex = firstIndex;
+    part.indexCount = std::uint32_t(out.index.size()) - firstIndex;
+    out.parts.push_back(part);
+  }
+}
+
+}  // namespace medulla

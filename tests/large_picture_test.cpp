@@ -1,0 +1,89 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "render/renderer.h"
+#include "render/shadow_map.h"
+
+namespace medulla {
+namespace {
+
+using glm::vec3;
+
+// Parallelogram of `cells`^2 quads at height z, facing +z: halfSide to either side of x, which grows by slant y.
+SurfaceShape sheet(float halfSide, std::uint32_t cells, float x, float slant, float z) {
+  SurfaceShape s;
+  s.look = "matte";
+  for (std::uint32_t j = 0; j <= cells; ++j)
+    for (std::uint32_t i = 0; i <= cells; ++i) {
+      const float y = halfSide * (2 * float(j) / float(cells) - 1);
+      s.restPositions.push_back({x + slant * y + halfSide * (2 * float(i) / float(cells) - 1), y, z});
+    }
+  const std::uint32_t n = cells + 1;
+  for (std::uint32_t j = 0; j < cells; ++j)
+    for (std::uint32_t i = 0; i < cells; ++i) {
+      const std::uint32_t a = j * n + i;
+      s.triangles.push_back({a, a + 1, a + n + 1});
+      s.triangles.push_back({a, a + n + 1, a + n});
+    }
+  return s;
+}
+
+// px: where row y, bright at x = 0, first falls to the mean of that and of x = `dark`.
+double crossing(const Image& image, int y, int dark) {
+  const auto at = [&](int x) { return double(image.pixels[4ul * (std::size_t(y) * image.width + x)]); };
+  const double middle = 0.5 * (at(0) + at(dark));
+  int x = 1;
+  while (x < dark && at(x) > middle) ++x;
+  return x - (middle - at(x)) / (at(x - 1) - at(x));
+}
+
+// px: by how much the points (k, x[k]) stray from the line through them, root of the mean square.
+double strayFromLine(const std::vector<double>& x) {
+  const auto n = double(x.size());
+  double sum = 0, sumK = 0, stray = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    sum += x[k] / n;
+    sumK += x[k] * (double(k) - 0.5 * (n - 1));
+  }
+  const double slope = 12 * sumK / (n * (n * n - 1));
+  for (std::size_t k = 0; k < x.size(); ++k) stray += std::pow(x[k] - sum - slope * (double(k) - 0.5 * (n - 1)), 2) / n;
+  return std::sqrt(stray);
+}
+
+// A narrow strip of a high picture, along the edge of the shadow that a sheet throws beside itself.
+TEST(LargePicture, StraightEdgeOfAShadowIsStraight) {
+  RendererSettings settings;
+  settings.width = 160;
+  settings.height = 2160;
+  settings.antialias = false;
+  Renderer renderer(settings);
+  renderer.addSurface(sheet(0.2f, 80, 0, 0, 0));
+  renderer.addSurface(sheet(0.15f, 60, 0.15f, 0.01f, 0.01f));
+  Picture p;
+  p.camera.position = {0, 0, 0.25f};
+  p.camera.fovDegrees = 40;
+  p.light.offset = {0.1f, 0, 0};
+  p.endoscopeMask = false;
+  Image image;
+  renderer.render(p, image);
+  // The lamp's ray past the sheet's edge ends 4.2 mm, 50 pixels, left of the middle.
+  std::vector<double> edge;
+  for (int y = 200; y < 1960; ++y) edge.push_back(crossing(image, y, 60));
+  EXPECT_NEAR(edge[edge.size() / 2], 30, 5);
+  EXPECT_LT(strayFromLine(edge), 0.4);
+}
+
+TEST(ShadowMap, IsAsFineAsThePicture) {
+  EXPECT_EQ(shadowSideFor(480), kShadowSide);
+  EXPECT_EQ(shadowSideFor(720), kShadowSide);
+  EXPECT_EQ(shadowSideFor(2160), 3 * kShadowSide);
+  EXPECT_EQ(shadowSideFor(kPictureSideMax), kShadowSideMost);
+  for (int height = 700; height < 3000; height += 7)
+    EXPECT_EQ(shadowSideFor(height) % ShadowMap::kBlockSide, 0) << height;
+}
+
+}  // namespace
+}  // namespace medulla
