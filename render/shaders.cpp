@@ -125,11 +125,12 @@ float litAt(vec2 q, float z) {
   return mix(rows.x, rows.y, w.y);
 }
 
-// Taps on turned squares and in the middle, evenly spread over the disc: on a ring, the shadows of shafts as thick
-// as it is wide have a dark line along their middle. A rotation per
-// pixel would hide their steps better but leaves a pattern. Most pixels agree on the widest squares and are done (of
-// three, on two: on one, the shadows of thin tools fell to pieces): llvmpipe runs both sides of a branch but leaves a
-// loop when all its pixels do, so the squares are a loop whose length the compiler cannot know.
+// Taps on turned squares and in the middle, evenly spread over the disc: on a ring, the shadows of shafts as thick as it
+// is wide have a dark line along their middle. A rotation per pixel would hide their steps better but leaves a pattern.
+// Most pixels agree on the widest squares and are done (of three, on two: on one, the shadows of thin tools fell to
+// pieces): llvmpipe runs both sides of a branch but leaves a loop when all its pixels do, so the squares are a loop
+// whose length the compiler cannot know. SQUARE: a corner of the k-th, in a disc of radius 1; WIDEST: the last without
+// which no pixel is done.
 float softShadow(vec3 p, float r) {
   vec2 q = p.xy * SHADOW_HEIGHT;
   float sum = litAt(q, p.z), taps = 1.;

@@ -16,8 +16,8 @@ struct LightView {
   glm::mat4 clipFromWorld{1};
 };
 
-// Texels along the map's side: kShadowSide up to a picture of 720 lines, then so many more that a texel covers as many
-// pixels, or the map's texels show as teeth along every edge.
+// Texels along the map's side: kShadowSide up to a picture of 720 lines, above it so many more that a texel covers no
+// more pixels than there, or texels would show as teeth along every edge.
 constexpr int kShadowSide = 1024, kShadowSideMost = 4096;
 int shadowSideFor(int pictureHeight);
 

@@ -12,7 +12,7 @@ namespace {
 using glm::vec3;
 
 constexpr std::uint32_t kWhole = ~0u;  // of an edge: no midpoint
-constexpr int kMostHalvings = 16;
+constexpr int kMostHalvings = 16;      // a cut through a triangle may be nearly as long as the edge that it halves
 
 // The mesh as it grows, and where its vertices are in the picture.
 struct Work {
@@ -36,9 +36,10 @@ void appendVertices(const SceneMesh& from, const MeshPart& part, SceneMesh& to) 
     append(array);
 }
 
-// From the middle of the edge to the surface. On a sphere of radius R the normals at the ends of a chord c have the
-// component c / 2R along it; with the sum of both, c/4 times that, halved, is the chord's height c^2 / 8R. (Phong
-// tessellation, Boubekeur and Alexa 2008, whose factor 3/4 would swell a sphere: 1/2 leaves it one.)
+// From the middle of the edge to the surface: Phong tessellation (Boubekeur and Alexa 2008) with the factor 1/2. The
+// normals at the ends of a chord c of a sphere of radius R have the components -c / 2R and c / 2R along it, half a
+// chord times them is c^2 / 4R, and a quarter of both normals times that c^2 / 8R, the arc's height over the chord. The
+// usual factor 3/4 would swell the sphere.
 vec3 bulge(const SceneMesh& mesh, std::uint32_t a, std::uint32_t b) {
   const vec3 half = 0.5f * (mesh.position[b] - mesh.position[a]);
   return 0.25f * (glm::dot(half, mesh.normal[b]) * mesh.normal[b] - glm::dot(half, mesh.normal[a]) * mesh.normal[a]);
@@ -79,8 +80,9 @@ bool isShown(const Work& work, std::uint32_t a, std::uint32_t b) {
   const vec3 d = (q - p) * work.height;
   if (d.x * d.x + d.y * d.y > kFarthest * kFarthest) return true;
   const vec3 off = bulge(work.mesh, a, b);
-  const float scale = work.height / std::max(std::min(p.z, q.z), v.nearPlane);  // px per m, but for the lens
-  if (glm::dot(off, off) * scale * scale * (0.5f / v.tangent + 1) * (0.5f / v.tangent + 1) < kOff * kOff) return false;
+  // Most edges pass here: across the view a metre is so many pixels, along it, at the picture's border, the one more.
+  const float most = work.height * (0.5f / v.tangent + 1) / std::max(std::min(p.z, q.z), v.nearPlane);
+  if (glm::dot(off, off) * most * most < kOff * kOff) return false;
   const vec3 middle = 0.5f * (work.mesh.position[a] + work.mesh.position[b]);
   const glm::vec2 moved = pictureFromWorld(v, middle + off) - pictureFromWorld(v, middle);
   return glm::length(moved) * work.height > kOff;
