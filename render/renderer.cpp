@@ -127,7 +127,7 @@ struct Renderer::Data {
         fineWidth(s.width * s.supersample),
         fineHeight(s.height * s.supersample),
         framebuffer(fineWidth, fineHeight),
-        tissue(shadowSideFor(s.height)),
+        tissue(shadowSideFor(s.height), s.supersample > 1),
         model(s.height),
         post(s.width, s.height),
         shadow(shadowSideFor(s.height)),

@@ -125,6 +125,18 @@ float litAt(vec2 q, float z) {
   return mix(rows.x, rows.y, w.y);
 }
 
+#ifdef SUPERSAMPLED
+// By an eighth of a half turn more in each of the four pixels that become one: together they have four times the taps.
+mat2 turnedBy(float r) {
+  ivec2 odd = ivec2(gl_FragCoord.xy) & 1;
+  vec2 c = r * (odd.x == 0 ? (odd.y == 0 ? vec2(1., 0.) : vec2(.92388, .38268))
+                           : (odd.y == 0 ? vec2(.70711, .70711) : vec2(.38268, .92388)));
+  return mat2(c.x, c.y, -c.y, c.x);
+}
+#else
+float turnedBy(float r) { return r; }
+#endif
+
 // Taps on turned squares and in the middle, evenly spread over the disc: on a ring, the shadows of shafts as thick as it
 // is wide have a dark line along their middle. A rotation per pixel would hide their steps better but leaves a pattern.
 // Most pixels agree on the widest squares and are done (of three, on two: on one, the shadows of thin tools fell to
@@ -135,7 +147,7 @@ float softShadow(vec3 p, float r) {
   vec2 q = p.xy * SHADOW_HEIGHT;
   float sum = litAt(q, p.z), taps = 1.;
   for (int k = 0; k < squares; ++k) {
-    vec2 d = r * (SQUARE);
+    vec2 d = turnedBy(r) * (SQUARE);
     sum += litAt(q + d, p.z) + litAt(q - d, p.z) + litAt(q + vec2(-d.y, d.x), p.z) + litAt(q + vec2(d.y, -d.x), p.z);
     taps += 4.;
     if (k >= WIDEST && (sum == 0. || sum == taps)) break;

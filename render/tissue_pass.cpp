@@ -87,12 +87,13 @@ std::string shadowDefines(int shadowSide) {
 
 }  // namespace
 
-TissuePass::Program TissuePass::makeProgram(Variant v, int shadowSide) {
+TissuePass::Program TissuePass::makeProgram(Variant v, int shadowSide, bool supersampled) {
   const bool dull = v == Variant::litDull || v == Variant::edgeDull;
   const int shade = v == Variant::dark ? 2 : v == Variant::edge || v == Variant::edgeDull ? 1 : 0;
   Program p;
   p.id = buildProgram("#define SHADE " + std::to_string(shade) + "\n" + (dull ? "#define DULL\n" : "") +
-                          "#define FILM_PEAK " + std::to_string(kFilmPeak) + "\n" + shadowDefines(shadowSide),
+                          (supersampled ? "#define SUPERSAMPLED\n" : "") + "#define FILM_PEAK " +
+                          std::to_string(kFilmPeak) + "\n" + shadowDefines(shadowSide),
                       kTissueVertexShader, kTissueFragmentShader);
   const auto uniform = [&p](const char* name) { return glGetUniformLocation(p.id, name); };
   p.clipFromWorld = uniform("clipFromWorld");
@@ -108,8 +109,8 @@ TissuePass::Program TissuePass::makeProgram(Variant v, int shadowSide) {
   return p;
 }
 
-TissuePass::TissuePass(int shadowSide) {
-  for (int v = 0; v < kVariants; ++v) programs_[v] = makeProgram(static_cast<Variant>(v), shadowSide);
+TissuePass::TissuePass(int shadowSide, bool supersampled) {
+  for (int v = 0; v < kVariants; ++v) programs_[v] = makeProgram(static_cast<Variant>(v), shadowSide, supersampled);
   maskProgram_ = buildProgram("", kMaskVertexShader, kMaskFragmentShader);
   shadowTexture_ = makeShadowTexture(shadowSide);
 

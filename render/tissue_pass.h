@@ -12,7 +12,7 @@ namespace medulla {
 // The OpenGL side of tissue and steel: programs, detail textures, buffers. Needs a current context.
 class TissuePass {
  public:
-  explicit TissuePass(int shadowSide);  // of ShadowMap
+  TissuePass(int shadowSide, bool supersampled);  // texels of ShadowMap; several pixels become one
   ~TissuePass();
   TissuePass(const TissuePass&) = delete;
   TissuePass& operator=(const TissuePass&) = delete;
@@ -30,7 +30,7 @@ class TissuePass {
     unsigned id = 0;
     int clipFromWorld, shadowFromWorld, surface, lobes, tint, opacity;
   };
-  static Program makeProgram(Variant variant, int shadowSide);
+  static Program makeProgram(Variant variant, int shadowSide, bool supersampled);
   void drawRuns(const SceneMesh& mesh, const DrawLists& lists, const std::vector<char>& wanted,
                 const Viewpoint& viewpoint, const LightView& lightView, float opacity);
 
