@@ -145,7 +145,9 @@ TEST(Grab, JawsHoldWhatIsStillFelt) {
     ToolState before;
     run.run(closing + 0.01, [&](double t, const ToolState& tool) {
       const bool closesNow = t > closing && t - run.tickDuration <= closing;
-      if (closesNow) EXPECT_EQ(tool.holding, before.inContact) << closing << " s, " << before.force.norm() << " N";
+      if (closesNow) {
+        EXPECT_EQ(tool.holding, before.inContact) << closing << " s, " << before.force.norm() << " N";
+      }
       before = tool;
     });
   }
