@@ -120,10 +120,13 @@ static void handOverContacts(const BlendedSurface& surface, double alpha, const 
 // Every held node pulled to where the tool wants it, by an equal share of the tool's stiffness: pulling is as stiff as
 // pushing. An equal share of forceMax, too: in the ratio of the late surface's forces, the limits would be springs that
 // answer a frame late, and let a patch held by a stiff tool ring.
-static void handOverGrip(const BlendedSurface& surface, const ServoTool& tool, double frameDuration, Loads& out) {
+static void handOverGrip(const BlendedSurface& surface, const ServoTool& tool, const Path& path, double frameDuration,
+                         Loads& out) {
   const double share = 1.0 / double(tool.grip.held.size());
   const int body = surface.bodyOfNode[tool.grip.held.front().node];
-  const auto& [start, end] = *tool.path;
+  ToolSample end = tool.device, start = tool.deviceAtFrameStart;
+  end.position = path.end;
+  start.position = path.end - frameDuration * path.velocity;
   for (const HeldOffset& held : tool.grip.held) {
     const Vector3d target = heldTarget(end, held);
     HeldNode& node = out.heldNodes.emplace_back();
@@ -141,11 +144,9 @@ static void handOverGrip(const BlendedSurface& surface, const ServoTool& tool, d
 void handOverTool(const BlendedSurface& surface, double alpha, double frameDuration, double tickDuration,
                   ServoTool& tool, std::vector<ProxyContact>& scratch, Loads& out) {
   const Path path = devicePath(tool, frameDuration, tickDuration);
-  tool.path = {tool.deviceAtFrameStart, tool.device};
-  (*tool.path)[0].position = path.end - frameDuration * path.velocity;
-  (*tool.path)[1].position = path.end;
+  tool.pathEnd = path.end;
   if (!tool.grip.held.empty())
-    handOverGrip(surface, tool, frameDuration, out);
+    handOverGrip(surface, tool, path, frameDuration, out);
   else
     handOverContacts(surface, alpha, tool, path, scratch, out);
 }

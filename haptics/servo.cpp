@@ -289,39 +289,23 @@ void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
   data_->alpha = alpha;
 }
 
-// m: by how much the mean place of what a grip holds, over the frame up to the surface's `to`, lay off the middle of
-// the chord between the frame's ends. What the tissue gave tells, beside what it would have given along the chord.
-static Vector3d offChord(const BlendedSurface& surface, const ServoTool& tool) {
-  const ToolSettings& s = tool.settings;
-  const auto& [start, end] = *tool.path;
-  const Vector3d alongChord = meanOverHeld(tool.grip, [&](const HeldOffset& held) -> Vector3d {
-    const Vector3d from = surface.from[held.node] - heldTarget(start, held),
-                   to = surface.to[held.node] - heldTarget(end, held);
-    return keptNear(0.5 * s.stiffness * (from + to) + s.damping / surface.duration * (to - from), Vector3d::Zero(),
-                    s.forceMax);
-  });
-  return -(surface.toolForce[0][tool.index] + alongChord) / s.stiffness;
-}
-
 static void startFrame(const BlendedSurface& surface, double tickDuration, ServoTool& tool) {
   const double way = (tool.device.position - tool.deviceAtFrameStart.position).norm();
   fadePatch(surface, 0, tool.proxy, tool.settings.radius, way, tool.ticks * tickDuration, tool.patch);
   tool.deviceAtFrameStart = tool.device;
   tool.deviceSum.setZero();
   const bool holds = !tool.grip.held.empty();
-  Vector3d lag = tool.path ? Vector3d(tool.device.position - (*tool.path)[1].position) : Vector3d::Zero();
+  Vector3d lag = tool.pathEnd ? Vector3d(tool.device.position - *tool.pathEnd) : Vector3d::Zero();
   if (!holds) lag = tool.isLeaving ? Vector3d(tool.lastFelt.dot(lag) * tool.lastFelt) : Vector3d::Zero();
   startFrame(lag, surface.duration, tool.motion);
   const auto& given = surface.toolForce;
   const Vector3d change = given[0].empty() ? Vector3d::Zero() : Vector3d(given[0][tool.index] - given[1][tool.index]);
-  if (holds) {
-    if (tool.path && !given[0].empty() && surface.toolForceAge == kToolForceAge)
-      learnBending(surface, tool.grip, offChord(surface, tool), tool.motion);
+  if (holds)
     learnFollowing(surface, tool.grip, tool.motion);
-  } else if (tool.isLeaving)
+  else if (tool.isLeaving)
     learnFollowing(surface, touchedContacts(tool), tool.lastFelt, tool.settings.stiffness,
                    tool.estimate > tool.settings.forceMax ? 0 : std::abs(tool.lastFelt.dot(change)), tool.motion);
-  tool.path.reset();
+  tool.pathEnd.reset();
   tool.change = {change.norm(), tool.change[0]};
   tool.ticks = 0;
 }

@@ -30,11 +30,10 @@ struct ServoTool {
   DeviceMotion motion;     // in this contact or grip
   // N, by how much the tissue's force changed over the frame up to the surface's `to`, and up to its `from`.
   std::array<double, 2> change{};
-  // Of the device's straight path as handed over since the frame began: its start and end.
-  std::optional<std::array<ToolSample, 2>> path;
-  double estimate = 0;  // N, of the force at the last tick, before it was kept to the tissue's
-  double push = 0;      // N, along the normal, of what was felt at the last tick
-  int ticks = 0;        // in this frame
+  std::optional<Eigen::Vector3d> pathEnd;  // m, of the device's path as handed over since the frame began
+  double estimate = 0;                     // N, of the force at the last tick, before it was kept to the tissue's
+  double push = 0;                         // N, along the normal, of what was felt at the last tick
+  int ticks = 0;                           // in this frame
   bool isLeaving = false;
 };
 

@@ -50,14 +50,6 @@ struct DeviceMotion {
     Eigen::Vector3d drift = Eigen::Vector3d::Zero();  // m
   };
   std::array<Swing, 2> swing{};
-  // How far what a grip holds goes round between frames' ends: 1 as what speeds up evenly, 0 along the chord, as what
-  // follows at once the path that the dynamics was given. Sums likewise (m2), of how it lay off the chords, of how it
-  // would have with 1, and of both; and how it lay in the frame up to `to` (m).
-  struct {
-    double offSquare = 0, roundSquare = 0, product = 0;
-    Eigen::Vector3d off = Eigen::Vector3d::Zero();
-  } bent{};
-  double bends = 0;
 };
 
 // Tissue that moved by itself begins to follow the device: its steps so far count as answers to ways of a device.
@@ -80,12 +72,6 @@ void startFrame(const Eigen::Vector3d& lag, double duration, DeviceMotion& devic
 void learnFollowing(const BlendedSurface& surface, std::span<const ProxyContact> contacts,
                     const Eigen::Vector3d& normal, double stiffness, double forceChange, DeviceMotion& device);
 void learnFollowing(const BlendedSurface& surface, const Grip& grip, DeviceMotion& device);
-
-// `off`, m: by how much the mean place of what is held, in the frame up to the surface's `to`, lay off the chord's
-// middle. A frame's path that speeds up by a bends a T^2 / 12 off it. What is heavy for the tool goes round so while
-// the chord is all that the surface shows: it was felt as k T^2 / 12 of mass more, and shaken at 5 Hz gave the hand
-// energy.
-void learnBending(const BlendedSurface& surface, const Grip& grip, const Eigen::Vector3d& off, DeviceMotion& device);
 
 struct TissueMotion {
   Eigen::Vector3d lead = Eigen::Vector3d::Zero();      // m, by now ahead of the blended surface

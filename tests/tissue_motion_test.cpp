@@ -192,9 +192,8 @@ TEST(TissueMotion, HowFarHeldTissueFollowsIsSeenFromItsSteps) {
   EXPECT_NEAR(followedAfter(1.2, 0.5, 40), 1, 1e-12);    // nor beyond the device
 }
 
-// m: what a still grip holds, by so many frames' steps; with `round` it goes round between frames' ends as it speeds
-// up.
-static TissueMotion heldAfter(int frames, const std::function<Vector3d(int)>& step, bool round, double alpha) {
+// m: by how much what a still grip holds leads, after so many frames of steps.
+static Vector3d leadAfter(int frames, const std::function<Vector3d(int)>& step, double alpha) {
   BlendedSurface surface;
   surface.duration = 0.02;
   for (auto& steps : surface.steps) steps.assign(1, Vector3d::Zero());
@@ -205,11 +204,9 @@ static TissueMotion heldAfter(int frames, const std::function<Vector3d(int)>& st
   for (int frame = 0; frame < frames; ++frame) {
     startFrame(Vector3d::Zero(), surface.duration, device);
     surface.steps = {{{step(frame)}, surface.steps[0], surface.steps[1]}};
-    const Vector3d off = -(step(frame + 1) - step(frame - 1)) / 24;
-    learnBending(surface, grip, round ? off : Vector3d::Zero(), device);
     learnFollowing(surface, grip, device);
   }
-  return heldMotion(surface, alpha, grip, device);
+  return heldMotion(surface, alpha, grip, device).lead;
 }
 
 // With four frames to its period twice the last step less the one before is 2.2 times as large, a quarter late.
@@ -218,16 +215,9 @@ TEST(TissueMotion, WhatVibratesInAStillGripIsFeltWhereItIs) {
     const auto step = [&](int frame) {
       return Vector3d(3e-5 + 1e-4 * std::cos(turn * frame), 2e-4 * std::sin(turn * frame), -1e-5);
     };
-    EXPECT_LT((heldAfter(40, step, false, 1).lead - step(40)).norm(), 1e-7) << turn;
-    EXPECT_LT((heldAfter(40, step, false, 0).lead - step(39)).norm(), 1e-7) << turn;
+    EXPECT_LT((leadAfter(40, step, 1) - step(40)).norm(), 1e-7) << turn;
+    EXPECT_LT((leadAfter(40, step, 0) - step(39)).norm(), 1e-7) << turn;
   }
-}
-
-TEST(TissueMotion, WhatGoesRoundBetweenFramesIsFeltOffItsChords) {
-  const auto step = [&](int frame) { return Vector3d(1e-6 * frame, -2e-6 * frame, 0); };
-  const Vector3d more = step(1);
-  EXPECT_LT((heldAfter(40, step, true, 1).lead - (step(40) - more / 12)).norm(), 1e-8);
-  EXPECT_LT((heldAfter(40, step, false, 1).lead - step(40)).norm(), 1e-8);
 }
 
 // Tissue that swings on its own, and that a way of 0.1 mm more presses by so much of the tool's stiffness more.
