@@ -46,10 +46,9 @@ Vector3d latestWay(const DeviceMotion& device, double alpha) {
   return device.way[0] + late * (device.way[1] - device.earlyBefore) + early * device.earlyBefore;
 }
 
-// m: the next step at alpha, drift apart, of the last ones; `of(k)` is the step k frames before the surface's last.
-template <class Of>
-Vector3d nextStep(const std::array<DeviceMotion::Swing, 2>& swing, double alpha, const Of& of) {
-  return blendPoint(swing[1].turn * of(1) - of(2), swing[0].turn * of(0) - of(1), alpha);
+// m: the next step at alpha, drift apart, of the `last` three, the newest first.
+Vector3d nextStep(const std::array<DeviceMotion::Swing, 2>& swing, double alpha, const Vector3d* last) {
+  return blendPoint(swing[1].turn * last[1] - last[2], swing[0].turn * last[0] - last[1], alpha);
 }
 
 // m: what BlendedSurface::nodeStep() and the steps of nextStep(), of the same frames in the same way, answer.
@@ -57,7 +56,7 @@ Vector3d wayOfStep(const DeviceMotion& device, double alpha) {
   return blendPoint(device.way[2], device.way[1], alpha);
 }
 Vector3d wayOfLead(const DeviceMotion& device, double alpha) {
-  return nextStep(device.swing, alpha, [&](int k) { return device.way[k + 1]; });
+  return nextStep(device.swing, alpha, &device.way[1]);
 }
 
 Vector3d meanOver(const BlendedSurface& surface, const ProxyContact& contact, const std::vector<Vector3d>& ofNodes) {
@@ -102,6 +101,11 @@ Vector3d heldStep(const BlendedSurface& surface, const Grip& grip, int framesAgo
   return meanOverHeld(grip, [&](const HeldOffset& held) { return surface.steps[framesAgo][held.node]; });
 }
 
+// The newest first.
+std::array<Vector3d, 3> heldSteps(const BlendedSurface& surface, const Grip& grip) {
+  return {heldStep(surface, grip, 0), heldStep(surface, grip, 1), heldStep(surface, grip, 2)};
+}
+
 // What gives so much may resist half as much again: a slab of 20 kPa did with 800 N/m where its give says 520, and a
 // stiff tool that left it lagged behind by 13 ms. But what is pushed starts late, and looks stiff at first: a free ball
 // that is poked has gone by the fourth frame.
@@ -112,9 +116,10 @@ double leastPart(const DeviceMotion& device) {
   return device.frames <= kUnsure ? part : part / (part + kStiffer * (1 - part));
 }
 
+constexpr double kLeast = 1e-12;  // m2, of 1 um: less is as if it stood still
+
 double partSeen(const DeviceMotion& device) {
-  constexpr double kLeast = 1e-12;  // m2, of 1 um: less is as if the device stood still
-  constexpr double kSafe = 1.5;     // forces follow the ways late; at 1, strokes of a live run give 4 mJ
+  constexpr double kSafe = 1.5;  // forces follow the ways late; at 1, strokes of a live run give 4 mJ
   const auto& seen = device.seen;
   const double bySteps = (seen.stepChange + kLeast * device.followsAtOnce) / (seen.wayChange + kLeast);
   const double byForce = 1 - kSafe * (seen.forceLength + kLeast * (1 - device.followsAtOnce)) / (seen.length + kLeast);
@@ -132,7 +137,6 @@ void seeStep(const Vector3d& change, DeviceMotion& device) {
 // while these change much, what is left is mostly that the part that follows is not known so well, and no swing is
 // learnt of it: a free ball that was sped up at 20 Hz felt a fifth too heavy.
 void seeSwing(const std::array<Vector3d, 3>& last, DeviceMotion& device) {
-  constexpr double kLeast = 1e-12;  // m2, as above
   constexpr double kUnknown = 0.1;  // of the squared changes of ways
   const auto own = [&](int k) -> Vector3d { return last[k] - device.follows[0] * device.way[k + 1]; };
   const Vector3d both = own(0) + own(2);
@@ -209,8 +213,7 @@ void learnFollowing(const BlendedSurface& surface, std::span<const ProxyContact>
 }
 
 void learnFollowing(const BlendedSurface& surface, const Grip& grip, DeviceMotion& device) {
-  const std::array<Vector3d, 3> last{heldStep(surface, grip, 0), heldStep(surface, grip, 1),
-                                     heldStep(surface, grip, 2)};
+  const std::array<Vector3d, 3> last = heldSteps(surface, grip);
   seeStep(last[0] - last[1], device);
   device.follows = {partSeen(device), device.follows[0]};
   seeSwing(last, device);
@@ -261,8 +264,9 @@ TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip&
   const double part = followsNow(device, alpha);
   const Vector3d beyond = latestWay(device, alpha) - wayOfLead(device, alpha);
   const Vector3d faster = device.velocity - wayOfStep(device, alpha) / surface.duration;
-  const Vector3d lead = blendPoint(device.swing[1].drift, device.swing[0].drift, alpha) +
-                        nextStep(device.swing, alpha, [&](int k) { return heldStep(surface, grip, k); });
+  const std::array<Vector3d, 3> last = heldSteps(surface, grip);
+  const Vector3d lead =
+      blendPoint(device.swing[1].drift, device.swing[0].drift, alpha) + nextStep(device.swing, alpha, last.data());
   const Vector3d step = meanOverHeld(grip, [&](const HeldOffset& h) { return surface.nodeStep(h.node, alpha); });
   return {lead + part * beyond, step / surface.duration + part * faster, step, part};
 }

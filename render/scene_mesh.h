@@ -36,6 +36,17 @@ struct SceneMesh {
   void resizeVertices(std::size_t count);
 };
 
+// `visit(array)` of every array with a number per vertex, a pointer to member.
+template <class Visit>
+void visitVertexArrays(const Visit& visit) {
+  for (const auto array : {&SceneMesh::position, &SceneMesh::normal, &SceneMesh::tangent, &SceneMesh::albedo})
+    visit(array);
+  visit(&SceneMesh::uv);
+  for (const auto array : {&SceneMesh::detail, &SceneMesh::openness, &SceneMesh::thinness, &SceneMesh::area,
+                           &SceneMesh::hollow, &SceneMesh::blanch})
+    visit(array);
+}
+
 // Area-weighted vertex normals (the sum of cross products) of one part, and what else its triangles tell: area, hollow.
 void computeNormals(SceneMesh& mesh, const MeshPart& part);
 // m, from vertex i to those beside it: six even triangles of edge e have, twice, 5.2 e^2.

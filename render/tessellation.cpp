@@ -25,15 +25,9 @@ struct Work {
 
 void appendVertices(const SceneMesh& from, const MeshPart& part, SceneMesh& to) {
   const auto first = std::ptrdiff_t(part.firstVertex), last = first + std::ptrdiff_t(part.vertexCount);
-  const auto append = [&](auto array) {
+  visitVertexArrays([&](auto array) {
     (to.*array).insert((to.*array).end(), (from.*array).begin() + first, (from.*array).begin() + last);
-  };
-  for (const auto array : {&SceneMesh::position, &SceneMesh::normal, &SceneMesh::tangent, &SceneMesh::albedo})
-    append(array);
-  append(&SceneMesh::uv);
-  for (const auto array : {&SceneMesh::detail, &SceneMesh::openness, &SceneMesh::thinness, &SceneMesh::area,
-                           &SceneMesh::hollow, &SceneMesh::blanch})
-    append(array);
+  });
 }
 
 // From the middle of the edge to the surface: Phong tessellation (Boubekeur and Alexa 2008) with the factor 1/2. The
@@ -49,15 +43,8 @@ std::uint32_t appendMidpoint(Work& work, std::uint32_t a, std::uint32_t b) {
   SceneMesh& mesh = work.mesh;
   const auto i = std::uint32_t(mesh.position.size());
   const vec3 offset = bulge(mesh, a, b);
-  const auto mean = [&mesh, a, b](auto array) {
-    (mesh.*array).push_back(0.5f * ((mesh.*array)[a] + (mesh.*array)[b]));
-  };
-  for (const auto array : {&SceneMesh::position, &SceneMesh::normal, &SceneMesh::tangent, &SceneMesh::albedo})
-    mean(array);
-  mean(&SceneMesh::uv);
-  for (const auto array : {&SceneMesh::detail, &SceneMesh::openness, &SceneMesh::thinness, &SceneMesh::area,
-                           &SceneMesh::hollow, &SceneMesh::blanch})
-    mean(array);
+  visitVertexArrays(
+      [&mesh, a, b](auto array) { (mesh.*array).push_back(0.5f * ((mesh.*array)[a] + (mesh.*array)[b])); });
   mesh.position[i] += offset;
   vec3 &n = mesh.normal[i], &t = mesh.tangent[i];
   n = glm::normalize(glm::length(n) > 0.1f ? n : mesh.normal[a]);
