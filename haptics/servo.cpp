@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -78,11 +79,21 @@ static Vector3d givenForce(const BlendedSurface& surface, double alpha, const Se
 // millimetre is several times the force. Downward twice as much: what lags behind a device that withdraws hands it
 // energy.
 static double pushKeptToTissue(const BlendedSurface& surface, double alpha, const Vector3d& normal,
-                               const TissueMotion& tissue, const ServoTool& tool) {
-  if (surface.toolForce[0].empty()) return tool.estimate;
+                               const TissueMotion& tissue, const ServoTool& tool, double push) {
+  if (surface.toolForce[0].empty()) return push;
   const double given = std::max(0.0, -givenForce(surface, alpha, tool).dot(normal));
   const double since = pushSince(surface, alpha, tissue, normal, tool.settings, tool.motion);
-  return std::clamp(tool.estimate, std::max(0.0, given - 2 * since), given + since);
+  return std::clamp(push, std::max(0.0, given - 2 * since), given + since);
+}
+
+// What the device's motion makes of it is taken off.
+static double pushFelt(const BlendedSurface& surface, double alpha, const Vector3d& normal, const TissueMotion& tissue,
+                       ServoTool& tool) {
+  const double push = pushKeptToTissue(surface, alpha, normal, tissue, tool, tool.estimate);
+  const WayAndChange ways = recentWays(tool.motion, alpha);
+  const double off = normal.dot(motionError(ways, alpha, tool.motion.error));
+  if (push > 0) noteFelt(std::min(push, tool.settings.forceMax) * normal, ways, tool.motion.error);
+  return pushKeptToTissue(surface, alpha, normal, tissue, tool, std::max(0.0, push - off));
 }
 
 // Likewise across it: a proxy on the late surface slips, or sticks, where the tissue itself does not.
@@ -115,7 +126,7 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   const TissueMotion tissue = contactMotion(surface, alpha, touchedContacts(tool), normal, tool.motion);
   const Vector3d motion = motionForce(tool, tissue);
   tool.estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
-  const double push = tool.push = pushKeptToTissue(surface, alpha, normal, tissue, tool);
+  const double push = tool.push = pushFelt(surface, alpha, normal, tissue, tool);
   Vector3d drag = proxy.inContact() ? Vector3d(tool.settings.stiffness * tangential(pull, normal)) : Vector3d::Zero();
   if (proxy.slipping || !tool.sticks) tool.leadWhereItStuck = tangential(tissue.lead, normal);
   tool.sticks = !proxy.slipping;
@@ -127,27 +138,15 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
                     tool.settings.staticFriction * proxy.wedging);
 }
 
-// N, `of` each held node the force of all, mean: the springs share the tool's stiffness equally.
-template <class Of>
-static Vector3d meanForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue,
-                          const ServoTool& tool, const Of& of) {
+// N, of the springs of what is held, which share the tool's stiffness equally, and of its motion; each limited to its
+// share of `most`, as in the dynamics.
+static Vector3d heldForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue,
+                          const ServoTool& tool, double most = std::numeric_limits<double>::infinity()) {
   const Vector3d motion = motionForce(tool, tissue);
   return meanOverHeld(tool.grip, [&](const HeldOffset& held) -> Vector3d {
-    return of(tool.settings.stiffness * (surface.node(held.node, alpha) - heldTarget(tool.device, held)) + motion);
+    const Vector3d stretch = surface.node(held.node, alpha) - heldTarget(tool.device, held);
+    return keptNear(tool.settings.stiffness * stretch + motion, Vector3d::Zero(), most);
   });
-}
-
-// Without a limit.
-static Vector3d heldForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue,
-                          const ServoTool& tool) {
-  return meanForce(surface, alpha, tissue, tool, [](const Vector3d& force) { return force; });
-}
-
-// Each limited to its share of forceMax, as in the dynamics.
-static Vector3d limitedForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue,
-                             const ServoTool& tool) {
-  return meanForce(surface, alpha, tissue, tool,
-                   [&](const Vector3d& force) { return keptNear(force, Vector3d::Zero(), tool.settings.forceMax); });
 }
 
 // The same for what a grip feels, in all directions.
@@ -157,6 +156,14 @@ static Vector3d keptToTissue(const BlendedSurface& surface, double alpha, const 
   const double change = (1 - alpha) * tool.change[1] + alpha * tool.change[0];
   const double since = heldSince(surface, alpha, tissue, change, tool.settings, tool.motion);
   return keptNear(force, -givenForce(surface, alpha, tool), since);
+}
+static Vector3d gripFelt(const BlendedSurface& surface, double alpha, const TissueMotion& tissue, ServoTool& tool) {
+  const Vector3d limited = heldForce(surface, alpha, tissue, tool, tool.settings.forceMax);
+  const Vector3d force = keptToTissue(surface, alpha, tissue, tool, limited);
+  const WayAndChange ways = recentWays(tool.motion, alpha);
+  const Vector3d off = motionError(ways, alpha, tool.motion.error);
+  noteFelt(force, ways, tool.motion.error);
+  return keptToTissue(surface, alpha, tissue, tool, force - off);
 }
 
 // In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
@@ -171,6 +178,7 @@ static void followLeaving(const BlendedSurface& surface, double alphaBefore, dou
     if (!tool.isLeaving) {
       tool.largestPush = 0;
       tool.sticks = false;
+      tool.pathEnd.reset();
       beginContact(surface, alphaBefore, tool.lastContact, tool.lastFelt, tool.settings.stiffness, tool.motion);
     }
     tool.isLeaving = true;
@@ -217,12 +225,16 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
   Grip& grip = tool.grip;
   const bool wasHolding = !grip.held.empty();
   updateGrip(surface, alpha, contactToHold(tool, felt), tool.device, tool.settings.gripRadius, grip);
-  if (!grip.held.empty()) tool.motion.velocity = heldVelocity(tool, before, tickDuration);
-  if (wasHolding == !grip.held.empty()) return;
-  if (wasHolding) {
-    tool.isLeaving = false;
+  if (grip.held.empty()) {
+    if (wasHolding) tool.isLeaving = false;
     return;
   }
+  tool.motion.velocity = heldVelocity(tool, before, tickDuration);
+  if (wasHolding) {
+    tool.motion.way[0] += tickDuration * tool.motion.velocity;
+    return;
+  }
+  tool.pathEnd.reset();
   beginHold(surface, alpha, grip, tool.settings.stiffness, tool.motion);
   const Eigen::Quaterniond toolFromWorld = tool.device.worldFromTool.conjugate();
   for (HeldOffset& held : grip.held) held.offset += toolFromWorld * surface.nodeLead(held.node, alpha);
@@ -236,13 +248,10 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
 }
 
 // Whether the grip holds on, its force recorded.
-static bool feelGrip(const BlendedSurface& surface, double alpha, double tickDuration, ServoTool& tool,
-                     ToolState& state) {
+static bool feelGrip(const BlendedSurface& surface, double alpha, ServoTool& tool, ToolState& state) {
   if (tool.grip.held.empty()) return false;
-  tool.motion.way[0] += tickDuration * tool.motion.velocity;
   const TissueMotion tissue = heldMotion(surface, alpha, tool.grip, tool.motion);
-  const Vector3d limited = limitedForce(surface, alpha, tissue, tool);
-  const Vector3d force = keptToTissue(surface, alpha, tissue, tool, limited);
+  const Vector3d force = gripFelt(surface, alpha, tissue, tool);
   tool.estimate = heldForce(surface, alpha, tissue, tool).norm();
   if (std::min(force.norm(), tool.settings.forceMax) > tool.settings.gripForceMax) {
     letSlip(tool.grip);
@@ -251,6 +260,7 @@ static bool feelGrip(const BlendedSurface& surface, double alpha, double tickDur
   }
   record(force, tool, state);
   tool.proxy.felt.setZero();  // what is felt after the release does not begin where this grip began
+  tool.proxy.device = tool.device.position;
   return true;
 }
 
@@ -268,7 +278,7 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
   const bool closes = !tool.grip.closed && input.grip > kGripCloses;
   if (closes && !tool.proxy.inContact()) followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
   tickGrip(surface, alpha, state.force, before, tickDuration, tool);
-  if (feelGrip(surface, alpha, tickDuration, tool, state)) return;
+  if (feelGrip(surface, alpha, tool, state)) return;
   tool.motion.velocity = way / tickDuration;  // of what has slipped out it was another
   const Vector3d carried = tool.proxy.centre;
   followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
@@ -289,6 +299,15 @@ void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
   data_->alpha = alpha;
 }
 
+// From what the frame that ended was felt like. Of a contact, along its normal.
+static void learnError(const BlendedSurface& surface, ServoTool& tool) {
+  if (surface.toolForce[0].empty()) return;
+  Vector3d gave = -surface.toolForce[0][tool.index];
+  if (tool.grip.held.empty()) gave = std::max(0.0, gave.dot(tool.lastFelt)) * tool.lastFelt;
+  const int framesLate = std::min(1, int(std::lround(surface.toolForceAge - kToolForceAge)));
+  learnMotionError(gave, tool.ticks, framesLate, surface.duration, tool.motion.error);
+}
+
 static void startFrame(const BlendedSurface& surface, double tickDuration, ServoTool& tool) {
   const double way = (tool.device.position - tool.deviceAtFrameStart.position).norm();
   fadePatch(surface, 0, tool.proxy, tool.settings.radius, way, tool.ticks * tickDuration, tool.patch);
@@ -298,6 +317,7 @@ static void startFrame(const BlendedSurface& surface, double tickDuration, Servo
   Vector3d lag = tool.pathEnd ? Vector3d(tool.device.position - *tool.pathEnd) : Vector3d::Zero();
   if (!holds) lag = tool.isLeaving ? Vector3d(tool.lastFelt.dot(lag) * tool.lastFelt) : Vector3d::Zero();
   startFrame(lag, surface.duration, tool.motion);
+  learnError(surface, tool);
   const auto& given = surface.toolForce;
   const Vector3d change = given[0].empty() ? Vector3d::Zero() : Vector3d(given[0][tool.index] - given[1][tool.index]);
   if (holds)
@@ -329,6 +349,8 @@ void Servo::commit(const DynamicsFrame& from, const DynamicsFrame& to, const std
     last.assign(data_->tools.size(), Vector3d::Zero());
     for (std::size_t k = 0; k < toolImpulse->size(); ++k) last[k] = (*toolImpulse)[k] / (to.time - from.time);
     if (isFirst) before = last;  // a tool may start in contact
+  } else {
+    data_->toolForce = {};
   }
   Buckets& buckets = data_->surfaces.writing();
   buckets.commit(from, to, data_->steps, data_->toolForce, kToolForceAge + framesLate);

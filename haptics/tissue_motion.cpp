@@ -259,6 +259,13 @@ double heldSince(const BlendedSurface& surface, double alpha, const TissueMotion
          (1 - tissue.followed) * (tool.stiffness * longer + tool.damping * device.velocity.norm());
 }
 
+WayAndChange recentWays(const DeviceMotion& device, double alpha) {
+  WayAndChange ways;
+  ways.col(0) = latestWay(device, alpha);
+  ways.col(1) = ways.col(0) - blendPoint(device.way[2], device.way[1], alpha);
+  return ways;
+}
+
 TissueMotion heldMotion(const BlendedSurface& surface, double alpha, const Grip& grip, const DeviceMotion& device) {
   if (!(surface.duration > 0)) return {};
   const double part = followsNow(device, alpha);

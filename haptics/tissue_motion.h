@@ -5,6 +5,7 @@
 #include <span>
 
 #include "haptics/grab.h"
+#include "haptics/motion_error.h"
 #include "haptics/proxy.h"
 
 // Where touched or held tissue is by now, ahead of the blended surface, which is a frame late. Two things are known:
@@ -50,6 +51,7 @@ struct DeviceMotion {
     Eigen::Vector3d drift = Eigen::Vector3d::Zero();  // m
   };
   std::array<Swing, 2> swing{};
+  MotionError error{};
 };
 
 // Tissue that moved by itself begins to follow the device: its steps so far count as answers to ways of a device.
@@ -85,6 +87,9 @@ struct TissueMotion {
 // normal: along the surface, friction lets tissue follow or not.
 TissueMotion contactMotion(const BlendedSurface& surface, double alpha, std::span<const ProxyContact> contacts,
                            const Eigen::Vector3d& normal, const DeviceMotion& device);
+
+// Of the device, in the frame's duration up to alpha.
+WayAndChange recentWays(const DeviceMotion& device, double alpha);
 
 // N: by how much a push along `normal` can differ from what it was BlendedSurface::toolForceAge ago: by what device and
 // tissue went since and the stiffness of tool and tissue in series, and by the tool's damper.

@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <tuple>
+
 #include "haptics/servo.h"
 #include "tests/tool_run.h"
 
@@ -249,6 +254,43 @@ TEST(Grab, PullBeyondForceMaxIsClampedForHandAndTissue) {
   });
   EXPECT_TRUE(clamped);
   EXPECT_LT((run.body.advance(run.loads, 0.02, 200) / 0.02 + force).norm(), 0.02 * force.norm());
+}
+
+// N, RMS of what the hand feels over its fourth second of shaking along x, against the same with dynamics at 1200 Hz.
+static double offWhileShaken(double frequency, int ticksPerFrame, double& rms) {
+  const auto shaken = [&](int ticks) {
+    ToolRun run = grabbing();
+    run.tool.stiffness = 4000;
+    run.ticksPerFrame = ticks;
+    run.device = [&](double t) {
+      const double x = 0.003 * ease(t, 0.6, 0.5) * std::sin(2 * std::numbers::pi * frequency * t);
+      return deviceAt(approach(t) + x * Vector3d::UnitX(), t > 0.5 ? 1 : 0);
+    };
+    std::vector<Vector3d> felt;
+    run.run(4, [&](double time, const ToolState& tool) {
+      if (time > 3) felt.push_back(tool.force);
+    });
+    return felt;
+  };
+  const std::vector<Vector3d> felt = shaken(ticksPerFrame), right = shaken(1);
+  double off = 0, size = 0;
+  for (std::size_t k = 0; k < felt.size(); ++k) {
+    off += (felt[k] - right[k]).squaredNorm();
+    size += right[k].squaredNorm();
+  }
+  rms = std::sqrt(size / static_cast<double>(felt.size()));
+  return std::sqrt(off / static_cast<double>(felt.size()));
+}
+
+// What goes round with a stiff tool leaves only a small difference of two large motions to be felt.
+TEST(Grab, ShakenTissueIsFeltAsItIsOnceItsMotionIsKnown) {
+  for (const auto& [frequency, ticks, most] : {std::tuple(3.0, 24, 0.02), {5.0, 24, 0.06}, {5.0, 12, 0.02}}) {
+    double rms = 0;
+    const double off = offWhileShaken(frequency, ticks, rms);
+    std::printf("[  reached ] %g Hz, dynamics at %d Hz: off by %.3f of %.3f N RMS\n", frequency, 1200 / ticks, off,
+                rms);
+    EXPECT_LT(off, most * rms);
+  }
 }
 
 TEST(Grab, BeyondItsForceTheTissueSlipsOutAndCanBeGrabbedAgain) {

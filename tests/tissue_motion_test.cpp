@@ -13,6 +13,7 @@
 
 namespace medulla {
 
+using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 // Light tissue: it is where its springs want it within a small part of a frame.
@@ -241,6 +242,53 @@ TEST(TissueMotion, HowFarTouchedTissueFollowsIsSeenFromItsForce) {
   EXPECT_NEAR(followedByForce(0.01, 0.5, 20), 0.985, 3e-3);  // half as much again, to be safe
   EXPECT_NEAR(followedByForce(0.8, 0.5, 3), 0.5, 1e-12);     // not less than what it gives at once
   EXPECT_NEAR(followedByForce(0.8, 0.5, 20), 0.4, 1e-12);    // half as stiff again at most
+}
+
+// A shake of which the hand feels a mass and a damper too much, `late` frames after the tissue gave it; N, RMS of what
+// is left of that over the frames from `first` on, and of all of it.
+static std::array<double, 2> leftOfError(int first, int frames, int late, const std::function<Vector2d(int)>& perWay) {
+  constexpr double kDuration = 0.02, kTurn = 0.6;  // s; per frame
+  const auto waysOf = [](int frame) {
+    WayAndChange ways;
+    ways << 1e-3 * std::sin(kTurn * frame), 5e-4 * std::cos(kTurn * frame), 0, 2e-4 * std::cos(kTurn * frame), 0, 0;
+    return ways;
+  };
+  const auto gave = [](int frame) { return Vector3d(0.1 * std::cos(0.2 * frame), 0.05, 0); };
+  MotionError error;
+  double left = 0, all = 0;
+  for (int frame = 0; frame < frames; ++frame) {
+    const WayAndChange ways = waysOf(frame);
+    const Vector3d off = ways * perWay(frame);
+    for (int tick = 0; tick < 4; ++tick) noteFelt(gave(frame) + off, ways, error);
+    if (frame >= first) {
+      left += (off - motionError(ways, 1, error)).squaredNorm();
+      all += off.squaredNorm();
+    }
+    learnMotionError(gave(frame - late), 4, late, kDuration, error);
+  }
+  return {std::sqrt(left / (frames - first)), std::sqrt(all / (frames - first))};
+}
+
+TEST(MotionError, WhatAMotionAddsIsTakenOffOnceItHasBeenForetold) {
+  const auto steady = [](int) { return Vector2d(40, -300); };
+  for (const int late : {0, 1}) {
+    const auto [left, all] = leftOfError(20, 60, late, steady);
+    EXPECT_LT(left, 0.05 * all);
+    EXPECT_LT(leftOfError(0, 20, late, steady)[0], all);
+  }
+  // What changes its sign from frame to frame cannot be foretold, and nothing is taken off.
+  const auto [left, all] = leftOfError(20, 60, 0, [](int frame) { return Vector2d(frame % 2 == 0 ? 40 : -40, 0); });
+  EXPECT_NEAR(left, all, 1e-3 * all);
+}
+
+TEST(MotionError, AFrameThatWasNotFeltThroughoutTeachesNothing) {
+  MotionError error;
+  WayAndChange ways = WayAndChange::Constant(1e-3);
+  for (int frame = 0; frame < 10; ++frame) {
+    noteFelt(Vector3d::UnitX(), ways, error);
+    learnMotionError(Vector3d::Zero(), 2, 0, 0.02, error);
+  }
+  EXPECT_EQ(motionError(ways, 1, error).norm(), 0);
 }
 
 }  // namespace medulla
