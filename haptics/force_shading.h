@@ -6,9 +6,9 @@
 // smooth surface that it stands for, by normals interpolated between its nodes.
 namespace medulla {
 
-// Per node of a surface at rest: whether the triangles at one of its edges stand more than 69 degrees apart. Asked of
-// each triangle alone, by its nodes' mean normals, an unevenly meshed edge is a crease on its one side and smooth on
-// the other.
+// Per node of a surface as a run begins: whether the triangles at one of its edges stand more than 69 degrees apart.
+// Asked of each triangle alone, by its nodes' mean normals, an unevenly meshed edge is a crease on its one side and
+// smooth on the other.
 std::vector<char> nodesOnCreases(const TriangleMesh& rest);
 
 // The smooth surface's unit normal at a point of a triangle, given by its barycentric weights, where a sphere is

@@ -18,8 +18,8 @@ namespace medulla {
 // Of one device while it touches; while it holds, of the mean of where it wants what it holds, which turns with it.
 struct DeviceMotion {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s, over the last tick
-  // m: the way that counts, in this dynamics frame so far and in the three before; in a grip from where the path that
-  // the dynamics was given ended to where it ended next.
+  // m: the way that counts, in this dynamics frame so far and in the three before; from where the path that the
+  // dynamics was given ended to where it ended next, of a contact along its normal.
   std::array<Eigen::Vector3d, 4> way{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
                                      Eigen::Vector3d::Zero()};
   std::array<Eigen::Vector3d, 4> wayAcross = way;  // m, likewise, across the normal of a contact

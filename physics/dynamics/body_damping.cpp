@@ -18,7 +18,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // Velocities are v = linear + angular x (x - centre). Vectors as (x, y, z, 0).
-struct RigidMotion {
+struct RigidLanes {
   Lanes centre, linear, angular;
 };
 
@@ -68,10 +68,10 @@ Vector3d vectorOf(const Lanes& v) {
 
 // The rigid motion with the spheres' linear and orbital angular momentum: sums about the body's first sphere, moved to
 // the centre of mass by Steiner's theorem.
-RigidMotion freeMotion(const WorldData& d, const BodyRange& r) {
+RigidLanes freeMotion(const WorldData& d, const BodyRange& r) {
   const Lanes reference = load(d.spheres.position[r.firstSphere]);
   const Moments m = momentsAbout(reference, d, r);
-  RigidMotion motion;
+  RigidLanes motion;
   const Lanes centre = m.first / splat(m.mass);
   motion.centre = reference + centre;
   motion.linear = m.momentum / splat(m.mass);
@@ -84,7 +84,7 @@ RigidMotion freeMotion(const WorldData& d, const BodyRange& r) {
 
 // The rotation about a point, or about a line through two, with the spheres' angular momentum there, seen from the
 // point's own motion.
-RigidMotion supportedMotion(const WorldData& d, const BodyRange& r) {
+RigidLanes supportedMotion(const WorldData& d, const BodyRange& r) {
   const Spheres& s = d.spheres;
   const auto placeOf = [&](const SupportPoint& p) {
     return p.sphere >= 0 ? load(s.position[r.firstSphere + p.sphere])
@@ -92,7 +92,7 @@ RigidMotion supportedMotion(const WorldData& d, const BodyRange& r) {
   };
   const SupportPoint& point = r.support.point;
   const Lanes zero = splat(0);
-  RigidMotion motion{placeOf(point), zero, zero};
+  RigidLanes motion{placeOf(point), zero, zero};
   if (point.sphere >= 0) motion.linear = load(s.velocity[r.firstSphere + point.sphere]);
   if (r.support.freedom == RigidFreedom::none) return motion;
   const Moments m = momentsAbout(motion.centre, d, r);
@@ -109,7 +109,7 @@ RigidMotion supportedMotion(const WorldData& d, const BodyRange& r) {
 
 // Against a motion that does not turn, which most bodies are left, and one that does.
 template <bool turns>
-void dampAgainst(const RigidMotion& rigid, double lost, const BodyRange& r, WorldData& d) {
+void dampAgainst(const RigidLanes& rigid, double lost, const BodyRange& r, WorldData& d) {
   Spheres& s = d.spheres;
   for (const int i : spheresOf(r)) {
     const Lanes v = load(s.velocity[i]), spin = load(s.angularVelocity[i]);
@@ -131,8 +131,8 @@ void dampBodies(WorldData& d, const Batch& batch) {
     const BodyRange& r = d.ranges[b];
     if (r.massDamping == 0) continue;
     const double lost = 1 - 1 / (1 + d.substep * r.massDamping);
-    const bool isFree = r.support.freedom == RigidFreedom::all, turns = r.support.freedom != RigidFreedom::none;
-    const RigidMotion rigid = isFree ? freeMotion(d, r) : supportedMotion(d, r);
+    const bool turns = r.support.freedom != RigidFreedom::none;
+    const RigidLanes rigid = isFree(r) ? freeMotion(d, r) : supportedMotion(d, r);
     turns ? dampAgainst<true>(rigid, lost, r, d) : dampAgainst<false>(rigid, lost, r, d);
   }
 }

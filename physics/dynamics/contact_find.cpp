@@ -87,7 +87,6 @@ bool outrunsContact(const WorldData& d, double time) {
   if (c.mode == ContactMode::none) return false;
   const double half = 0.5 * contactReach(d);
   for (std::size_t i = 0; i < c.ball.size(); ++i) {
-    if (c.inverseCellMass[i] == 0) continue;
     const Lanes v = load(d.spheres.velocity[i]) + crossProduct(load(d.spheres.angularVelocity[i]), load(c.arm[i]));
     const double farthest = half + 0.5 * c.ball[i].v[3];
     if (time * time * dotProduct(v, v) > farthest * farthest) return true;

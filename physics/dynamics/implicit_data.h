@@ -128,7 +128,6 @@ struct ImplicitData {
   // enough.
   std::vector<double> left, enough;
   std::vector<double> turning;  // J^1/2, per free body: root of twice its energy of turning, times the angle; 0: slow
-  double elasticBefore = 0;     // J, of all, where the step begins
   std::vector<double> workOfPaths, workOfLoads;  // J, per body, in this stage
   std::vector<EnergyBalance> bodies, islands;    // per body
   std::vector<int> island;                       // per body: the first one of its island

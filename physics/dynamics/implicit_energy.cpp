@@ -32,14 +32,13 @@ void setKinetic(const WorldData& d, ImplicitData& s, double EnergyBalance::*kine
 }
 
 // Returns the sum of all.
-double setElastic(const WorldData& d, ImplicitData& s, double EnergyBalance::*elastic) {
+void setElastic(const WorldData& d, ImplicitData& s, double EnergyBalance::*elastic) {
   std::fill(s.sums.begin(), s.sums.end(), 0);
-  const double links = linkEnergy(d, &s.sums);
+  linkEnergy(d, &s.sums);
   for (std::size_t b = 0; b < s.bodies.size(); ++b) s.bodies[b].*elastic = s.sums[b];
   std::fill(s.sums.begin(), s.sums.end(), 0);
-  const double surfaces = surfaceEnergy(d, &s.sums);
+  surfaceEnergy(d, &s.sums);
   for (std::size_t b = 0; b < s.bodies.size(); ++b) s.bodies[b].*elastic += s.sums[b];
-  return links + surfaces;
 }
 
 // What gravity, loads, contacts and paths give in the last stage, for the time of the whole step.
@@ -168,7 +167,7 @@ double kineticEnergy(const WorldData& d, ImplicitData& s) {
 
 void noteEnergyBefore(WorldData& d, ImplicitData& s) {
   setKinetic(d, s, &EnergyBalance::kineticBefore);
-  s.elasticBefore = setElastic(d, s, &EnergyBalance::elasticBefore);
+  setElastic(d, s, &EnergyBalance::elasticBefore);
   for (std::size_t b = 0; b < s.bodies.size(); ++b) {
     EnergyBalance& e = s.bodies[b];
     e.mass = s.bodyMass[b];

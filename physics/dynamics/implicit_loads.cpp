@@ -135,7 +135,7 @@ Resistance resistanceOf(const Drag& drag) {
 // weight on a slope does so without creeping. With the energy l^2 / (2 s) l = c (l0 - s v), where c <= 1 is Coulomb's
 // limit, is passive: its work is l.v = (l0 - l / c).l / s <= (l0^2 - l^2) / (2 s). Between steps of different durations
 // the force stays, not the impulse, and s may change as well: a ledger says what has really been taken in, and
-// workOfLoads() lets no more than that come back.
+// sumWorkOfLoads() lets no more than that come back.
 void settleContact(const WorldData& d, ImplicitData& s, std::size_t k, LoadRow* rows) {
   PointLoad& load = s.loads[k];
   const Contact& c = d.contact.contacts[load.index];

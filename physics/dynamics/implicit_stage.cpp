@@ -268,7 +268,7 @@ void setEnough(const WorldData& d, ImplicitData& s, double share) {
       const double external = impulseEnergy(
           d, d.ranges[b], [&](int quad) { return Vector3d(vectorOf(s.residual[quad]) - vectorOf(s.balance[quad])); });
       const double weight = s.duration * vectorOf(d.gravity).norm() * std::sqrt(s.bodyMass[b]);
-      size = std::min(size, std::sqrt(external) + weight + s.turning[b] + std::sqrt(2 * s.elasticBefore));
+      size = std::min(size, std::sqrt(external) + weight + s.turning[b] + std::sqrt(2 * s.bodies[b].elasticBefore));
     }
     const double enough = share * size + least;
     s.enough[b] = enough * enough;

@@ -71,9 +71,6 @@ double product(const Motion& a, const Motion& b);
 void addScaled(double f, const Motion& b, Motion& a);  // a += f b
 void hold(const std::vector<Quad>& freedom, Motion& m);
 
-inline bool isFree(const BodyRange& range) {
-  return range.support.freedom == RigidFreedom::all;
-}
 // Calls visit(mass, position, quad of its motion) for all of a body that has a motion of its own.
 template <class Visit>
 void visitMasses(const WorldData& d, const BodyRange& range, const Visit& visit) {

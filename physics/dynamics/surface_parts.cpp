@@ -177,8 +177,7 @@ void changeParts(WorldData& d) {
   partsChanged(d);
   wholeMotions(d, now);
   for (std::size_t b = 0; b < now.size(); ++b) {
-    const bool isFree = d.ranges[b].support.freedom == RigidFreedom::all;
-    if (d.bodies[b].surface != SurfaceMode::contact || !isFree || now[b].mass == 0) continue;
+    if (d.bodies[b].surface != SurfaceMode::contact || !isFree(d.ranges[b]) || now[b].mass == 0) continue;
     addMomenta(d, static_cast<int>(b), now[b], before[b].linear - now[b].linear, before[b].angular - now[b].angular);
   }
 }

@@ -215,6 +215,9 @@ struct BodyRange {
   RigidSupport support;        // damped is motion against the rigid motions that it leaves
   int batch = 0;               // bodies of different batches share no group of spheres or links
 };
+inline bool isFree(const BodyRange& range) {
+  return range.support.freedom == RigidFreedom::all;
+}
 // Its spheres' numbers, to loop over; std::views::iota is beyond clang++ 14.
 struct SphereNumbers {
   struct Iterator {
