@@ -156,6 +156,24 @@ TEST(DrivenSphere, ASteadyDriveIsFreeMotionOfTheWholeBody) {
   EXPECT_LT(world.energies().elastic, 1e-9 * rest);
 }
 
+TEST(DrivenSphere, LeavesWhatIsFixedWhereItIs) {
+  for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit}) {
+    BodyDescription b = tube(SurfaceMode::full);
+    b.fixed = {{0, FixedFreedom::all}};
+    b.fixedNodes = {0, 1, 2};
+    b.driven = {DrivenSphere{.sphere = 4, .velocity = Vector3d(0.01, 0, 0)}};
+    WorldSettings settings = weightless();
+    settings.integrator = integrator;
+    World world(settings, {b});
+    const WorldData& d = world.data();
+    const auto nodeAt = [&](int node) { return vectorAt(d.nodes.position, d.ranges[0].node[node]); };
+    const Vector3d sphere = vectorOf(d.spheres.position[0]), node = nodeAt(2);
+    for (int frame = 0; frame < 10; ++frame) world.advance({});
+    EXPECT_EQ(vectorOf(d.spheres.position[0]), sphere);
+    EXPECT_EQ(nodeAt(2), node);
+  }
+}
+
 TEST(DrivenSphere, RefusedWhereItContradictsItself) {
   const auto message = [](const DrivenSphere& drive) {
     BodyDescription b = tube(SurfaceMode::skin);

@@ -263,6 +263,20 @@ TEST(ImplicitContact, FastBodiesDoNotPassEachOther) {
 }
 
 // What friction has taken in, F^2 / (2 k) with k = pi (2 + pi) m / T^2 of each contact, is all that it may give back.
+TEST(ImplicitContact, NorDoesADrivenOnePassWhatLiesInItsWay) {
+  for (int k = 0; k < 8; ++k) {
+    const double speed = 8;
+    const auto one = [](const std::string& name, double y) {
+      return ballBody(name, ballModel({{{0, 0, 0}, kRadius}}, {}), {0, y, 0}, 0.2);
+    };
+    BodyDescription driven = one("driven", 0.1 + speed * 0.005 * k / 8);
+    driven.driven = {DrivenSphere{.sphere = 0, .velocity = {0, -speed, 0}}};
+    World world(contactSettings(1, Vector3d::Zero()), {driven, one("resting", 0)});
+    runUntil(world, 0.06);
+    EXPECT_LT(placeOf(world, 1).y(), placeOf(world, 0).y() - kRadius) << k;
+  }
+}
+
 TEST(ImplicitContact, FrictionThatHeldGivesBackNoMoreThanItTookIn) {
   const double slope = 0.35;
   BodyDescription soft = raft("raft", {0, kRadius, 0}, 0.5);

@@ -245,8 +245,11 @@ void addDrives(WorldData& d, const BodyDescription& body, const BodyRange& r) {
     drive.frequency = driven.frequency;
     drive.phase = driven.phase;
     d.drives.push_back(drive);
-    for (int i = 0; i < r.sphereCount; ++i) d.spheres.velocity[r.firstSphere + i] = drive.velocity;
-    for (int i : r.node) setVector(d.nodes.velocity, i, vectorOf(drive.velocity));
+    d.spheres.velocity[drive.sphere] = drive.velocity;
+    for (const int i : spheresOf(r))
+      if (d.spheres.groups[i / 4].inverseMass[i % 4] > 0) d.spheres.velocity[i] = drive.velocity;
+    for (const int i : r.node)
+      if (d.nodes.inverseMass[i] > 0) setVector(d.nodes.velocity, i, vectorOf(drive.velocity));
   }
 }
 
