@@ -176,6 +176,7 @@ struct Update {
 Update updateOf(const std::string& path, const GoldenOptions& options, const std::string& renderedWith) {
   Update update;
   update.folder = goldenFolderOf(path, options);
+  requireNameFree(path, update.folder);
   const std::string scene = fs::proximate(fs::absolute(path), fs::absolute(update.folder)).string();
   const bool whole = std::any_of(options.update.begin(), options.update.end(),
                                  [&](const std::string& name) { return namesScene(name, path); });
