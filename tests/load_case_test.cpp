@@ -229,6 +229,17 @@ TEST_F(LoadCase, ARunUntilRestEndsWhenNothingMoves) {
   EXPECT_LT(farthest(end, longer), 0.01 * farthest(start, longer));
 }
 
+TEST_F(LoadCase, AMomentAfterRestIsThatOfRestAndNoted) {
+  const std::string end = folder / "end.obj", late = folder / "late.obj";
+  const ProgramResult run = runProgram({"replay", scene(kHeld, "40"), "--until-rest", "--surface-at", "end", end,
+                                        "--surface-at", "0", folder / "start.obj", "--surface-at", "39", late});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  ASSERT_EQ(complaints(run).size(), 1) << run.err;
+  EXPECT_TRUE(complaints(run)[0].starts_with(fmt::format("note: {} is the shape at rest, at ", late))) << run.err;
+  EXPECT_TRUE(complaints(run)[0].ends_with(" s: the run ended before 39 s")) << run.err;
+  EXPECT_EQ(readFile(late), readFile(end));
+}
+
 // A scene that has been still for less than a swing, though no load acts any more.
 TEST_F(LoadCase, ARunThatEndsBeforeRestIsSureSaysSinceWhenItIsStill) {
   const std::string load = fmt::format("{}<load plane='0 1 0 -0.06' force='0 0 1e-3' to='0.1'/>", kHeld);
