@@ -51,8 +51,9 @@ TEST_F(BadInput, CheckWarnsOfWhatRunsWarnOf) {
   EXPECT_EQ(run({"check", "own/organ.xml"}).err, "");
   add(fmt::format("<body name='twin' tissue='t' look='liver' model='{}/assets/gallbladder/gallbladder.model.xml'/>",
                   MEDULLA_SOURCE_DIR));
-  const std::vector<std::string> changes{"--set", "dynamics.sleep_after=1", "--set", "dynamics.integrator=implicit",
-                                         "--set", "clock.duration=0.02",    "--set", "output.golden=0"};
+  const std::vector<std::string> changes{"--set", "dynamics.sleep_after=1",    "--set", "dynamics.integrator=implicit",
+                                         "--set", "clock.duration=0.02",       "--set", "output.golden=0",
+                                         "--set", "body.organ.surface=contact"};
   const auto warnings = [&](const char* verb) {
     std::vector<std::string> words{verb, "own/organ.xml"};
     words.insert(words.end(), changes.begin(), changes.end());
@@ -62,8 +63,9 @@ TEST_F(BadInput, CheckWarnsOfWhatRunsWarnOf) {
   };
   const std::vector<std::string> found = warnings("check");
   EXPECT_EQ(found, warnings("replay"));
-  ASSERT_EQ(found.size(), 2u);
+  ASSERT_EQ(found.size(), 3u);
   EXPECT_TRUE(found[0].starts_with("warning: bodies 'twin' and 'organ' overlap by ")) << found[0];
+  EXPECT_TRUE(found[2].starts_with("note: surface=\"contact\" is \"full\"")) << found[2];
 }
 
 TEST_F(BadInput, ATissueTooStiffForAnyStepIsRefusedWithItsScene) {
