@@ -126,6 +126,17 @@ static void resolveFixes(const Scene& scene, SceneBody& body) {
                     body.name));
 }
 
+// Of those fixed by number the file alone tells.
+static void requireDrivenFree(const Scene& scene, const SceneBody& body) {
+  for (std::size_t k = 0; k < body.driven.size(); ++k)
+    for (const FixedSphere& fixed : body.fixed)
+      if (fixed.sphere == body.driven[k].sphere)
+        throw valueError(
+            scene, body.drivenAt[k], "sphere",
+            fmt::format("body \"{}\" drives sphere {}, which a <fix> of its surface holds: expected one of the two",
+                        body.name, fixed.sphere));
+}
+
 static void resolveLoads(const Scene& scene, SceneBody& body) {
   const SoftBodyModel& model = *body.model;
   for (const SceneLoad& load : body.loads) {
@@ -143,6 +154,15 @@ static Reference loadReference(const Scene& scene, const SceneBody& body) {
   return readReference(body.referencePath, *body.model);
 }
 
+static void requireSphere(const Scene& scene, const SceneBody& body, int line, const std::string& attribute,
+                          const char* verb, int sphere) {
+  const int spheres = static_cast<int>(body.model->spheres.size());
+  if (sphere >= spheres)
+    throw valueError(
+        scene, line, attribute,
+        fmt::format("body \"{}\" {} sphere {}, its model has spheres 0 to {}", body.name, verb, sphere, spheres - 1));
+}
+
 static void loadModels(Scene& scene) {
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     SceneBody& body = scene.bodies[b];
@@ -152,17 +172,10 @@ static void loadModels(Scene& scene) {
       requireFile(scene, body.line, "model", fmt::format("model of body \"{}\"", body.name), body.modelPath);
       body.model = std::make_shared<const SoftBodyModel>(readModel(body.modelPath));
     }
-    const int spheres = static_cast<int>(body.model->spheres.size());
-    for (const FixedSphere& fixed : body.fixed)
-      if (fixed.sphere < 0 || fixed.sphere >= spheres)
-        throw inputError(scene.path, body.line,
-                         fmt::format("body \"{}\" fixes sphere {}, its model has spheres 0 to {}", body.name,
-                                     fixed.sphere, spheres - 1));
-    for (const DrivenSphere& driven : body.driven)
-      if (driven.sphere >= spheres)
-        throw inputError(scene.path, body.line,
-                         fmt::format("body \"{}\" drives sphere {}, its model has spheres 0 to {}", body.name,
-                                     driven.sphere, spheres - 1));
+    for (std::size_t k = 0; k < body.fixed.size(); ++k)
+      requireSphere(scene, body, body.fixedAt[k], "spheres", "fixes", body.fixed[k].sphere);
+    for (std::size_t k = 0; k < body.driven.size(); ++k)
+      requireSphere(scene, body, body.drivenAt[k], "sphere", "drives", body.driven[k].sphere);
   }
 }
 
@@ -213,6 +226,7 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
   loadModels(scene);
   for (SceneBody& body : scene.bodies) {
     resolveFixes(scene, body);
+    requireDrivenFree(scene, body);
     resolveLoads(scene, body);
     loaded.references.push_back(loadReference(scene, body));
   }

@@ -34,6 +34,13 @@ int numberOf(const fs::path& path) {
   return number >= 0 && path.filename() == pngName(number) ? number : -1;
 }
 
+bool isPng(const fs::path& path) {
+  constexpr char signature[] = {'\x89', 'P', 'N', 'G', '\r', '\n', '\x1a', '\n'};
+  std::ifstream file(path, std::ios::binary);
+  char first[sizeof signature] = {};
+  return file.read(first, sizeof first) && std::memcmp(first, signature, sizeof first) == 0;
+}
+
 // A file that a power cut left short has its name already; its last chunk is missing then.
 bool isWholePng(const fs::path& path) {
   constexpr char end[] = {0, 0, 0, 0, 'I', 'E', 'N', 'D', '\xae', '\x42', '\x60', '\x82'};
@@ -114,14 +121,12 @@ int PngFolder::finish() {
   return slice_.whole ? removeLater() : 0;
 }
 
-// Who makes a film of the folder would have their end of another one behind this.
+// Who makes a film of the folder would have their end of another one behind this. A run leaves no gap: what stands
+// behind one is somebody's own.
 int PngFolder::removeLater() const {
-  std::vector<fs::path> later;
-  for (const auto& entry : fs::directory_iterator(folder_))
-    if (numberOf(entry.path()) >= slice_.last && !fs::is_directory(entry.symlink_status()))
-      later.push_back(entry.path());
-  for (const fs::path& picture : later) fs::remove(picture);
-  return static_cast<int>(later.size());
+  int number = slice_.last;
+  for (; isPng(folder_ / pngName(number)); ++number) fs::remove(folder_ / pngName(number));
+  return number - slice_.last;
 }
 
 PictureOutputs::PictureOutputs(const std::vector<std::string>& paths, const Settings& settings) {

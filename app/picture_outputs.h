@@ -14,7 +14,7 @@ namespace medulla {
 
 // A folder of numbered PNG files. They collect in DIR.A-B.part beside it and move in when all are there: a run that
 // ends early harms no earlier picture. Runs of other slices may fill the same folder at the same time; one of every
-// picture takes away what a longer run before it has left beyond its last.
+// picture takes away what a longer run before it has left: the PNG files that follow its last without a gap.
 class PngFolder {
  public:
   struct Slice {

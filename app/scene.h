@@ -41,6 +41,7 @@ struct SceneBody : BodyDescription {
   std::string referencePath;  // where another program puts its vertices at the end; empty: none
   std::vector<SceneFix> fixes;
   std::vector<SceneLoad> loads;
+  std::vector<int> fixedAt, drivenAt;  // lines, of each sphere fixed by number and each driven one
 };
 
 // What does not move: drawn if it has a look, holding bodies if it says so.

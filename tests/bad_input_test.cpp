@@ -51,8 +51,9 @@ TEST_F(BadInput, CheckWarnsOfWhatRunsWarnOf) {
   EXPECT_EQ(run({"check", "own/organ.xml"}).err, "");
   add(fmt::format("<body name='twin' tissue='t' look='liver' model='{}/assets/gallbladder/gallbladder.model.xml'/>",
                   MEDULLA_SOURCE_DIR));
-  const std::vector<std::string> changes{"--set", "dynamics.sleep_after=1", "--set", "dynamics.integrator=implicit",
-                                         "--set", "clock.duration=0.02",    "--set", "output.golden=0"};
+  const std::vector<std::string> changes{"--set", "dynamics.sleep_after=1",    "--set", "dynamics.integrator=implicit",
+                                         "--set", "clock.duration=0.02",       "--set", "output.golden=0",
+                                         "--set", "body.organ.surface=contact"};
   const auto warnings = [&](const char* verb) {
     std::vector<std::string> words{verb, "own/organ.xml"};
     words.insert(words.end(), changes.begin(), changes.end());
@@ -62,8 +63,9 @@ TEST_F(BadInput, CheckWarnsOfWhatRunsWarnOf) {
   };
   const std::vector<std::string> found = warnings("check");
   EXPECT_EQ(found, warnings("replay"));
-  ASSERT_EQ(found.size(), 2u);
+  ASSERT_EQ(found.size(), 3u);
   EXPECT_TRUE(found[0].starts_with("warning: bodies 'twin' and 'organ' overlap by ")) << found[0];
+  EXPECT_TRUE(found[2].starts_with("note: surface=\"contact\" is \"full\"")) << found[2];
 }
 
 TEST_F(BadInput, ATissueTooStiffForAnyStepIsRefusedWithItsScene) {
@@ -113,9 +115,23 @@ TEST_F(BadInput, OutputsThatAreCalledAsAnotherKindOfFileAreWrongUsage) {
   expectRefused(run({"replay", "own/organ.xml", "--surface-at", "end", "own/organ.xml"}), "ends in .obj", 2);
   expectRefused(run({"build", mesh, "-o", "own/organ.ply"}), "-o own/organ.ply: expected a file that ends in .xml", 2);
   expectRefused(run({"build", mesh, "-o", "m.xml", "--report", "own/organ.xml"}), "--report own/organ.xml: exp", 2);
+  for (const char* other : {"own/notes.md", "own/log.txt", "own/log"})
+    expectRefused(run({"replay", "own/organ.xml", "--log", other}), "ends in .csv", 2);
   EXPECT_EQ(read("own/organ.xml"), victim);
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"own"});
-  EXPECT_EQ(run({"replay", "own/organ.xml", "--log", "own/log.txt"}).exitCode, 0);
+}
+
+TEST_F(BadInput, AModelReplacesNoOtherXml) {
+  const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
+  folder.write("notes.xml", "not even XML");
+  for (const char* name : {"own/organ.xml", "notes.xml"}) {
+    const std::string victim = read(name);
+    expectRefused(run({"build", mesh, "-o", name, "--spheres", "1"}),
+                  std::string(name) + ": is no model: expected one to replace");
+    EXPECT_EQ(read(name), victim);
+  }
+  for (const char* again : {"first", "second"})
+    EXPECT_EQ(run({"build", mesh, "-o", "m.xml", "--spheres", "1"}).exitCode, 0) << again;
 }
 
 TEST_F(BadInput, DevicesAndPipesAreNoFiles) {

@@ -107,6 +107,18 @@ TEST_F(GoldenFolder, AnImageThatNoMomentNamesFailsUntilAnUpdateRemovesIt) {
   EXPECT_EQ(golden({}).exitCode, 0);
 }
 
+TEST_F(GoldenFolder, ImagesOfAnotherSceneOfTheNameAreKeptUntilThatHasGone) {
+  const std::string scene = read("own/organ.xml"), before = read("pictures/organ_8.png");
+  std::filesystem::create_directory(folder / "moved");
+  folder.write("moved/organ.xml", replaced(scene, "organ.csv", "../own/organ.csv"));
+  expectRefused(golden({"--update", "moved/organ.xml"}),
+                "moved/organ.xml: two scenes of the name organ for one folder of golden images: pictures/organ_");
+  EXPECT_TRUE(read("pictures/organ_8.png") == before);
+  std::filesystem::remove(folder / "own/organ.xml");
+  EXPECT_EQ(golden({"--update", "moved/organ.xml"}).exitCode, 0);
+  EXPECT_FALSE(read("pictures/organ_8.png") == before);
+}
+
 TEST_F(GoldenFolder, PicturesOfOthersAreNotedAndKept) {
   std::filesystem::copy(folder / "pictures/organ_8.png", folder / "pictures/organ copy.png");
   Image square = blackImage(8, 8);

@@ -156,7 +156,11 @@ TEST_F(OwnGolden, WhatCannotBeComparedIsSaid) {
   EXPECT_NE(golden({"own/organ.xml", "--dir", "none"})
                 .out.find("none/organ_8.png does not exist: --update own/organ.xml stores it\n"),
             std::string::npos);
-  expectRefused(golden({"--dir", "pictures", "--update", "liver"}), "--update liver: no such scene");
+  expectRefused(golden({"--dir", "pictures", "--update", "liver"}),
+                "--update liver: neither one of the scenes of this call (");
+  expectRefused(
+      golden({"--dir", "pictures", "--update", "own/other.xml", "own/organ.xml"}),
+      "--update own/other.xml: neither one of the scenes of this call (own/organ.xml) nor a moment of one; each");
   expectRefused(golden({"own/organ.xml", "./own/organ.xml", "--dir", "pictures"}), "two scenes of the name organ");
   const ProgramResult twice = golden({"--dir", "pictures", "--update", "own/organ.xml", "--update", "own/organ.xml"});
   EXPECT_EQ(twice.out, "pictures/organ_8.png written\npictures/organ_10.png written\n") << twice.err;

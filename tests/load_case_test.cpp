@@ -169,6 +169,14 @@ TEST_F(LoadCase, MistakesNameFileAndLine) {
   EXPECT_EQ(refusal("<fix vertices='far.csv'/>"),
             "far.csv:3: column vertex is '235', expected a whole number from 0 to 234");
   EXPECT_EQ(refusal("<fix plane='0 1 0 -5'/>"), "case.xml:4: no surface node of body \"pear\" lies in here");
+  const auto driven = [](int sphere) {
+    return fmt::format("<drive sphere='{}' axis='1 0 0' amplitude='0' frequency='1'/>", sphere);
+  };
+  EXPECT_EQ(refusal("\n<fix spheres='0 99'/>"),
+            "case.xml:5: body \"pear\" fixes sphere 99, its model has spheres 0 to 6");
+  EXPECT_EQ(refusal("\n" + driven(99)), "case.xml:5: body \"pear\" drives sphere 99, its model has spheres 0 to 6");
+  EXPECT_EQ(refusal(kHeld + ("\n" + driven(1))),
+            "case.xml:5: body \"pear\" drives sphere 1, which a <fix> of its surface holds: expected one of the two");
   const std::string few = scene("<fix sphere='-0.05 -0.07 0.02 0.012'/>");
   EXPECT_EQ(complaintOf([&] { loadScene(readScene(few)); }), "");
   EXPECT_EQ(complaintOf([&] {
@@ -227,6 +235,17 @@ TEST_F(LoadCase, ARunUntilRestEndsWhenNothingMoves) {
             0);
   EXPECT_GT(farthest(start, longer), 1e-3);
   EXPECT_LT(farthest(end, longer), 0.01 * farthest(start, longer));
+}
+
+TEST_F(LoadCase, AMomentAfterRestIsThatOfRestAndNoted) {
+  const std::string end = folder / "end.obj", late = folder / "late.obj";
+  const ProgramResult run = runProgram({"replay", scene(kHeld, "40"), "--until-rest", "--surface-at", "end", end,
+                                        "--surface-at", "0", folder / "start.obj", "--surface-at", "39", late});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  ASSERT_EQ(complaints(run).size(), 1) << run.err;
+  EXPECT_TRUE(complaints(run)[0].starts_with(fmt::format("note: {} is the shape at rest, at ", late))) << run.err;
+  EXPECT_TRUE(complaints(run)[0].ends_with(" s: the run ended before 39 s")) << run.err;
+  EXPECT_EQ(readFile(late), readFile(end));
 }
 
 // A scene that has been still for less than a swing, though no load acts any more.

@@ -127,7 +127,8 @@ TEST(Plot, RefusesInOneLineAndLeavesNothing) {
   EXPECT_EQ(runProgram({"plot", folder / "run.csv"}).exitCode, 2);
 }
 
-// What frames took is a file of its own, so that logs are equal in every run; its rows need not be the log's.
+// What frames took is a file of its own, so that logs are equal in every run; its rows need not be the log's, but the
+// time that they span should.
 TEST(Plot, DrawsWhatFramesTook) {
   const TemporaryFolder folder;
   folder.write("run.csv", shortLog());
@@ -136,6 +137,10 @@ TEST(Plot, DrawsWhatFramesTook) {
   const std::string script = plotScript(readLog(folder / "run.csv"), &times, "run", PlotFormat::svg);
   EXPECT_TRUE(has(script, "what a dynamics frame took, ms"));
   EXPECT_EQ(blockOf(script, "p5_1"), "0.02 1.5\n0.04 2.5\n");
+  const ProgramResult shorter =
+      runProgram({"plot", folder / "run.csv", "--frame-times", folder / "times.csv", "-o", folder / "picture.svg"});
+  EXPECT_TRUE(has(shorter.err, "run.csv ends at 0.2 s, ")) << shorter.err;
+  EXPECT_TRUE(has(shorter.err, "times.csv at 0.04 s: are they of one run?")) << shorter.err;
   folder.write("other.csv", "t,servo\n0.02,1\n");
   const ProgramResult r =
       runProgram({"plot", folder / "run.csv", "--frame-times", folder / "other.csv", "-o", folder / "picture.svg"});

@@ -195,6 +195,8 @@ TEST_F(Recording, EveryMistakeInTheFileIsNamedWithItsRow) {
       {"", xyz, "1 2 3\n1 nan 3\n", "r.txt:2: column 2 is 'nan', expected a finite number"},
       {"", xyz, "1 2 3\n1 1e999 3\n", "r.txt:2: column 2 is '1e999', expected a finite number"},
       {"", xyz, "1 2 30\n", "r.txt:1: position z is 30 m, expected within 20 m of the origin"},
+      {"", "<columns rate=\"10\" position=\"1 2 3\" grip=\"4\"/>", "1 2 3 0.2\n1 2 3 40\n",
+       "r.txt:2: grip is 40, expected 0 (open) to 1 (closed), or a <grip> in "},
       {"", named, "t,x,yy,z\n0,1,2,3\n", "r.txt:1: no column 'y'; did you mean"},
       {"", named, "t,x,y\x1b[31m,z\n0,1,2,3\n", "r.txt:1: no column 'y'; did you mean 't'?"},
       {"", named, "0 1 2 3\n", "r.txt:1: column 't' is wanted, but the file has no header"},

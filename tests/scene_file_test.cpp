@@ -196,7 +196,7 @@ TEST_F(SceneFile, MistakesInTheStructureNameTheLineAndWhatWasExpected) {
       {"<dynamics ", "<dynamics/><dynamics ", "x.xml:5: <scene> has more than 1 <dynamics>"},
       {"young=\"6e3\"", "young=\"6e3\" young=\"7e3\"",
        R"(x.xml:7: broken XML: an attribute is not of the form name="value", or stands twice)"},
-      {"<!-- tissues -->", "tissues", R"(x.xml:3: <scene> holds text "tissues", expected none)"},
+      {"<!-- tissues -->", "tissues", R"(x.xml:6: <scene> holds text "tissues", expected none)"},
       {"<!-- tissues -->", "<!ENTITY x>", "x.xml:6: <!...> inside an element is not understood"},
       {"<scene ", "<scone ", "x.xml:3: broken XML: an element is not closed where it was opened"},
       {"</scene>", "</scene><scene/>", "x.xml:26: broken XML: more than one element or text at the top"},

@@ -108,6 +108,13 @@ TEST(StabilityCommand, WritesMapAndTrials) {
   EXPECT_EQ(std::count(map.begin(), map.end(), '\n'), 1 + 3 * 4);
   EXPECT_EQ(std::count(trials.begin(), trials.end(), '\n'), 1 + 3 * static_cast<long>(tortureTrials().size()));
   EXPECT_NE(map.find("explicit,,10000,0.05,0,"), std::string::npos) << map;
+  const ProgramResult again = runProgram({"stability", scene, "-o", folder / "out", "--steps", "10", "--young", "1e4",
+                                          "--trial-steps", "50", "--methods", "explicit"});
+  ASSERT_EQ(complaints(again).size(), 1) << again.err;
+  EXPECT_NE(
+      again.err.find("out/trials.csv holds trials of implicit, implicit_2, which those of this call will replace"),
+      std::string::npos)
+      << again.err;
 }
 
 // Rows are on the disk as they are known; the command that was interrupted goes on from there, to the same tables.

@@ -7,6 +7,7 @@
 #include "app/commands/commands.h"
 #include "app/enum_names.h"
 #include "app/files/fix_text.h"
+#include "app/files/input_error.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/output_file.h"
@@ -143,6 +144,12 @@ std::vector<BuildJob> jobsOf(const BuildOptions& options) {
   return jobs;
 }
 
+// Scenes and recordings end in .xml, too.
+void requireReplaceable(const std::string& path) {
+  if (fs::exists(path) && !isModel(path))
+    throw inputError(path, 0, "is no model: expected one to replace, or a name that is free");
+}
+
 void requireDistinct(const BuildOptions& options, const std::vector<BuildJob>& jobs) {
   std::vector<std::string> outputs{options.reportPath}, inputs = options.fine;
   for (const BuildJob& job : jobs) {
@@ -151,6 +158,7 @@ void requireDistinct(const BuildOptions& options, const std::vector<BuildJob>& j
   }
   requireDistinctFiles(outputs, inputs);
   requireWritable(outputs);
+  for (const BuildJob& job : jobs) requireReplaceable(job.modelPath);
 }
 
 void readMeshes(const BuildOptions& options, std::vector<BuildJob>& jobs) {

@@ -176,6 +176,7 @@ struct Update {
 Update updateOf(const std::string& path, const GoldenOptions& options, const std::string& renderedWith) {
   Update update;
   update.folder = goldenFolderOf(path, options);
+  requireNameFree(path, update.folder);
   const std::string scene = fs::proximate(fs::absolute(path), fs::absolute(update.folder)).string();
   const bool whole = std::any_of(options.update.begin(), options.update.end(),
                                  [&](const std::string& name) { return namesScene(name, path); });
@@ -214,7 +215,11 @@ int updateImages(const std::vector<std::string>& scenes, const GoldenOptions& op
     const auto scene = std::find_if(scenes.begin(), scenes.end(), [&](const std::string& path) {
       return namesScene(name, path) || namesMomentOf(name, path);
     });
-    if (scene == scenes.end()) throw std::runtime_error("--update " + name + ": no such scene and no moment of one");
+    if (scene == scenes.end())
+      throw std::runtime_error(
+          fmt::format("--update {}: neither one of the scenes of this call ({}) nor a moment of one; each to be "
+                      "updated takes an --update",
+                      name, joined(scenes, ", ")));
     const std::vector<std::string> known = namesOf(momentsOf(readScene(*scene)));
     if (!namesScene(name, *scene) && std::find(known.begin(), known.end(), name) == known.end())
       throw std::runtime_error(fmt::format("--update {}: {} has no such moment", name, *scene));

@@ -125,6 +125,14 @@ std::vector<StrayImage> formerMoments(const std::string& scene, const std::strin
   return images;
 }
 
+void requireNameFree(const std::string& scene, const std::string& folder) {
+  for (const StrayImage& image :
+       imagesCalled(folder, [&](const std::string& name) { return namesMomentOf(name, scene); }))
+    if (fs::exists(image.scene) && !fs::equivalent(image.scene, scene))
+      throw std::runtime_error(fmt::format("{}: two scenes of the name {} for one folder of golden images: {} is of {}",
+                                           scene, stemOf(scene), image.path, image.scene));
+}
+
 std::vector<StrayImage> strayImages(const std::string& folder, const std::vector<std::string>& known) {
   return imagesCalled(folder, [&](const std::string& name) { return !isOneOf(name, known); });
 }

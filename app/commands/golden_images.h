@@ -37,6 +37,9 @@ struct StrayImage {
 // cannot be read, or were stored for it: moments that it no longer has.
 std::vector<StrayImage> formerMoments(const std::string& scene, const std::string& folder,
                                       const std::vector<std::string>& known);
+// Throws std::runtime_error where the folder holds such images that were stored for another scene, which is still
+// there.
+void requireNameFree(const std::string& scene, const std::string& folder);
 // All images of the folder that are not called as one of `known`.
 std::vector<StrayImage> strayImages(const std::string& folder, const std::vector<std::string>& known);
 

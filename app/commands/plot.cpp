@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <vector>
@@ -12,6 +13,15 @@
 
 namespace medulla {
 
+// No error: a log may be cut to what is to be seen.
+static void noteOtherRun(const LogTable& log, const LogTable& frameTimes) {
+  const double end = log.value.back()[0], other = frameTimes.value.back()[0];
+  const double frame = other / static_cast<double>(frameTimes.value.size());
+  if (std::abs(end - other) > 2 * frame)  // the log of a run against the clock is a frame behind
+    fmt::print(stderr, "note: {} ends at {:.6g} s, {} at {:.6g} s: are they of one run?\n", log.path, end,
+               frameTimes.path, other);
+}
+
 int runPlot(const PlotOptions& options) {
   const std::filesystem::path path = options.output;
   if (path.extension() != ".png" && path.extension() != ".svg")
@@ -23,8 +33,10 @@ int runPlot(const PlotOptions& options) {
   std::optional<LogTable> frameTimes;
   if (!options.frameTimes.empty()) frameTimes = readLog(options.frameTimes);
   const PlotFormat format = path.extension() == ".png" ? PlotFormat::png : PlotFormat::svg;
-  const std::optional<std::string> picture = runGnuplot(
-      plotScript(log, frameTimes ? &*frameTimes : nullptr, std::filesystem::path(options.log).stem().string(), format));
+  const std::string script =
+      plotScript(log, frameTimes ? &*frameTimes : nullptr, std::filesystem::path(options.log).stem().string(), format);
+  if (frameTimes) noteOtherRun(log, *frameTimes);
+  const std::optional<std::string> picture = runGnuplot(script);
   if (!picture)
     throw std::runtime_error(
         fmt::format("{}: gnuplot is not installed, expected it (Debian package gnuplot-nox)", options.output));

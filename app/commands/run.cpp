@@ -125,8 +125,12 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
   for (const SceneBody& body : scene.bodies)
     if (std::set<int>(body.fixedNodes.begin(), body.fixedNodes.end()).size() == body.model->restNodes.size())
       fmt::print(stderr, "note: every node of body '{}' is held\n", body.name);
-  if (scene.dynamics.sleepAfter > 0 && scene.dynamics.integrator == Integrator::implicit)
+  if (scene.dynamics.integrator != Integrator::implicit) return;
+  if (scene.dynamics.sleepAfter > 0)
     fmt::print(stderr, "warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
+  if (std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                  [](const SceneBody& body) { return body.surface == SurfaceMode::contact; }))
+    fmt::print(stderr, "note: surface=\"contact\" is \"full\": nodes are chosen under the explicit integrator only\n");
 }
 
 // What a run came to that was hardly meant. A run that ends before a tool's motion does says nothing of the tool.

@@ -26,18 +26,23 @@ class SurfaceRecorder {
             fmt::format("--surface-at {}: expected a time from 0 to {} s or \"end\"", time, loaded.scene.duration));
       requireWritable({request.path});
       moments_.push_back({time, {}});
-      paths_.push_back(request.path);
+      requests_.push_back(request);
     }
   }
   void afterFrame(const Simulation& simulation, bool last) { recordFrames(simulation, last, moments_); }
   void write(const Simulation& simulation) const {
-    for (std::size_t k = 0; k < paths_.size(); ++k)
-      writeSurface(paths_[k], simulation.world().bodies(), moments_[k].frame);
+    for (std::size_t k = 0; k < requests_.size(); ++k) {
+      const SurfaceRequest& request = requests_[k];
+      writeSurface(request.path, simulation.world().bodies(), moments_[k].frame);
+      if (request.time.value_or(0) > simulation.time() + 1e-9)
+        fmt::print(stderr, "note: {} is the shape at rest, at {:.6g} s: the run ended before {:.6g} s\n", request.path,
+                   simulation.time(), *request.time);
+    }
   }
 
  private:
   std::vector<RecordedFrame> moments_;
-  std::vector<std::string> paths_;  // one each
+  std::vector<SurfaceRequest> requests_;  // one each
 };
 
 class CacheRecorder {

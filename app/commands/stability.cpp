@@ -11,6 +11,8 @@
 #include "app/files/gnuplot.h"
 #include "app/files/output_file.h"
 #include "app/files/stability_file.h"
+#include "app/files/text.h"
+#include "app/files/text_file.h"
 #include "app/files/trial_journal.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
@@ -169,6 +171,22 @@ StabilityTables runTrials(const StabilityOptions& options, const BodyDescription
   return out;
 }
 
+// Rows of an earlier call may be of another scene: none is taken along.
+void noteReplaced(const std::string& table, const std::vector<TortureMethod>& methods) {
+  if (!fs::exists(table)) return;
+  const std::string text = readTextFile(table);
+  std::vector<std::string> gone;
+  for (const TortureMethod& known : tortureMethods()) {
+    const auto isKnown = [&](const TortureMethod& method) { return method.name == known.name; };
+    if (std::none_of(methods.begin(), methods.end(), isKnown) &&
+        text.find("\n" + known.name + ",") != std::string::npos)
+      gone.push_back(known.name);
+  }
+  if (!gone.empty())
+    fmt::print(stderr, "note: {} holds trials of {}, which those of this call will replace\n", table,
+               joined(gone, ", "));
+}
+
 void writeTables(const fs::path& folder, const std::string& title, const StabilityTables& tables) {
   writeStability((folder / "map.csv").string(), tables.map);
   writeStability((folder / "trials.csv").string(), tables.trials);
@@ -190,6 +208,7 @@ int runStability(const StabilityOptions& options) {
   requireWritable(outputs);
   outputs.push_back(kept);
   requireDistinctOutputs(loaded, options.run, outputs);
+  noteReplaced((folder / "trials.csv").string(), methods);
   TrialJournal journal(kept, motionHash(loaded));
   const StabilityTables tables = runTrials(options, body, methods, journal);
   writeTables(folder, loaded.scene.name, tables);

@@ -224,6 +224,14 @@ void writeModel(const std::string& path, const SoftBodyModel& model) {
   file.commit();
 }
 
+bool isModel(const std::string& path) {
+  try {
+    return rootElementOf(path) == modelRules().front().element;
+  } catch (const std::runtime_error&) {
+    return false;
+  }
+}
+
 SoftBodyModel readModel(const std::string& path) {
   // Another version may have other elements: it is the first thing to be told.
   const auto checkVersion = [](const XmlElement& root) {

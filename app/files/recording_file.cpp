@@ -134,6 +134,9 @@ std::vector<Row> readTable(std::string_view text, const std::string& name, const
   for (bool more = header.empty() || rows.next(); more; more = rows.next()) {
     rows.requireCells(count, expected);
     out.push_back(rowAt(rows, layout, columns, out.size()));
+    if (const double grip = out.back().grip; !map.hasOwnGrip && (grip < 0 || grip > 1))
+      rows.fail(fmt::format("grip is {}, expected 0 (open) to 1 (closed), or a <grip> in {} that says what it means",
+                            grip, map.path));
   }
   if (out.empty()) throw inputError(name, 0, "no rows after the header, expected at least one");
   return out;

@@ -36,6 +36,7 @@ void useJigsaws(int arm, RecordingMap& map) {
   map.layouts = {columns};
   map.gripOpen = 1;
   map.gripCloses = 0.2;  // rad
+  map.hasOwnGrip = true;
 }
 
 // geometry_msgs/PoseStamped as three programs write it: rostopic echo -p, bagpy, and ros2 topic echo --csv, which has
@@ -103,6 +104,7 @@ void readUnits(const XmlElement& e, RecordingMap& map) {
 void readGrip(const XmlElement& e, RecordingMap& map) {
   map.gripOpen = readNumber(e, "open", map.gripOpen);
   map.gripCloses = readNumber(e, "closes", map.gripCloses);
+  map.hasOwnGrip = map.hasOwnGrip || !e.where.empty();
   if (map.gripOpen == map.gripCloses) refuse(e, "closes", "the grip is open there, expected another value");
 }
 

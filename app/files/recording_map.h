@@ -39,6 +39,7 @@ struct RecordingMap {
   double metresPerUnit = 1;
   // The grip's column where the grip is fully open, and where it closes: kGripCloses of a trajectory's grip.
   double gripOpen = 0, gripCloses = 0.5;
+  bool hasOwnGrip = false;  // what these are is known; without it the column is a trajectory's, from 0 to 1
   // world = position + orientation * scale * mirrored; forces are only mirrored and turned.
   Eigen::Vector3d mirror = Eigen::Vector3d::Ones();  // 1 or -1 per axis
   double scale = 1;

@@ -144,6 +144,7 @@ void readFixations(const XmlElement& body, const std::string& scenePath, SceneBo
     for (const int sphere : readIntegers(*fix, "spheres", 0, kNotNegative)) {
       if (!taken.insert(sphere).second) refuse(*fix, "spheres", "sphere " + std::to_string(sphere) + " is fixed twice");
       out.fixed.push_back({sphere, freedom});
+      out.fixedAt.push_back(fix->line);
     }
   }
 }
@@ -170,14 +171,14 @@ std::vector<SceneLoad> readLoads(const XmlElement& body, const std::string& scen
   return out;
 }
 
-std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::vector<FixedSphere>& fixed) {
-  std::vector<DrivenSphere> out;
+void readDrivenSpheres(const XmlElement& body, SceneBody& out) {
   for (const XmlElement* drive : childrenOf(body, "drive")) {
     DrivenSphere d;
     d.sphere = readInteger(*drive, "sphere", d.sphere, kNotNegative);
     const auto isThis = [&](const auto& other) { return other.sphere == d.sphere; };
-    if (std::any_of(fixed.begin(), fixed.end(), isThis)) refuse(*drive, "sphere", "this sphere is fixed");
-    if (std::any_of(out.begin(), out.end(), isThis)) refuse(*drive, "sphere", "this sphere is driven twice");
+    if (std::any_of(out.fixed.begin(), out.fixed.end(), isThis)) refuse(*drive, "sphere", "this sphere is fixed");
+    if (std::any_of(out.driven.begin(), out.driven.end(), isThis))
+      refuse(*drive, "sphere", "this sphere is driven twice");
     d.axis = readVector(*drive, "axis", d.axis);
     if (d.axis.isZero()) refuse(*drive, "axis", "expected a direction");
     d.amplitude = readNumber(*drive, "amplitude", d.amplitude, {.low = 0, .most = kAnyLength.most});
@@ -185,9 +186,9 @@ std::vector<DrivenSphere> readDrivenSpheres(const XmlElement& body, const std::v
     d.phase = readNumber(*drive, "phase", d.phase);
     d.velocity = readVector(*drive, "velocity", d.velocity);
     d.freedom = readEnum(*drive, "dof", d.freedom);
-    out.push_back(d);
+    out.driven.push_back(d);
+    out.drivenAt.push_back(drive->line);
   }
-  return out;
 }
 
 LinkFactors readLinkFactors(const XmlElement& links) {
@@ -234,7 +235,7 @@ void readBodies(const XmlElement& root, Scene& scene) {
     if (e->find("reference")) body.referencePath = readPath(*e, "reference", scene.path);
     readFixations(*e, scene.path, body);
     body.loads = readLoads(*e, scene.path);
-    body.driven = readDrivenSpheres(*e, body.fixed);
+    readDrivenSpheres(*e, body);
     body.factors = readLinkFactors(onlyChild(*e, "links"));
     scene.bodies.push_back(std::move(body));
   }

@@ -59,6 +59,7 @@ void copyText(const std::string& path, const tinyxml2::XMLText& text, XmlElement
     throw inputError(path, text.GetLineNum(), "<" + out.name + ">: text in several pieces, expected one");
   out.text = value.substr(start, value.find_last_not_of(" \t\r\n") + 1 - start);
   out.textLine = text.GetLineNum();
+  out.textWhere = place(path, out.textLine);
 }
 
 XmlElement copyElement(const std::string& path, const tinyxml2::XMLElement& element) {
@@ -115,7 +116,7 @@ void checkElement(const XmlElement& element, const XmlRules& rules) {
   const XmlRule& rule = ruleOf(rules, element.name);
   checkAttributes(element, rule);
   if (!rule.text && !element.text.empty()) {
-    throw complaint(element.where,
+    throw complaint(element.textWhere,
                     "<" + element.name + "> holds text " + inQuotes(element.text, '"') + ", expected none");
   }
   std::vector<std::string> known;

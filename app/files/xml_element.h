@@ -22,6 +22,7 @@ struct XmlElement {
   std::vector<XmlElement> children;
   std::string text;  // from its first character that is not white space
   int textLine = 0;
+  std::string textWhere;
 
   const XmlAttribute* find(const std::string& attribute) const;  // nullptr where absent
 };
