@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <string_view>
 
 #include "app/commands/commands.h"
 #include "app/commands/rest_watch.h"
@@ -71,8 +72,12 @@ void usageError(const std::string& option, const std::string& value, const std::
   throw CLI::ValidationError(value.empty() ? option : option + " " + value, "expected " + expected);
 }
 
-void requireEnding(const std::string& option, const std::string& path, const std::string& ending) {
-  if (!path.empty() && !path.ends_with(ending)) usageError(option, path, "a file that ends in " + ending);
+void refuseOtherKinds(const std::string& option, const std::string& path, const std::string& ending) {
+  constexpr std::string_view kinds[] = {".xml", ".xsd", ".csv",  ".cache", ".obj",  ".off",  ".ply", ".stl",
+                                        ".mp4", ".gif", ".webm", ".png",   ".webp", ".html", ".svg", ".md",
+                                        ".c",   ".h",   ".cpp",  ".py",    ".sh",   ".json", ".yml"};
+  for (const std::string_view kind : kinds)
+    if (kind != ending && path.ends_with(kind)) usageError(option, path, "a file that ends in " + ending);
 }
 
 template <typename T>
@@ -124,9 +129,9 @@ RunOptions runOptions(const RunArguments& a) {
   }
   options.trajectories = filesByTool("--trajectory", a.trajectories);
   options.records = filesByTool("--record", a.records);
-  for (const auto& [tool, path] : options.records) requireEnding("--record", path, ".csv");
-  requireEnding("--log", a.log, ".csv");
-  requireEnding("--frame-times", a.frameTimes, ".csv");
+  for (const auto& [tool, path] : options.records) refuseOtherKinds("--record", path, ".csv");
+  refuseOtherKinds("--log", a.log, ".csv");
+  refuseOtherKinds("--frame-times", a.frameTimes, ".csv");
   options.logPath = a.log;
   options.logEveryTick = a.logRate == "tick";
   if (options.logEveryTick && a.log.empty()) usageError("--log-rate", a.logRate, "--log FILE with it");
@@ -134,7 +139,7 @@ RunOptions runOptions(const RunArguments& a) {
   for (const auto& request : a.surfaces) {
     SurfaceRequest r;
     r.path = request.at(1);
-    requireEnding("--surface-at", r.path, ".obj");
+    if (!r.path.ends_with(".obj")) usageError("--surface-at", r.path, "a file that ends in .obj");
     if (request[0] != "end") {
       r.time = parseNumber<double>(request[0]);
       if (!r.time) usageError("--surface-at", request[0], "a time in seconds or \"end\"");

@@ -28,8 +28,8 @@ BuildOptions buildOptions(const BuildArguments& a) {
     if (option->count() > 0 && s.method != BuildMethod::cover)
       usageError(option->get_name(), option->as<std::string>(),
                  "--method cover with it: of a skeleton it says nothing");
-  if (options.meshes.size() == 1) requireEnding("-o", options.output, ".xml");
-  requireEnding("--report", options.reportPath, ".csv");
+  if (options.meshes.size() == 1) refuseOtherKinds("-o", options.output, ".xml");
+  refuseOtherKinds("--report", options.reportPath, ".csv");
   if (!options.fine.empty() && options.fine.size() != options.meshes.size())
     usageError("--fine", options.fine.back(),
                fmt::format("one for each of {} meshes, not {}", options.meshes.size(), options.fine.size()));

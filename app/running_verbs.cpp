@@ -239,7 +239,7 @@ Verb addReplay(CLI::App& app) {
   return {c, [a] {
             RunOptions options = runOptions(a->run);
             options.untilRest = a->untilRest;
-            requireEnding("--cache", a->cache, ".cache");
+            refuseOtherKinds("--cache", a->cache, ".cache");
             options.cacheToWrite = a->cache;
             options.realtime = a->realtime;
             if (a->realtime && !a->cache.empty())

@@ -19,9 +19,9 @@ struct Verb {
 
 [[noreturn]] void usageError(const std::string& option, const std::string& value, const std::string& expected);
 
-// A usage error where the file that an option is to write has another ending than its kind: what stands under that
-// name would be lost by mistake. An empty path, of an option that was not given, passes.
-void requireEnding(const std::string& option, const std::string& path, const std::string& ending);
+// A usage error where the file that an option is to write has the ending of another kind: what stands under that name
+// would be lost by mistake. Endings of no known kind pass.
+void refuseOtherKinds(const std::string& option, const std::string& path, const std::string& ending);
 
 inline constexpr double kEndless = std::numeric_limits<double>::infinity();
 // Checks an option's words, each of them. CLI::Range lets NaN pass. `what`: how errors begin to say what is expected.

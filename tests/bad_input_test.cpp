@@ -115,10 +115,11 @@ TEST_F(BadInput, OutputsThatAreCalledAsAnotherKindOfFileAreWrongUsage) {
   expectRefused(run({"replay", "own/organ.xml", "--surface-at", "end", "own/organ.xml"}), "ends in .obj", 2);
   expectRefused(run({"build", mesh, "-o", "own/organ.ply"}), "-o own/organ.ply: expected a file that ends in .xml", 2);
   expectRefused(run({"build", mesh, "-o", "m.xml", "--report", "own/organ.xml"}), "--report own/organ.xml: exp", 2);
-  for (const char* other : {"own/notes.md", "own/log.txt", "own/log"})
+  for (const char* other : {"own/notes.md", "own/main.cpp", "own/scene.xsd"})
     expectRefused(run({"replay", "own/organ.xml", "--log", other}), "ends in .csv", 2);
   EXPECT_EQ(read("own/organ.xml"), victim);
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"own"});
+  EXPECT_EQ(run({"replay", "own/organ.xml", "--log", "own/log.txt"}).exitCode, 0);
 }
 
 TEST_F(BadInput, AModelReplacesNoOtherXml) {
