@@ -261,6 +261,23 @@ TEST(Contact, MomentaStayWhileBodiesCollide) {
   }
 }
 
+TEST(Contact, ABodyThatStartsInsideAStaticShapeIsReported) {
+  const auto overlapAt = [](double height) {
+    const StaticShape floor;
+    return World(settings(ContactMode::balls, 0.001), {ball("a", kBallRadius, {0, height, 0})}, {floor})
+        .startOverlaps();
+  };
+  EXPECT_TRUE(overlapAt(1.1 * kBallRadius).empty());
+  EXPECT_TRUE(overlapAt(0.999 * kBallRadius).empty());  // as what rests does
+  for (const double height : {0.5 * kBallRadius, -3 * kBallRadius}) {
+    const std::vector<BodyOverlap> found = overlapAt(height);
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].body0, 0);
+    EXPECT_EQ(found[0].body1, -1);
+    EXPECT_NEAR(found[0].depth, kBallRadius - height, 1e-12);
+  }
+}
+
 TEST(Contact, OverlapAtTheStartIsReportedAndPushedOutSlowly) {
   World world(
       settings(ContactMode::balls, 0.001),

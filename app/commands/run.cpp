@@ -118,9 +118,14 @@ static void printBuriedTools(const LoadedScene& loaded, const World& world) {
 void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world) {
   const Scene& scene = loaded.scene;
   printUnplayed(loaded, options.isExcerpt);
-  for (const BodyOverlap& o : world.startOverlaps())
-    fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n", scene.bodies[o.body0].name,
-               scene.bodies[o.body1].name, 1e3 * o.depth);
+  for (const BodyOverlap& o : world.startOverlaps()) {
+    const std::string& name = scene.bodies[o.body0].name;
+    if (o.body1 < 0)
+      fmt::print(stderr, "warning: body '{}' overlaps static shapes by {:.2g} mm at the start\n", name, 1e3 * o.depth);
+    else
+      fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n", name,
+                 scene.bodies[o.body1].name, 1e3 * o.depth);
+  }
   printBuriedTools(loaded, world);
   for (const SceneBody& body : scene.bodies)
     if (std::set<int>(body.fixedNodes.begin(), body.fixedNodes.end()).size() == body.model->restNodes.size())

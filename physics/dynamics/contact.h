@@ -31,10 +31,10 @@ struct StaticShape {
   double friction = 0.2;                           // as Tissue::friction
 };
 
-// Two bodies that overlap before anything has moved.
+// Two bodies that overlap before anything has moved, or a body and static shapes, by more than one does in use.
 struct BodyOverlap {
-  int body0 = 0, body1 = 0;
-  double depth = 0;  // m, the deepest
+  int body0 = 0, body1 = 0;  // -1: static shapes
+  double depth = 0;          // m, the deepest
 };
 
 // Largest penetration so far, in % of the smaller of the two radii in contact.

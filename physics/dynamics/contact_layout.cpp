@@ -145,17 +145,27 @@ void excludeWhatOverlapsAtRest(WorldData& d) {
   for (std::vector<std::uint32_t>& e : c.excluded) sortUnique(e);
 }
 
-void noteStartOverlaps(ContactData& c) {
+void noteStartOverlap(ContactData& c, int b0, int b1, double depth) {
+  const auto same = [&](const BodyOverlap& o) { return o.body0 == b0 && o.body1 == b1; };
+  const auto found = std::find_if(c.startOverlaps.begin(), c.startOverlaps.end(), same);
+  if (found == c.startOverlaps.end())
+    c.startOverlaps.push_back({b0, b1, depth});
+  else
+    found->depth = std::max(found->depth, depth);
+}
+
+void noteStartOverlaps(WorldData& d) {
+  constexpr double kInUse = 0.01;  // of the radius: what lies on something may begin so deep in it
+  ContactData& c = d.contact;
   forEachPair(c, [&](std::uint32_t i, std::uint32_t j, double gap, double) {
     const int b0 = c.colliders[i].body, b1 = c.colliders[j].body;
-    if (!(gap < 0) || b0 == b1) return;
-    const auto same = [&](const BodyOverlap& o) { return o.body0 == b0 && o.body1 == b1; };
-    const auto found = std::find_if(c.startOverlaps.begin(), c.startOverlaps.end(), same);
-    if (found == c.startOverlaps.end())
-      c.startOverlaps.push_back({b0, b1, -gap});
-    else
-      found->depth = std::max(found->depth, -gap);
+    if (gap < 0 && b0 != b1) noteStartOverlap(c, b0, b1, -gap);
   });
+  findStaticContacts(d, 0);
+  for (const Contact& contact : c.contacts)
+    if (-contact.gap > kInUse * contact.smallerRadius)
+      noteStartOverlap(c, c.bodyOf[contact.sphere[0]], -1, -contact.gap);
+  c.contacts.clear();
   std::sort(c.startOverlaps.begin(), c.startOverlaps.end(), [](const BodyOverlap& a, const BodyOverlap& b) {
     return a.body0 != b.body0 ? a.body0 < b.body0 : a.body1 < b.body1;
   });
@@ -177,7 +187,7 @@ void layOutContact(WorldData& d, const std::vector<StaticShape>& statics) {
   excludeWhatOverlapsAtRest(d);
   c.listsAreOld = true;
   listNeighbours(d);
-  noteStartOverlaps(c);
+  noteStartOverlaps(d);
 }
 
 }  // namespace medulla
