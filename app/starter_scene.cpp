@@ -30,19 +30,37 @@ struct Layout {
   Vector3d touch = Vector3d::Zero(), normal = Vector3d::UnitZ();
 };
 
-// The node towards the free end that faces the camera best.
-int touchedNode(const SoftBodyModel& m, const Layout& l, const std::vector<Vector3d>& normals) {
+struct SurfacePoint {
+  Vector3d at, normal;
+};
+
+// Its nodes, and the middles of triangles that are large: the nodes of a box of twelve triangles are corners, off which
+// a tool slides, and which are drawn rounded far behind it.
+std::vector<SurfacePoint> touchablePoints(const SoftBodyModel& m, double size) {
+  constexpr double kLarge = 0.2;  // of the body, a triangle's longest edge
+  std::vector<SurfacePoint> points;
+  const std::vector<Vector3d> normals = vertexNormals({m.restNodes, m.triangles});
+  for (std::size_t i = 0; i < normals.size(); ++i) points.push_back({m.restNodes[i], normals[i]});
+  for (const auto& [i, j, k] : m.triangles) {
+    const Vector3d &a = m.restNodes[i], &b = m.restNodes[j], &c = m.restNodes[k];
+    if (std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()}) > kLarge * size)
+      points.push_back({(a + b + c) / 3, (b - a).cross(c - a).normalized()});
+  }
+  return points;
+}
+
+// Towards the free end, facing the camera best.
+SurfacePoint touchedPoint(const SoftBodyModel& m, const Layout& l) {
   Vector3d wanted = l.box.center();
   wanted[l.axis] -= 0.15 * l.held * l.box.sizes()[l.axis];
   wanted.z() = l.box.max().z();
-  const auto distance = [&](std::size_t i) {
-    const double turnedAway = l.size * (1 - normals[i].z());
-    return (m.restNodes[i] - wanted).norm() + turnedAway;
+  const auto distance = [&](const SurfacePoint& p) {
+    const double turnedAway = l.size * (1 - p.normal.z());
+    return (p.at - wanted).norm() + turnedAway;
   };
-  std::size_t best = 0;
-  for (std::size_t i = 1; i < m.restNodes.size(); ++i)
-    if (distance(i) < distance(best)) best = i;
-  return static_cast<int>(best);
+  const std::vector<SurfacePoint> points = touchablePoints(m, l.size);
+  return *std::min_element(points.begin(), points.end(),
+                           [&](const SurfacePoint& a, const SurfacePoint& b) { return distance(a) < distance(b); });
 }
 
 // How far towards an end of the longest axis, in box lengths from the middle: 0.5 at the very end.
@@ -79,10 +97,9 @@ Layout layOutScene(const SoftBodyModel& m) {
   l.size = l.box.diagonal().norm();
   l.box.sizes().maxCoeff(&l.axis);
   l.held = l.axis == 1 || volumeBeyond(m, l, 1) > volumeBeyond(m, l, -1) ? 1 : -1;
-  const std::vector<Vector3d> normals = vertexNormals({m.restNodes, m.triangles});
-  const int node = touchedNode(m, l, normals);
-  l.touch = m.restNodes[node];
-  l.normal = normals[node];
+  const SurfacePoint touched = touchedPoint(m, l);
+  l.touch = touched.at;
+  l.normal = touched.normal;
   l.grain = std::min(l.size, kThicknesses * thicknessAt(m, l.touch));
   return l;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "app/files/log_table.h"
 #include "app/scene.h"
@@ -100,6 +101,23 @@ TEST(StarterScene, AToolThatHoldsStillFeelsAForceThatDoes) {
 }
 
 // A tool made for a tube's length would close far behind it.
+// Its nodes are corners alone, off which a tool slides, out of the picture.
+TEST(StarterScene, ABoxOfTwelveTrianglesIsTouchedOnAFace) {
+  const TemporaryFolder folder;
+  folder.write("box.obj",
+               "v -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\n"
+               "f 1 3 4\nf 1 4 2\nf 5 6 8\nf 5 8 7\nf 1 2 6\nf 1 6 5\nf 3 7 8\nf 3 8 4\nf 1 5 7\nf 1 7 3\nf 2 4 "
+               "8\nf 2 8 6\n");
+  ASSERT_EQ(makeStarter(folder, folder / "box.obj").exitCode, 0);
+  const std::string keys = readFile(folder / "mine/box.csv");
+  const std::size_t touch = keys.find("\n3.8,");
+  ASSERT_NE(touch, std::string::npos);
+  double x = 0, y = 0, z = 0;
+  ASSERT_EQ(std::sscanf(keys.c_str() + touch, " 3.8,%lf,%lf,%lf", &x, &y, &z), 3);
+  EXPECT_LT(std::max(std::abs(x), std::abs(y)), 0.5);
+  EXPECT_NEAR(z, 1, 1e-6);
+}
+
 TEST(StarterScene, TheToolIsNoThickerThanAThinBody) {
   const TemporaryFolder folder;
   const TriangleMesh mesh = cylinderMesh(1, 0.005, 12, 200);
