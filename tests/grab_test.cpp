@@ -262,6 +262,7 @@ static double offWhileShaken(double frequency, int ticksPerFrame, double& rms) {
     ToolRun run = grabbing();
     run.tool.stiffness = 4000;
     run.ticksPerFrame = ticks;
+    run.substeps = 9 * ticks;
     run.device = [&](double t) {
       const double x = 0.003 * ease(t, 0.6, 0.5) * std::sin(2 * std::numbers::pi * frequency * t);
       return deviceAt(approach(t) + x * Vector3d::UnitX(), t > 0.5 ? 1 : 0);

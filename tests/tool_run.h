@@ -22,6 +22,7 @@ struct ToolRun {
   bool blend = true;                                      // false: every tick at the newest frame
   std::vector<NodeGive> give{};                           // TouchableBody::give
   bool live = false;                                      // what was handed over waits for a frame
+  int substeps = 200;                                     // of the body, per frame
 
   void run(double duration, const std::function<void(double time, const ToolState&)>& each = {}) {
     const double frameDuration = ticksPerFrame * tickDuration;
@@ -37,7 +38,7 @@ struct ToolRun {
         if (each) each(time, servo.tools()[0]);
       }
       servo.handOver(frameDuration, loads);
-      const Eigen::Vector3d impulse = body.advance(live ? earlier : loads, frameDuration, 200);
+      const Eigen::Vector3d impulse = body.advance(live ? earlier : loads, frameDuration, substeps);
       earlier = loads;
       bodyImpulse += impulse;
       bodyImpulseLength += impulse.norm();
