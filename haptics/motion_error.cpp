@@ -32,7 +32,9 @@ void learnMotionError(const Eigen::Vector3d& gave, int ticks, int framesLate, do
     ridged.diagonal() *= 1 + kRidge;
     ridged.diagonal().array() += kLeast;
     error.perWay = ridged.inverse() * error.answers;
-    error.known = {{foretold * error.perWay, error.known[0]}};
+    // Gently: short frames say little each, and what they say differs.
+    const Eigen::Vector2d known = kept * error.known[0] + (1 - kept) * foretold * error.perWay;
+    error.known = {{known, error.known[0]}};
   }
   error.frames = {{{}, error.frames[0]}};
 }
