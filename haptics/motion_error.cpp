@@ -16,6 +16,7 @@ void noteFelt(const Eigen::Vector3d& force, const WayAndChange& ways, MotionErro
 void learnMotionError(const Eigen::Vector3d& gave, int ticks, int framesLate, double duration, MotionError& error) {
   constexpr double kMemory = 0.1;  // s, as of what else is learnt of tissue; of the squares alone half or twice as long
                                    // feels the same within a few per cent
+  constexpr double kGentle = 0.02;                 // s
   constexpr double kRidge = 0.01, kLeast = 1e-24;  // of the moments; m2: what is given off without a way says nothing
   if (error.frames[0].ticks < ticks) error.frames[0] = {};
   const MotionError::FeltFrame& frame = error.frames[framesLate];
@@ -33,7 +34,8 @@ void learnMotionError(const Eigen::Vector3d& gave, int ticks, int framesLate, do
     ridged.diagonal().array() += kLeast;
     error.perWay = ridged.inverse() * error.answers;
     // Gently: short frames say little each, and what they say differs.
-    const Eigen::Vector2d known = kept * error.known[0] + (1 - kept) * foretold * error.perWay;
+    const double former = std::exp(-duration / kGentle);
+    const Eigen::Vector2d known = former * error.known[0] + (1 - former) * foretold * error.perWay;
     error.known = {{known, error.known[0]}};
   }
   error.frames = {{{}, error.frames[0]}};
