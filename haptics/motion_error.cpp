@@ -16,7 +16,8 @@ void noteFelt(const Eigen::Vector3d& force, const WayAndChange& ways, MotionErro
 void learnMotionError(const Eigen::Vector3d& gave, int ticks, int framesLate, double duration, MotionError& error) {
   constexpr double kMemory = 0.1;  // s, as of what else is learnt of tissue; of the squares alone half or twice as long
                                    // feels the same within a few per cent
-  constexpr double kGentle = 0.02;                 // s
+  constexpr double kGentle = 0.02;                 // s; none kinks pushes of 5 ms frames by 2 mN, as slow as the memory
+                                                   // leaves a free ball that was sped up a tenth too light
   constexpr double kRidge = 0.01, kLeast = 1e-24;  // of the moments; m2: what is given off without a way says nothing
   if (error.frames[0].ticks < ticks) error.frames[0] = {};
   const MotionError::FeltFrame& frame = error.frames[framesLate];
@@ -33,7 +34,6 @@ void learnMotionError(const Eigen::Vector3d& gave, int ticks, int framesLate, do
     ridged.diagonal() *= 1 + kRidge;
     ridged.diagonal().array() += kLeast;
     error.perWay = ridged.inverse() * error.answers;
-    // Gently: short frames say little each, and what they say differs.
     const double former = std::exp(-duration / kGentle);
     const Eigen::Vector2d known = former * error.known[0] + (1 - former) * foretold * error.perWay;
     error.known = {{known, error.known[0]}};

@@ -262,7 +262,6 @@ TEST(ImplicitContact, FastBodiesDoNotPassEachOther) {
   }
 }
 
-// What friction has taken in, F^2 / (2 k) with k = pi (2 + pi) m / T^2 of each contact, is all that it may give back.
 TEST(ImplicitContact, NorDoesADrivenOnePassWhatLiesInItsWay) {
   for (int k = 0; k < 8; ++k) {
     const double speed = 8;
@@ -277,6 +276,7 @@ TEST(ImplicitContact, NorDoesADrivenOnePassWhatLiesInItsWay) {
   }
 }
 
+// What friction has taken in, F^2 / (2 k) with k = pi (2 + pi) m / T^2 of each contact, is all that it may give back.
 TEST(ImplicitContact, FrictionThatHeldGivesBackNoMoreThanItTookIn) {
   const double slope = 0.35;
   BodyDescription soft = raft("raft", {0, kRadius, 0}, 0.5);

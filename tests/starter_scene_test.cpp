@@ -100,7 +100,6 @@ TEST(StarterScene, AToolThatHoldsStillFeelsAForceThatDoes) {
   EXPECT_LT(std::sqrt(squares / count - mean * mean), 0.15 * mean);
 }
 
-// A tool made for a tube's length would close far behind it.
 // Its nodes are corners alone, off which a tool slides, out of the picture.
 TEST(StarterScene, ABoxOfTwelveTrianglesIsTouchedOnAFace) {
   const TemporaryFolder folder;
@@ -118,6 +117,7 @@ TEST(StarterScene, ABoxOfTwelveTrianglesIsTouchedOnAFace) {
   EXPECT_NEAR(z, 1, 1e-6);
 }
 
+// A tool made for a tube's length would close far behind it.
 TEST(StarterScene, TheToolIsNoThickerThanAThinBody) {
   const TemporaryFolder folder;
   const TriangleMesh mesh = cylinderMesh(1, 0.005, 12, 200);

@@ -31,7 +31,6 @@ void setKinetic(const WorldData& d, ImplicitData& s, double EnergyBalance::*kine
   for (std::size_t b = 0; b < s.bodies.size(); ++b) s.bodies[b].*kinetic = s.sums[b];
 }
 
-// Returns the sum of all.
 void setElastic(const WorldData& d, ImplicitData& s, double EnergyBalance::*elastic) {
   std::fill(s.sums.begin(), s.sums.end(), 0);
   linkEnergy(d, &s.sums);
