@@ -277,9 +277,40 @@ void setEnough(const WorldData& d, ImplicitData& s, double share) {
 
 }  // namespace
 
+namespace {
+
+// How a step of the iteration is found. The preconditioner alone costs one evaluation of forces instead of three or
+// four. Far from the solution the true derivative is not definite, and a way down is worth more than the tangent.
+enum class Way { preconditioner, derivative, definite };
+
+// Whether the preconditioner is the derivative but for what vanishes at rest: it knows nodes' neighbours and what
+// contacts and tools join in part only.
+bool isWhole(const WorldData& d, const ImplicitData& s) {
+  return d.nodes.dynamicEnd == 0 && s.rows.empty();
+}
+
+bool takeStep(WorldData& d, ImplicitData& s, const StageLoads& stage, Way way, bool goesOn, double& left) {
+  constexpr double kSolved = 0.03;
+  ++s.solves;
+  if (way != Way::preconditioner) {
+    s.iterations += solveSystem(d, s, kSolved, way == Way::derivative ? differentiate : applySystem);
+    return search(d, s, stage, left);
+  }
+  solvePreconditioner(d, s, goesOn);
+  s.image = s.residual;
+  const bool moved = search(d, s, stage, left);
+  for (std::size_t k = 0; k < s.motion.size(); ++k) {
+    store(s.direction[k], load(s.motion[k]) - load(s.kept[k]));
+    store(s.image[k], load(s.residual[k]) - load(s.image[k]));
+  }
+  return moved;
+}
+
+}  // namespace
+
 bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   constexpr int kIterations = 20;
-  constexpr double kSolved = 0.03, kClose = 0.1, kNear = 0.3;
+  constexpr double kClose = 0.1, kNear = 0.3;
   const double share = s.duration < d.substep ? 1e-6 : 1e-3;  // of two stages, or one
   if (d.contact.mode != ContactMode::none) {
     findContacts(d);
@@ -293,20 +324,24 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   evaluateResidual(d, s, stage);
   setEnough(d, s, share);
   double left = residualSize(s);
-  Operator derivative = differentiate;
+  Way way = isWhole(d, s) ? Way::preconditioner : Way::derivative;
   bool hasMoved = true;  // so far that the matrix of before is no longer close
+  bool goesOn = false;
   for (int i = 0; i < kIterations && left > 1; ++i) {
     const double before = left;
     s.dragsBefore = s.drags;
-    if (hasMoved) assembleSystem(d, s);
-    s.iterations += solveSystem(d, s, kSolved, derivative);
-    ++s.solves;
-    const bool moved = search(d, s, stage, left);
-    hasMoved = left > kClose * before;
-    // Far from the solution the true derivative is not definite, and a way down is worth more than the tangent.
-    if (left > kNear * before) {
-      if (derivative == applySystem && !moved) break;
-      derivative = applySystem;
+    if (hasMoved && !assembleSystem(d, s, way == Way::definite)) {
+      way = Way::definite;
+      assembleSystem(d, s, true);
+    }
+    const bool moved = takeStep(d, s, stage, way, goesOn, left);
+    goesOn = way == Way::preconditioner;
+    hasMoved = !goesOn && left > kClose * before;
+    if (way == Way::preconditioner && left > kClose * before) {
+      way = Way::derivative;
+    } else if (left > kNear * before) {
+      if (way == Way::definite && !moved) break;
+      way = Way::definite;
     }
   }
   return left <= kSettled;

@@ -41,7 +41,8 @@ inline int bodyOf(const ImplicitData& s, const LoadRow& row) {  // the first, wh
 }
 
 // link_stiffness.cpp: adds the links' stiffness and damping, times the squared duration, to `diagonal`; sets `beside`.
-void addLinkStiffness(const WorldData& d, ImplicitData& s);
+// `definite`: only what is positive semidefinite of it.
+void addLinkStiffness(const WorldData& d, ImplicitData& s, bool definite);
 // Of four links, whose places in ImplicitData::pairs are `pair`; -1: none.
 void addLinkBlocks(const LinkBlocks& m, const int (&pair)[4], ImplicitData& s);
 
@@ -61,11 +62,17 @@ void layOutMassOnFrames(const WorldData& d, ImplicitData& s);
 void addMassOnFrames(const WorldData& d, ImplicitData& s);
 
 // implicit_system.cpp
-void assembleSystem(WorldData& d, ImplicitData& s);
+// `definite`: the matrix is positive definite in any state. Else it is nearer to the derivative; false where it is not
+// definite and cannot be used.
+bool assembleSystem(WorldData& d, ImplicitData& s, bool definite);
 void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y);  // y = A x
 // Conjugate gradients: A change = -residual, to `tolerance` of the residual. Returns the iterations.
 using Operator = void (*)(WorldData& d, ImplicitData& s, const Motion& x, Motion& y);
 int solveSystem(WorldData& d, ImplicitData& s, double tolerance, Operator apply);
+// P change = -residual, with the preconditioner's matrix P. `goesOn`: the last step along ImplicitData::direction
+// changed the residual by ImplicitData::image; what that tells of the derivative is made use of, as conjugate gradients
+// would.
+void solvePreconditioner(WorldData& d, ImplicitData& s, bool goesOn);
 void applyRows(const ImplicitData& s, const Motion& x, Motion& y);  // y += the loads' part of A x
 double product(const Motion& a, const Motion& b);
 void addScaled(double f, const Motion& b, Motion& a);  // a += f b

@@ -183,9 +183,9 @@ static void setMasses(const WorldData& d, ImplicitData& s) {
   }
 }
 
-void assembleSystem(WorldData& d, ImplicitData& s) {
+bool assembleSystem(WorldData& d, ImplicitData& s, bool definite) {
   setMasses(d, s);
-  addLinkStiffness(d, s);
+  addLinkStiffness(d, s, definite);
   if (d.nodes.dynamicEnd > 0) {
     s.lumped = s.diagonal;
     std::fill(std::copy(s.beside.begin(), s.beside.end(), s.lumpedBeside.begin()), s.lumpedBeside.end(),
@@ -196,7 +196,7 @@ void assembleSystem(WorldData& d, ImplicitData& s) {
   } else {
     loadFactor(d, s, s.diagonal, s.beside);
   }
-  s.spheres.factorise();
+  return s.spheres.factorise();
 }
 
 void applySystem(WorldData& d, ImplicitData& s, const Motion& x, Motion& y) {
@@ -231,6 +231,17 @@ void applyRows(const ImplicitData& s, const Motion& x, Motion& y) {
       store(to, fma(splat(row.weight * rate), load(s.rowCoefficient[k]), load(to)));
     }
   }
+}
+
+void solvePreconditioner(WorldData& d, ImplicitData& s, bool goesOn) {
+  Motion& r = s.remaining;
+  r = s.residual;
+  negate(r);
+  hold(s.freedom, r);
+  precondition(d, s, r, s.change);
+  const double curvature = goesOn ? product(s.direction, s.image) : 0;
+  if (curvature > 0)
+    addScaled((product(r, s.direction) - product(s.change, s.image)) / curvature, s.direction, s.change);
 }
 
 int solveSystem(WorldData& d, ImplicitData& s, double tolerance, Operator apply) {

@@ -4,8 +4,10 @@
 
 // The links' stiffness matrices: G^T K G with the gradients G of their measures and K the stiffnesses between them
 // (Gauss and Newton), plus what a tension adds across the line. Both are positive semidefinite at any pose, so that
-// nothing has to be projected by eigenvalues; what is left out (moments times second derivatives of the angles, and the
-// negative stiffness of a compressed line) vanishes at rest and changes how fast an iteration converges, not to what.
+// nothing has to be projected by eigenvalues, but for a compressed line, which takes stiffness away: that belongs to
+// the derivative near a solution, and is left out of a matrix that has to be definite. What is left out always, moments
+// times second derivatives of the angles, vanishes at rest and changes how fast an iteration converges, not to what.
+// Tried: all of them to first order in the angles; assembling them takes the time that they spare.
 namespace medulla {
 
 namespace {
@@ -103,20 +105,22 @@ MEDULLA_INLINE void addArms(const LinkPose& f, LinkBlocks& m) {
   m.between = m.between + rowsCrossed(from0, back1) + transposed(rowsCrossed(transposed(m.line1), f.arm0));
 }
 
-// Of the elongation, and of a tension across the line.
-MEDULLA_INLINE Matrix3Lanes lineStiffness(const LinkGroup& g, const LinkPose& f, Lanes damped, Lanes h2) {
+// Of the elongation, whose damper goes by its stiffness at rest, and of a tension across the line.
+MEDULLA_INLINE Matrix3Lanes lineStiffness(const LinkGroup& g, const LinkPose& f, Lanes damped, Lanes h2,
+                                          bool definite) {
   Lanes slope, tension;
   elongationLaw(g, squareRoot(dot(f.line, f.line)), slope, tension);
-  const Lanes across = h2 * larger(tension, splat(0)) * f.inverseLength;
+  const Lanes across = h2 * (definite ? larger(tension, splat(0)) : tension) * f.inverseLength;
   Matrix3Lanes m = zeroMatrix();
   m.row[0].x = m.row[1].y = m.row[2].z = across;
-  addOuter((damped * slope - across) * f.n, f.n, m);
+  addOuter((fma(h2, slope, (damped - h2) * g.elongation) - across) * f.n, f.n, m);
   return m;
 }
 
-void setStiffness(const LinkGroup& g, const LinkPose& f, const Spheres& s, double duration, LinkBlocks& m) {
+void setStiffness(const LinkGroup& g, const LinkPose& f, const Spheres& s, double duration, bool definite,
+                  LinkBlocks& m) {
   const Lanes h2 = splat(duration * duration), damped = fma(splat(duration), g.relaxation, h2);
-  m.line = lineStiffness(g, f, damped, h2);
+  m.line = lineStiffness(g, f, damped, h2, definite);
   m.line0 = m.line1 = m.turn0 = m.between = m.turn1 = zeroMatrix();
   addTurning(g, f, s, damped, m);
   if (g.hasArms) addArms(f, m);
@@ -156,10 +160,10 @@ void addLinkBlocks(const LinkBlocks& m, const int (&pair)[4], ImplicitData& s) {
   });
 }
 
-void addLinkStiffness(const WorldData& d, ImplicitData& s) {
+void addLinkStiffness(const WorldData& d, ImplicitData& s, bool definite) {
   for (std::size_t group = 0; group < d.links.groups.size(); ++group) {
     LinkBlocks m;
-    setStiffness(d.links.groups[group], poseOfLinks(d, group), d.spheres, s.duration, m);
+    setStiffness(d.links.groups[group], poseOfLinks(d, group), d.spheres, s.duration, definite, m);
     int pair[4];
     for (int lane = 0; lane < 4; ++lane) {
       const int link = 4 * static_cast<int>(group) + lane;
