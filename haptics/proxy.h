@@ -28,7 +28,8 @@ struct Proxy {
   Eigen::Vector3d shading = Eigen::Vector3d::Zero();
   Eigen::Vector3d felt = Eigen::Vector3d::Zero();  // m, from the device to there, without friction; zero: not shaded
   Eigen::Vector3d device = Eigen::Vector3d::Zero(), surfaceMotion = Eigen::Vector3d::Zero();  // m, of the last tick
-  int lastBucket = -1;  // where the last sweep ended: the next is likely to end there, too
+  bool lookNext = false;  // whether it is outside, if the next tick finds it without a contact
+  int lastBucket = -1;    // where the last sweep ended: the next is likely to end there, too
   int contactCount = 0;
   std::array<ProxyContact, 3> contacts;
 

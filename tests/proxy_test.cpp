@@ -239,4 +239,25 @@ TEST(Proxy, ASwapOfFramesInMidSlideIsNotFelt) {
   EXPECT_LT(elsewhere, 3 * r.tool.stiffness * 0.06 * tickDuration);
 }
 
+// A pole of 36 triangles of 2 mm that trembles by most of that from tick to tick: some turn over as they pass a tool of
+// 3 mm, and the surface passes through itself. What it takes in for a tick it puts out again.
+TEST(Proxy, TrianglesThatTurnOverDoNotKeepItInside) {
+  ProxyRun r;
+  r.shape = ellipsoid(36, 60, 12, 0);
+  r.ticksPerFrame = 1;
+  r.tool.radius = 0.003;
+  r.device = [](double t) { return Vector3d(0.105 - 0.02 * std::min(1.0, t / 0.3), 0, 0); };
+  r.motion = [random = TestRandom{8}](const Vector3d& rest, double time) mutable {
+    const Vector3d tremor = random.vector(rest.x() > 0.09 ? 0.0015 : 0);
+    return Vector3d(rest + std::min(1.0, time / 0.1) * tremor);
+  };
+  int touched = 0, inside = 0;
+  r.run([&](double, const ToolState& tool, const BlendedSurface& surface, double alpha) {
+    touched += tool.inContact;
+    inside += isInside(surface, alpha, tool.proxy);
+  });
+  EXPECT_GT(touched, 500);
+  EXPECT_LT(inside, 10);
+}
+
 }  // namespace medulla
