@@ -25,11 +25,12 @@ static BlendedSurface pile(int triangles) {
   return surface;
 }
 
-// A still tool, on all that it has touched or `away` (m) from it; a second forgets all but 1/e of what it touches.
-static void fade(double duration, ContactPatch& patch, double away = 0) {
+// A still tool of 5 mm, on all that it has touched or `away` (m) from it; a second forgets all but 1/e of what it
+// touches.
+static void fade(double duration, ContactPatch& patch, const Eigen::Vector3d& away = Eigen::Vector3d::Zero()) {
   static const BlendedSurface surface = pile(2 * kContactPatchCapacity + 1);
   Proxy proxy;
-  proxy.centre = pointAt(surface.triangle(0, 0), {0.5, 0.25, 0.25}) + Eigen::Vector3d(0, 0, away);
+  proxy.centre = pointAt(surface.triangle(0, 0), {0.5, 0.25, 0.25}) + away;
   fadePatch(surface, 0, proxy, 0.005, 0, duration, patch);
 }
 
@@ -63,8 +64,15 @@ TEST(ContactPatch, FadesAndIsGoneAfterAFrameWithoutTouch) {
 TEST(ContactPatch, WhatHasComeOffTheProxyIsForgottenTwentyTimesAsFast) {
   ContactPatch patch;
   addContacts(touching(7), 0.005, 1, 0, patch);
-  fade(0.01, patch, 0.001);
+  fade(0.01, patch, {0.002, 0, 0});
   EXPECT_NEAR(patch.entries[0].share, std::exp(-0.2), 1e-12);
+}
+
+TEST(ContactPatch, WhatLiesBelowAToolThatRidesOnARimIsNot) {
+  ContactPatch patch;
+  addContacts(touching(7), 0.005, 1, 0, patch);
+  fade(0.01, patch, {0.001, 0, 0.002});
+  EXPECT_NEAR(patch.entries[0].share, std::exp(-0.01), 1e-12);
 }
 
 // A frame as short as a tick adds little to what a second of them has.
