@@ -17,7 +17,7 @@ namespace {
 constexpr int kEdgeThreshold = 9, kRelativeShift = 3;
 constexpr int kSearch = 14;           // px along an edge to either side
 constexpr float kSubpixel = 0.5f;     // how strongly single pixels that stick out are softened
-constexpr int kMargin = kSearch + 2;  // rows and columns without smoothing: no step leaves the picture
+constexpr int kMargin = kSearch + 2;  // of repeated pixels around the picture: no step leaves them
 
 // Glare: pixels brighter than this (of 255) spread over a few cells of kCell^2 pixels.
 constexpr int kCell = 8, kGlareFrom = 205;
@@ -31,8 +31,8 @@ int luma(int r, int g, int b) {
 }
 
 struct Blend {
-  std::ptrdiff_t neighbour;  // px from here
-  float share;               // 0..0.5 of the neighbour's colour
+  int dx, dy;   // px, of the neighbour from here
+  float share;  // 0..0.5 of its colour
 };
 
 // Steps along the edge until the mean of the two rows beside it changes: that is where the edge jumps a row.
@@ -104,7 +104,8 @@ Blend findBlend(const std::uint8_t* m, std::ptrdiff_t stride) {
   const float mean = float(2 * (n + s + w + e) + nw + ne + sw + se) / 12;
   const float alone = std::min(std::abs(mean - float(here)) / float(std::max(high - low, 1)), 1.f);
   const float soft = alone * alone * (3 - 2 * alone);
-  return {across, std::max(straight, soft * soft * kSubpixel)};
+  const int side = towardsBefore ? -1 : 1;
+  return {level ? 0 : side, level ? side : 0, std::max(straight, soft * soft * kSubpixel)};
 }
 
 }  // namespace
@@ -112,8 +113,9 @@ Blend findBlend(const std::uint8_t* m, std::ptrdiff_t stride) {
 PostProcess::PostProcess(int width, int height)
     : width_(width),
       height_(height),
-      luma_(std::size_t(width) * height),
-      edge_(width),
+      lumaStride_(width + 2 * kMargin),
+      luma_(std::size_t(lumaStride_) * (height + 2 * kMargin)),
+      edge_(width + 7),
       black_(4ul * width),
       cellsX_(width / kCell + 3),
       cellsY_(height / kCell + 3),
@@ -194,25 +196,42 @@ void PostProcess::addGlare(Image& image) {
 }
 
 void PostProcess::computeLuma(const Image& image) {
-  const std::uint8_t* p = image.pixels.data();
-  std::uint8_t* out = luma_.data();
-  const std::size_t n = luma_.size();
-  for (std::size_t i = 0; i < n; ++i) out[i] = std::uint8_t(luma(p[4 * i], p[4 * i + 1], p[4 * i + 2]));
+  const int width = width_;  // bytes written might be those of width_: no vectors then
+  for (int y = 0; y < height_; ++y) {
+    const std::uint8_t* p = &image.pixels[4ul * y * width];
+    std::uint8_t* out = &luma_[lumaIndex(0, y)];
+    for (int x = 0; x < width; ++x) out[x] = std::uint8_t(luma(p[4 * x], p[4 * x + 1], p[4 * x + 2]));
+    std::fill_n(out - kMargin, kMargin, out[0]);
+    std::fill_n(out + width, kMargin, out[width - 1]);
+  }
+  const auto repeat = [this](int from, int to) {
+    std::memcpy(&luma_[lumaIndex(-kMargin, to)], &luma_[lumaIndex(-kMargin, from)], lumaStride_);
+  };
+  for (int k = 1; k <= kMargin; ++k) {
+    repeat(0, -k);
+    repeat(height_ - 1, height_ - 1 + k);
+  }
 }
 
-void PostProcess::smoothPixel(const Image& image, std::size_t at) {
-  const Blend blend = findBlend(&luma_[at], width_);
-  const std::uint8_t *p = &image.pixels[4 * at], *q = p + 4 * blend.neighbour;
-  Smoothed s{std::uint32_t(at), {}};
+std::size_t PostProcess::lumaIndex(int x, int y) const {
+  return std::size_t(y + kMargin) * lumaStride_ + std::size_t(x + kMargin);
+}
+
+void PostProcess::smoothPixel(const Image& image, int x, int y) {
+  const Blend blend = findBlend(&luma_[lumaIndex(x, y)], lumaStride_);
+  const auto at = [this](int px, int py) { return std::size_t(py) * width_ + px; };
+  const std::size_t neighbour = at(std::clamp(x + blend.dx, 0, width_ - 1), std::clamp(y + blend.dy, 0, height_ - 1));
+  const std::uint8_t *p = &image.pixels[4 * at(x, y)], *q = &image.pixels[4 * neighbour];
+  Smoothed s{std::uint32_t(at(x, y)), {}};
   for (int c = 0; c < 3; ++c) s.rgb[c] = std::uint8_t(float(p[c]) + (float(q[c]) - float(p[c])) * blend.share + kRound);
   smoothed_.push_back(s);
 }
 
 void PostProcess::smoothRow(const Image& image, int y) {
-  const std::uint8_t *above = &luma_[std::size_t(y - 1) * width_], *here = above + width_, *below = here + width_;
+  const std::uint8_t *here = &luma_[lumaIndex(0, y)], *above = here - lumaStride_, *below = here + lumaStride_;
   std::uint8_t* edge = edge_.data();
-  const int end = width_ - kMargin;
-  for (int x = kMargin; x < end; ++x) {
+  const int width = width_;  // as in computeLuma()
+  for (int x = 0; x < width; ++x) {
     const std::uint8_t a = above[x - 1], b = above[x + 1], c = below[x - 1], d = below[x + 1], m = here[x];
     const std::uint8_t low = std::min(std::min(std::min(a, b), std::min(c, d)), m);
     const std::uint8_t high = std::max(std::max(std::max(a, b), std::max(c, d)), m);
@@ -220,18 +239,17 @@ void PostProcess::smoothRow(const Image& image, int y) {
     edge[x] = std::uint8_t(high - low) > limit;
   }
   // Eight flags of 0 or 1 at a time: few are set.
-  for (int x = kMargin; x < end; x += 8) {
+  for (int x = 0; x < width; x += 8) {
     std::uint64_t flags = 0;
     std::memcpy(&flags, edge + x, sizeof flags);
-    for (; flags != 0; flags &= flags - 1)
-      smoothPixel(image, std::size_t(y) * width_ + x + std::countr_zero(flags) / 8);
+    for (; flags != 0; flags &= flags - 1) smoothPixel(image, x + std::countr_zero(flags) / 8, y);
   }
 }
 
 void PostProcess::smoothEdges(Image& image) {
   computeLuma(image);
   smoothed_.clear();
-  for (int y = kMargin; y < height_ - kMargin; ++y) smoothRow(image, y);
+  for (int y = 0; y < height_; ++y) smoothRow(image, y);
   for (const Smoothed& s : smoothed_) std::copy(s.rgb, s.rgb + 3, &image.pixels[4ul * s.index]);
 }
 

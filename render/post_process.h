@@ -30,13 +30,17 @@ class PostProcess {
   void gatherHighlights(const Image& image);
   void blurGlare();
   void computeLuma(const Image& image);
-  void smoothPixel(const Image& image, std::size_t at);
+  std::size_t lumaIndex(int x, int y) const;
+  void smoothPixel(const Image& image, int x, int y);
   void smoothRow(const Image& image, int y);
 
   int width_, height_;
-  std::vector<RimPixel> rim_;                      // where the picture fades
-  std::vector<Span> outside_;                      // where it is black
-  std::vector<std::uint8_t> luma_, edge_, black_;  // black: a row of opaque pixels
+  std::vector<RimPixel> rim_;  // where the picture fades
+  std::vector<Span> outside_;  // where it is black
+  std::ptrdiff_t lumaStride_;
+  std::vector<std::uint8_t> luma_;   // with a margin in which the picture's outermost pixels are repeated
+  std::vector<std::uint8_t> edge_;   // flags of a row, filled up with 0 to a multiple of eight
+  std::vector<std::uint8_t> black_;  // a row of opaque pixels
   std::vector<Smoothed> smoothed_;
   int cellsX_, cellsY_;  // coarse grid of the halo, with a border of one empty cell
   std::vector<float> glare_, blurred_;
