@@ -165,6 +165,18 @@ ModelView::Instance ModelView::rodInstance(glm::vec3 a, glm::vec3 b, float radiu
   return {{rowOf(0, x, y, along, a), rowOf(1, x, y, along, a), rowOf(2, x, y, along, a)}, colour};
 }
 
+ModelView::Instance ModelView::ballInstance(glm::vec3 centre, float radius, glm::vec4 colour) {
+  const glm::mat3 r(radius);
+  const auto row = [&](int k) { return rowOf(k, r[0], r[1], r[2], centre); };
+  return {{row(0), row(1), row(2)}, colour};
+}
+
+// Of spheres_.
+static std::size_t levelOf(const Viewpoint& v, float depth, float radius) {
+  const float size = 0.5f * radius / (std::max(depth, v.nearPlane) * v.tangent);
+  return std::size_t(size > kFinerAbove[0]) + std::size_t(size > kFinerAbove[1]);
+}
+
 // What is thinner than a pixel breaks into dots.
 float ModelView::atLeast(const Viewpoint& v, float depth, float radius) const {
   return std::max(radius, 0.6f * pixel_ * 2 * std::max(depth, v.nearPlane) * v.tangent);
@@ -199,11 +211,8 @@ void ModelView::sortBalls(const Viewpoint& view, const std::vector<DrawnBall>& b
   seenThrough_.clear();
   for (const DrawnBall& ball : balls) {
     const float depth = pictureFromWorld(view, ball.centre).z, radius = atLeast(view, depth, ball.radius);
-    const float size = 0.5f * radius / (std::max(depth, view.nearPlane) * view.tangent);
-    const std::size_t level = std::size_t(size > kFinerAbove[0]) + std::size_t(size > kFinerAbove[1]);
-    const glm::mat3 r(radius);
-    const auto row = [&](int k) { return rowOf(k, r[0], r[1], r[2], ball.centre); };
-    const Instance i{{row(0), row(1), row(2)}, fade(ball.colour, depth)};
+    const std::size_t level = levelOf(view, depth, radius);
+    const Instance i = ballInstance(ball.centre, radius, fade(ball.colour, depth));
     if (ball.colour.a >= 1)
       opaque_[level].push_back(i);
     else
@@ -239,9 +248,11 @@ void ModelView::placeRods(const Viewpoint& view, const Drawing& drawing, const D
     // A short arrow is a small one: its head takes no more than its half.
     const float head = std::min(8 * arrow.radius, 0.5f * length), radius = head / 8;
     const glm::vec3 neck = arrow.to - head / length * along;
-    const float depth = depthOf(arrow.from, arrow.to);
+    const float depth = depthOf(arrow.from, arrow.to), shaftRadius = atLeast(view, depth, radius);
     const glm::vec4 colour = fade(arrow.colour, depth);
-    shafts_.push_back(rodInstance(arrow.from, neck, atLeast(view, depth, radius), colour));
+    shafts_.push_back(rodInstance(arrow.from, neck, shaftRadius, colour));
+    // A shaft is a tube: seen from behind it would be open.
+    opaque_[levelOf(view, depth, shaftRadius)].push_back(ballInstance(arrow.from, shaftRadius, colour));
     heads_.push_back(rodInstance(neck, arrow.to, 3 * radius, colour));
   }
 }

@@ -53,6 +53,7 @@ class ModelView {
   static UnitMesh makeCylinder(int sides);
   static UnitMesh makeCone(int sides);
   static Instance rodInstance(glm::vec3 a, glm::vec3 b, float radius, glm::vec4 colour);
+  static Instance ballInstance(glm::vec3 centre, float radius, glm::vec4 colour);
   void sortBalls(const Viewpoint& viewpoint, const std::vector<DrawnBall>& balls, const DepthFade& fade);
   void placeRods(const Viewpoint& viewpoint, const Drawing& drawing, const DepthFade& fade, bool allOpaque);
   float atLeast(const Viewpoint& viewpoint, float depth, float radius) const;
