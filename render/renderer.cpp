@@ -209,8 +209,7 @@ void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view)
   lightView = makeLightView(picture.light, view, picture.camera, drawn());
   if (settings.shadows) renderShadowMap(drawn(), lightView, shadow);
   findVisibleTriangles(drawn(), view, picture.view == ViewKind::tissue, seen);
-  lightVertices(drawn(), seen, view, picture.light, lightView, haze ? &*haze : nullptr, picture.time, shadowIfOn(),
-                lit);
+  lightVertices(drawn(), seen, view, picture, lightView, haze ? &*haze : nullptr, shadowIfOn(), lit);
   sortByVariant(drawn(), seen, lit, shadowIfOn(), fineHeight, lists);
 }
 

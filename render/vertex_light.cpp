@@ -28,6 +28,7 @@ struct Surroundings {
   const LightView& lightView;
   const HazeField* haze;
   float time;
+  bool studio;                 // before the model's light backdrop instead of in the cavity
   float coneInner, coneOuter;  // cosines: the endoscope's cone is a little wider than the picture
   vec3 below = kAmbientBelow, above = kAmbientAbove, rim = kRimLight;
   vec3 lamp{1};  // colour of its light
@@ -110,7 +111,8 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
 
 // Polished metal and the sheath's lacquer mirror the cavity: dim red below, pale tissue above, black where the port and
 // the gaps between organs are, and the lamp's wide reflector, seen beside the lens. What is mirrored lies in the lamp's
-// cone even where the shaft itself leaves it. In haze it mirrors that, and half as much of dark things in it.
+// cone even where the shaft itself leaves it. In haze it mirrors that, and half as much of dark things in it; beside
+// the model the grey of a studio.
 void lightMetal(const Shading& v, vec3 tangent, const Surroundings& s, LitVertex& out) {
   const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
   const vec3 mirrored = 2.f * v.normal * facing - v.toEye;
@@ -119,7 +121,10 @@ void lightMetal(const Shading& v, vec3 tangent, const Surroundings& s, LitVertex
   const float gap = 1 - 0.75f * smoothStep(0.35f, 0.05f, std::abs(mirrored.y + 0.25f));
   const vec3 cavity = (vec3(0.045f, 0.014f, 0.011f) + vec3(0.17f, 0.085f, 0.07f) * (above * above)) * gap;
   const float lit = std::min(v.distanceFalloff, 1.4f);
-  const vec3 around = s.haze ? s.haze->toward(mirrored) * (0.5f * gap / kExposure) : cavity * lit;
+  const vec3 studio = vec3(0.14f, 0.145f, 0.155f) + vec3(0.34f, 0.34f, 0.33f) * (above * above);
+  const vec3 around = s.haze     ? s.haze->toward(mirrored) * (0.5f * gap / kExposure)
+                      : s.studio ? studio * lit
+                                 : cavity * lit;
   // Brushed or drawn along its length, it shows the lamp as a streak (Kajiya and Kay 1989).
   const vec3 along = glm::cross(v.normal, tangent), halfway = glm::normalize(v.toLight + v.toEye);
   const vec3 across = halfway - along * glm::dot(halfway, along);
@@ -216,11 +221,19 @@ GlossLobes glossLobes(const Look& look) {
 
 namespace {
 
-Surroundings makeSurroundings(const Viewpoint& view, const Light& light, const LightView& lightView,
-                              const HazeField* haze, float time) {
+Surroundings makeSurroundings(const Viewpoint& view, const Picture& picture, const LightView& lightView,
+                              const HazeField* haze) {
   const float corner = view.round ? 2 * view.rim : 1.6f * std::sqrt(1 + view.aspect * view.aspect);
   const float cone = std::atan(corner * view.tangent);
-  Surroundings s{view, light, lightView, haze, time, std::cos(0.40f * cone), std::cos(std::min(1.07f * cone, 1.5f))};
+  const Light& light = picture.light;
+  Surroundings s{view,
+                 light,
+                 lightView,
+                 haze,
+                 picture.time,
+                 picture.view == ViewKind::model,
+                 std::cos(0.40f * cone),
+                 std::cos(std::min(1.07f * cone, 1.5f))};
   if (!haze) return s;
   s.below = haze->below();
   s.above = haze->above();
@@ -261,14 +274,13 @@ Shading lightVertex(const SceneMesh& mesh, const Look& look, std::size_t i, vec3
 
 }  // namespace
 
-void lightVertices(const SceneMesh& mesh, const VisibleTriangles& seen, const Viewpoint& view, const Light& light,
-                   const LightView& lightView, const HazeField* haze, float time, const ShadowMap* shadow,
-                   VertexLight& out) {
+void lightVertices(const SceneMesh& mesh, const VisibleTriangles& seen, const Viewpoint& view, const Picture& picture,
+                   const LightView& lightView, const HazeField* haze, const ShadowMap* shadow, VertexLight& out) {
   const std::size_t n = seen.vertices.size();
   out.vertices.resize(n);
   out.shade.assign(n, Shade::lit);
   out.glinting.resize(n);
-  const Surroundings s = makeSurroundings(view, light, lightView, haze, time);
+  const Surroundings s = makeSurroundings(view, picture, lightView, haze);
   for (const VisiblePart& visible : seen.parts) {
     const MeshPart& part = mesh.parts[visible.part];
     const GlossLobes lobes = glossLobes(*part.look);

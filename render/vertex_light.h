@@ -42,9 +42,9 @@ struct VertexLight {
 constexpr float kExposure = 1.3f, kSoftening = 0.14f;
 float lightFalloff(const Light& light, float distance);
 
-// haze: of light.haze, or nullptr. time: Picture::time.
-void lightVertices(const SceneMesh& mesh, const VisibleTriangles& seen, const Viewpoint& viewpoint, const Light& light,
-                   const LightView& lightView, const HazeField* haze, float time, const ShadowMap* shadow,
+// haze: of picture.light.haze, or nullptr.
+void lightVertices(const SceneMesh& mesh, const VisibleTriangles& seen, const Viewpoint& viewpoint,
+                   const Picture& picture, const LightView& lightView, const HazeField* haze, const ShadowMap* shadow,
                    VertexLight& out);
 
 }  // namespace medulla
