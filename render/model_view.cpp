@@ -143,7 +143,7 @@ void ModelView::drawInstances(const UnitMesh& mesh, const std::vector<Instance>&
   glDrawElementsInstanced(GL_TRIANGLES, mesh.indexCount, GL_UNSIGNED_INT, nullptr, int(instances.size()));
 }
 
-void ModelView::setCamera(const Viewpoint& v) const {
+void ModelView::setCamera(const Viewpoint& v, float nearer) const {
   glUseProgram(program_);
   const auto uniform = [this](const char* name) { return glGetUniformLocation(program_, name); };
   glUniformMatrix4fv(uniform("clipFromWorld"), 1, GL_FALSE, glm::value_ptr(v.clipFromWorld));
@@ -151,6 +151,7 @@ void ModelView::setCamera(const Viewpoint& v) const {
   glUniform3fv(uniform("right"), 1, glm::value_ptr(v.right));
   glUniform3fv(uniform("up"), 1, glm::value_ptr(v.up));
   glUniform3fv(uniform("back"), 1, glm::value_ptr(v.back));
+  glUniform1f(uniform("nearer"), nearer);
 }
 
 static glm::vec4 rowOf(int k, glm::vec3 x, glm::vec3 y, glm::vec3 z, glm::vec3 origin) {
@@ -297,7 +298,9 @@ void ModelView::drawBallsSeenThrough(bool hide) const {
 
 void ModelView::drawFaint(const Viewpoint& view) const {
   if (faintRods_.empty()) return;
-  setCamera(view);
+  // They run along a skin, now before it, now behind: hidden by it they would break into pieces.
+  constexpr float kNearer = 0.015f;
+  setCamera(view, kNearer);
   glEnable(GL_CULL_FACE);
   startBlending();
   drawInstances(cylinder_, faintRods_);

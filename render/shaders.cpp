@@ -208,6 +208,8 @@ layout(location = 3) in vec4 row1;
 layout(location = 4) in vec4 row2;
 layout(location = 5) in vec4 colour;
 uniform mat4 clipFromWorld;
+uniform vec3 eye;
+uniform float nearer;
 out vec3 vNormal;
 out vec3 vPosition;
 flat out vec4 vColour;
@@ -217,7 +219,7 @@ void main() {
   vec3 x = vec3(row0.x, row1.x, row2.x), z = vec3(row0.z, row1.z, row2.z), y = vec3(row0.y, row1.y, row2.y);
   vNormal = x * (normal.x / dot(x, x)) + y * (normal.y / dot(y, y)) + z * (normal.z / dot(z, z));
   vColour = colour;
-  gl_Position = clipFromWorld * vec4(vPosition, 1);
+  gl_Position = clipFromWorld * vec4(mix(vPosition, eye, nearer), 1);
 }
 )";
 
