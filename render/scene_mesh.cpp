@@ -56,7 +56,18 @@ float spacingOf(const SceneMesh& mesh, std::size_t i) {
   return 0.44f * std::sqrt(mesh.area[i]);
 }
 
+// Where there is no relief to speak of, nobody sees which way it runs: tangents that turn with the texture from vertex
+// to vertex would crumple the highlights between them.
+static void computeEvenTangents(SceneMesh& mesh, const MeshPart& part) {
+  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+    const glm::vec3 n = mesh.normal[i];
+    mesh.tangent[i] = normalizedOr(glm::vec3(1, 0, 0) - n * n.x, {0, 1, 0});
+  }
+}
+
 void computeTangents(SceneMesh& mesh, const MeshPart& part) {
+  constexpr float kNoRelief = 0.05f;
+  if (part.look->bump <= kNoRelief) return computeEvenTangents(mesh, part);
   std::fill_n(mesh.tangent.begin() + part.firstVertex, part.vertexCount, glm::vec3(0));
   for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
     const std::uint32_t a = mesh.index[k], b = mesh.index[k + 1], c = mesh.index[k + 2];

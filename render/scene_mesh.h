@@ -51,7 +51,7 @@ void visitVertexArrays(const Visit& visit) {
 void computeNormals(SceneMesh& mesh, const MeshPart& part);
 // m, from vertex i to those beside it: six even triangles of edge e have, twice, 5.2 e^2.
 float spacingOf(const SceneMesh& mesh, std::size_t i);
-// Tangents from the gradient of u over each triangle; needs normals.
+// Tangents from the gradient of u over each triangle, of looks without relief along x; needs normals.
 void computeTangents(SceneMesh& mesh, const MeshPart& part);
 
 }  // namespace medulla
