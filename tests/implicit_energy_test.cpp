@@ -77,7 +77,7 @@ TEST(ImplicitEnergy, WhatFliesBesideAFailingBodyFliesOn) {
 
 // A contact that pushes hands energy on: what it joins is judged together.
 TEST(ImplicitEnergy, WhatPushesAFailingBodyCreepsWithIt) {
-  const Failing f{LinkModel::beam, 1, 0.02, 4};
+  const Failing f{LinkModel::beam, 1, 0.02, 10};
   WorldSettings settings = settingsOf(f);
   settings.contact = ContactMode::balls;
   World world(settings,
