@@ -275,10 +275,6 @@ void setEnough(const WorldData& d, ImplicitData& s, double share) {
   }
 }
 
-}  // namespace
-
-namespace {
-
 // How a step of the iteration is found. The preconditioner alone costs one evaluation of forces instead of three or
 // four. Far from the solution the true derivative is not definite, and a way down is worth more than the tangent.
 enum class Way { preconditioner, derivative, definite };
@@ -326,7 +322,6 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   double left = residualSize(s);
   Way way = isWhole(d, s) ? Way::preconditioner : Way::derivative;
   bool hasMoved = true;  // so far that the matrix of before is no longer close
-  bool goesOn = false;
   for (int i = 0; i < kIterations && left > 1; ++i) {
     const double before = left;
     s.dragsBefore = s.drags;
@@ -334,9 +329,8 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
       way = Way::definite;
       assembleSystem(d, s, true);
     }
-    const bool moved = takeStep(d, s, stage, way, goesOn, left);
-    goesOn = way == Way::preconditioner;
-    hasMoved = !goesOn && left > kClose * before;
+    const bool moved = takeStep(d, s, stage, way, i > 0, left);
+    hasMoved = way != Way::preconditioner && left > kClose * before;
     if (way == Way::preconditioner && left > kClose * before) {
       way = Way::derivative;
     } else if (left > kNear * before) {

@@ -233,11 +233,15 @@ void applyRows(const ImplicitData& s, const Motion& x, Motion& y) {
   }
 }
 
+static Motion& setRemaining(ImplicitData& s) {
+  s.remaining = s.residual;
+  negate(s.remaining);
+  hold(s.freedom, s.remaining);
+  return s.remaining;
+}
+
 void solvePreconditioner(WorldData& d, ImplicitData& s, bool goesOn) {
-  Motion& r = s.remaining;
-  r = s.residual;
-  negate(r);
-  hold(s.freedom, r);
+  const Motion& r = setRemaining(s);
   precondition(d, s, r, s.change);
   const double curvature = goesOn ? product(s.direction, s.image) : 0;
   if (curvature > 0)
@@ -247,10 +251,7 @@ void solvePreconditioner(WorldData& d, ImplicitData& s, bool goesOn) {
 int solveSystem(WorldData& d, ImplicitData& s, double tolerance, Operator apply) {
   constexpr int kIterations = 200;
   std::fill(s.change.begin(), s.change.end(), Quad{});
-  Motion& r = s.remaining;
-  r = s.residual;
-  negate(r);
-  hold(s.freedom, r);
+  Motion& r = setRemaining(s);
   precondition(d, s, r, s.preconditioned);
   s.direction = s.preconditioned;
   double size = product(r, s.preconditioned);
