@@ -26,9 +26,10 @@ Progress::~Progress() {
 
 std::string Progress::text(double done, double elapsed) const {
   const double share = std::clamp(done / total_, 0.0, 1.0);
-  const double left = share > 0 ? elapsed * (1 - share) / share : 0;
   const std::string amount = unit_ == "%" ? "" : fmt::format("{:.4g}/{:.4g} {}, ", done, total_, unit_);
-  return fmt::format("{} {}{:.0f} %, {:.0f} s left", what_, amount, 100 * share, left);
+  // Less than a hundredth foretells nothing.
+  const std::string left = share < 0.01 ? "?" : fmt::format("{:.0f}", elapsed * (1 - share) / share);
+  return fmt::format("{} {}{:.0f} %, {} s left", what_, amount, 100 * share, left);
 }
 
 void Progress::update(double done) {

@@ -38,6 +38,7 @@ struct SceneLoad {
 struct SceneBody : BodyDescription {
   int line = 0;
   std::string modelPath, look;
+  bool choosesLinks = false;  // says which, rather than leaving it to the default
   std::string referencePath;  // where another program puts its vertices at the end; empty: none
   std::vector<SceneFix> fixes;
   std::vector<SceneLoad> loads;

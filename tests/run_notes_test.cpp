@@ -136,5 +136,18 @@ TEST_F(RunNotes, ABodyOfWhichEveryNodeIsHeld) {
   }
 }
 
+TEST_F(RunNotes, AModelWhoseIdentifiedLinksAreNotTaken) {
+  const auto notesOf = [&](const std::string& links) {
+    folder.write("own/liver.xml", fmt::format(R"(<scene name="liver"><clock duration="0.1"/>
+<tissue name="t" young="5e3"/><body name="liver" tissue="t" look="liver" model="{}/assets/liver/liver.model.xml" {}/>
+<camera position="0 0 0.4" target="0 0 0"/></scene>)",
+                                              MEDULLA_SOURCE_DIR, links));
+    return complaints(run({"check", "own/liver.xml"}));
+  };
+  EXPECT_EQ(notesOf("links=\"beam\""), Notes{});
+  EXPECT_EQ(notesOf(""), Notes{"note: body 'liver' has beams, though its model has identified links: "
+                               "links=\"identified\" takes these, links=\"beam\" ends this note"});
+}
+
 }  // namespace
 }  // namespace medulla

@@ -115,6 +115,16 @@ static void printBuriedTools(const LoadedScene& loaded, const World& world) {
   }
 }
 
+// Who had finite elements identify links hardly wants beams by default.
+static void printUnusedNetworks(const Scene& scene) {
+  for (const SceneBody& body : scene.bodies)
+    if (!body.choosesLinks && body.model->identified && !body.model->identified->usesFormulas)
+      fmt::print(stderr,
+                 "note: body '{}' has beams, though its model has identified links: links=\"identified\" takes these, "
+                 "links=\"beam\" ends this note\n",
+                 body.name);
+}
+
 void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world) {
   const Scene& scene = loaded.scene;
   printUnplayed(loaded, options.isExcerpt);
@@ -136,6 +146,7 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
   for (const SceneBody& body : scene.bodies)
     if (std::set<int>(body.fixedNodes.begin(), body.fixedNodes.end()).size() == body.model->restNodes.size())
       fmt::print(stderr, "note: every node of body '{}' is held\n", body.name);
+  printUnusedNetworks(scene);
   if (scene.dynamics.integrator != Integrator::implicit) return;
   if (scene.dynamics.sleepAfter > 0)
     fmt::print(stderr, "warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");

@@ -230,6 +230,7 @@ void readBodies(const XmlElement& root, Scene& scene) {
     body.look = readText(*e, "look");
     body.tissue = findTissue(*e, tissues);
     body.links = readEnum(*e, "links", body.links);
+    body.choosesLinks = e->find("links") != nullptr;
     body.surface = readEnum(*e, "surface", body.surface);
     body.worldFromModel = readPlacement(*e);
     if (e->find("reference")) body.referencePath = readPath(*e, "reference", scene.path);
