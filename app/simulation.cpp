@@ -49,6 +49,7 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   totals_.touched.resize(tools.size());
   totals_.held.resize(tools.size());
   totals_.closings.resize(tools.size());
+  totals_.squeezedTicks.resize(tools.size());
   for (const ToolSample& input : inputs_) totals_.beganClosed.push_back(input.grip > kGripCloses);
   record_.duration = frameDuration_;
   record_.from = record_.to = current_;
@@ -119,6 +120,7 @@ void Simulation::accountTicks() {
       totals_.clampedTicks += tool.clamped;
       if (tool.inContact || tool.holding) totals_.touched[k] = true;
       if (tool.holding) totals_.held[k] = true;
+      totals_.squeezedTicks[k] += tool.squeezed;
       totals_.closings[k] +=
           record_.inputs[tick][k].grip > kGripCloses && record_.inputs[tick - 1][k].grip <= kGripCloses;
       totals_.gripSlips += tool.slipped && !record_.tools[tick - 1][k].slipped;

@@ -74,6 +74,7 @@ struct RunTotals {
   std::vector<bool> touched, held;                // has tool k been in contact or held anything; has it held anything
   std::vector<int> closings;                      // how often tool k's grip has closed since it began
   std::vector<bool> beganClosed;                  // was it closed then
+  std::vector<long> squeezedTicks;                // of tool k
   double userEnergyMax = 0;                       // J, the most that any tool had handed to the user
   double toolImpulse = 0, impulseDifference = 0;  // N s, sums over frames and tools of lengths
   double impulseMismatch() const { return mismatchOf(impulseDifference, toolImpulse); }

@@ -197,6 +197,7 @@ static void record(const Vector3d& force, ServoTool& tool, ToolState& state) {
   state.proxy = tool.proxy.centre;
   state.holding = !tool.grip.held.empty();
   state.slipped = tool.grip.slipped;
+  state.squeezed = !state.holding && tool.proxy.radius < 0.5 * tool.settings.radius;
   state.inContact = tool.proxy.inContact() || (!state.holding && size > 0);
   tool.deviceSum += tool.device.position;
   ++tool.ticks;

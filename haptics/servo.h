@@ -30,6 +30,9 @@ struct ToolState {
   bool holding = false;
   bool clamped = false;  // forceMax was reached
   bool slipped = false;  // what the closed grip held has torn away
+  // Surfaces on all sides leave its proxy less than half of its radius. Tissue that closes around a tool does so, where
+  // it is pressed deeper than its model can follow.
+  bool squeezed = false;
   // J, handed to the user since the start: the force of each tick over the device's way to the next. What a grip turns
   // does work, too, but the hand gets no moment.
   double energy = 0;

@@ -148,6 +148,12 @@ TEST(Proxy, SqueezedBetweenWallsShrinksAndDoesNotTunnel) {
   r.run([&](double, const ToolState& tool, const BlendedSurface& surface, double alpha) {
     ASSERT_LT(tool.proxy.y(), surface.node(0, alpha).y());
     ASSERT_GT(tool.proxy.y(), surface.node(4, alpha).y());
+    const double room = 0.5 * (surface.node(0, alpha) - surface.node(4, alpha)).y();
+    if (room < 0.5 * r.tool.radius) {
+      ASSERT_TRUE(tool.squeezed);
+    } else if (room > r.tool.radius) {
+      ASSERT_FALSE(tool.squeezed);
+    }
   });
 }
 

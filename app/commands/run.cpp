@@ -155,6 +155,19 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
     fmt::print(stderr, "note: surface=\"contact\" is \"full\": nodes are chosen under the explicit integrator only\n");
 }
 
+// A moment of it is nothing: a tool that is caught between two bodies.
+static void printSqueezed(const LoadedScene& loaded, const RunTotals& totals) {
+  constexpr double kLeast = 0.05;  // s
+  for (std::size_t k = 0; k < totals.squeezedTicks.size(); ++k) {
+    const double squeezed = double(totals.squeezedTicks[k]) / loaded.scene.servoRate;
+    if (squeezed < kLeast) continue;
+    fmt::print(stderr,
+               "note: for {:.2g} s surfaces left tool '{}' less than half of its radius: walls that close on it, or "
+               "tissue pressed deeper than its model can follow, which then lets the tool in\n",
+               squeezed, loaded.scene.tools[k].name);
+  }
+}
+
 // What a run came to that was hardly meant. A run that ends before a tool's motion does says nothing of the tool.
 static void printNotes(const LoadedScene& loaded, const RunTotals& totals, const CreepReport& creep) {
   for (std::size_t k = 0; k < loaded.trajectories.size(); ++k) {
@@ -169,6 +182,7 @@ static void printNotes(const LoadedScene& loaded, const RunTotals& totals, const
     else if (totals.beganClosed[k] && !totals.held[k])
       fmt::print(stderr, "note: tool '{}' was closed from the start and held nothing\n", name);
   }
+  printSqueezed(loaded, totals);
   if (totals.volumeRatioMin <= 0)
     fmt::print(stderr,
                "note: a body was turned inside out (volume_ratio_min {:.3g}): its model is too coarse, its tissue too "

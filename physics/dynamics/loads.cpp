@@ -192,7 +192,7 @@ void applyLoads(WorldData& d, const Loads& loads, double remaining, std::vector<
   // Loads on different masses settle in one pass; loads that share a node or a sphere converge by a factor of 2 or
   // better per pass, and the rest is taken up in the next substep.
   constexpr int kPasses = 20;
-  constexpr double kSettled = 1e-12;  // of the largest force
+  constexpr double kUnchanged = 1e-12;  // of the largest force
   const std::size_t count = loads.toolSprings.size() + loads.heldNodes.size();
   assert(d.loadForces.size() == count);
   d.settling.resize(count);
@@ -208,7 +208,7 @@ void applyLoads(WorldData& d, const Loads& loads, double remaining, std::vector<
       change = std::max(change, settle(d, d.settling[k], d.loadForces[k]));
       largest = std::max(largest, d.loadForces[k].norm());
     }
-    if (!(change > kSettled * largest)) break;
+    if (!(change > kUnchanged * largest)) break;
   }
   for (std::size_t k = 0; k < count; ++k) toolImpulse[d.settling[k].spring.tool] += d.substep * d.loadForces[k];
 }
