@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <utility>
 
 #include "physics/model/rotation_between.h"
 #include "tests/contact_bodies.h"
@@ -275,6 +277,33 @@ TEST(Contact, ABodyThatStartsInsideAStaticShapeIsReported) {
     EXPECT_EQ(found[0].body0, 0);
     EXPECT_EQ(found[0].body1, -1);
     EXPECT_NEAR(found[0].depth, kBallRadius - height, 1e-12);
+  }
+}
+
+// A tube that lies 1 mm deep in a floor, or in a ceiling that is a mesh: glued there, by an end, or not at all.
+TEST(Contact, WhatIsFixedToAStaticShapeDoesNotStandOnIt) {
+  const std::shared_ptr<SoftBodyModel> tube = synthetic::shortTube();
+  const double radius = 0.012;
+  StaticShape floor, ceiling;
+  floor.worldFromShape.translation().y() = 0.001 - radius;
+  ceiling.kind = StaticShape::Kind::mesh;
+  ceiling.mesh = {{{-1, radius - 0.001, -1}, {1, radius - 0.001, -1}, {0, radius - 0.001, 1}}, {{0, 1, 2}}};
+  const auto worldWith = [&](const StaticShape& shape, const std::function<bool(const Vector3d&)>& isHeld) {
+    BodyDescription b = ballBody("tube", tube, Vector3d::Zero());
+    for (std::size_t n = 0; n < tube->restNodes.size(); ++n)
+      if (isHeld(tube->restNodes[n])) b.fixedNodes.push_back(int(n));
+    World world(settings(ContactMode::balls, 0.001), {b}, {shape});
+    world.advance({});
+    return world;
+  };
+  for (const auto& [shape, side] : {std::pair(floor, -1), {ceiling, 1}}) {
+    const World glued = worldWith(shape, [&](const Vector3d& x) { return side * x.y() > 0.8 * radius; });
+    EXPECT_TRUE(glued.startOverlaps().empty());
+    EXPECT_EQ(glued.penetration().statics, 0);
+    const World byAnEnd = worldWith(shape, [&](const Vector3d& x) { return x.x() < 0.005; });
+    EXPECT_EQ(byAnEnd.startOverlaps().size(), 1u);
+    EXPECT_GT(byAnEnd.penetration().statics, 5);
+    EXPECT_EQ(worldWith(shape, [](const Vector3d&) { return false; }).startOverlaps().size(), 1u);
   }
 }
 

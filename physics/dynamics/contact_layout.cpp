@@ -145,6 +145,34 @@ void excludeWhatOverlapsAtRest(WorldData& d) {
   for (std::vector<std::uint32_t>& e : c.excluded) sortUnique(e);
 }
 
+// `held`: a point of the body's surface.
+void findWhatHolds(ContactData& c, int sphere, const Vector3d& held) {
+  const double radius = c.ball[sphere].v[3], near = kTouchingAtRest * radius;
+  if ((held - vectorOf(c.ball[sphere])).norm() > radius + near) return;
+  for (std::size_t k = 0; k < c.statics.size(); ++k)
+    if (isNear(c.statics[k], held, near)) c.isFixedTo[k * c.ball.size() + sphere] = true;
+}
+
+// What is glued to a shape is held by the tissue between. A rigid ball that stood on it besides would bear what that
+// does again: a slab on a table that it is fixed to felt twice as hard to a tool. Of a skin nodes are not held.
+void findWhatIsFixedToStatics(WorldData& d) {
+  ContactData& c = d.contact;
+  c.isFixedTo.assign(c.statics.size() * c.ball.size(), false);
+  for (std::size_t b = 0; b < d.bodies.size(); ++b) {
+    const BodyDescription& body = d.bodies[b];
+    if (c.statics.empty() || (body.surface == SurfaceMode::skin && body.links != LinkModel::identified)) continue;
+    std::vector<char> isHeld(body.model->restNodes.size(), false);
+    for (const int n : body.fixedNodes) isHeld[n] = true;
+    for (const auto& [n0, n1, n2] : body.model->triangles) {
+      if (!isHeld[n0] || !isHeld[n1] || !isHeld[n2]) continue;
+      std::array<Vector3d, 3> corners{body.model->restNodes[n0], body.model->restNodes[n1], body.model->restNodes[n2]};
+      for (Vector3d& corner : corners) corner = body.worldFromModel * corner;
+      for (int i = d.ranges[b].firstSphere; i < d.ranges[b].firstSphere + d.ranges[b].sphereCount; ++i)
+        findWhatHolds(c, i, closestOnTriangle(vectorOf(c.ball[i]), corners));
+    }
+  }
+}
+
 void noteStartOverlap(ContactData& c, int b0, int b1, double depth) {
   const auto same = [&](const BodyOverlap& o) { return o.body0 == b0 && o.body1 == b1; };
   const auto found = std::find_if(c.startOverlaps.begin(), c.startOverlaps.end(), same);
@@ -183,6 +211,7 @@ void layOutContact(WorldData& d, const std::vector<StaticShape>& statics) {
   addBalls(d);
   addColliders(d);
   placeBalls(d);
+  findWhatIsFixedToStatics(d);
   listNeighbours(d);
   excludeWhatOverlapsAtRest(d);
   c.listsAreOld = true;

@@ -136,6 +136,11 @@ std::array<int, 2> bodiesOf(const WorldData& d, std::uint64_t key) {
   return {colliders[key >> 32].body, colliders[key & 0xffffffff].body};
 }
 
+bool isNear(const StaticContactShape& shape, const Vector3d& p, double within) {
+  const bool isMesh = shape.kind == StaticShape::Kind::mesh;
+  return (isMesh ? closestPoint(shape.tree, p, within).distance : nearestOn(shape, p).distance) < within;
+}
+
 void listStaticNeighbours(WorldData& d) {
   ContactData& c = d.contact;
   c.staticNeighbours.clear();
@@ -144,6 +149,7 @@ void listStaticNeighbours(WorldData& d) {
     const StaticContactShape& shape = c.statics[k];
     for (std::uint32_t i = 0; i < c.ball.size(); ++i) {
       if (c.inverseCellMass[i] == 0 || d.rest[c.bodyOf[i]].asleep) continue;  // fixed or a pad, or asleep
+      if (c.isFixedTo[k * c.ball.size() + i]) continue;
       const Vector3d p = vectorOf(c.ball[i]);
       const double radius = c.ball[i].v[3];
       const int first = static_cast<int>(c.nearTriangles.size());
