@@ -18,7 +18,7 @@ Image picture(int width, int height, const std::function<std::array<int, 3>(int 
       for (int c = 0; c < 3; ++c) image.pixels[4 * (std::size_t(y) * width + x) + c] = std::uint8_t(colour(x, y)[c]);
   return image;
 }
-Image flat(int r, int g, int b) {
+Image ofColour(int r, int g, int b) {
   return picture(48, 32, [&](int, int) { return std::array{r, g, b}; });
 }
 Image noise(unsigned seed) {
@@ -52,7 +52,7 @@ TEST(Flip, OrderDoesNotMatterAndEveryErrorIsAShare) {
 // Nothing but colour differs between fields without an edge. Green and blue are the two corners of the cube that are
 // farthest apart, by which all is scaled.
 TEST(Flip, GreenAgainstBlueIsTheMaximum) {
-  for (const float e : flipErrors(flat(0, 255, 0), flat(0, 0, 255))) EXPECT_NEAR(e, 1, 1e-5);
+  for (const float e : flipErrors(ofColour(0, 255, 0), ofColour(0, 0, 255))) EXPECT_NEAR(e, 1, 1e-5);
 }
 
 // L* is 0 and 100, chroma none: 100^0.7 against the bent range of the largest difference, the paper's constants.
@@ -61,13 +61,13 @@ TEST(Flip, BlackAgainstWhiteFollowsFromLightnessAlone) {
   const double chroma = std::hypot(-86.18 * 0.8773 - 79.19 * 0.3230, 83.18 * 0.8773 + 107.86 * 0.3230);
   const double largest = std::pow(87.73 - 32.30 + chroma, 0.7), bend = 0.4 * largest, difference = std::pow(100, 0.7);
   const double expected = 0.95 + 0.05 * (difference - bend) / (largest - bend);
-  EXPECT_NEAR(flipMean(flat(0, 0, 0), flat(255, 255, 255)), expected, 1e-4);
+  EXPECT_NEAR(flipMean(ofColour(0, 0, 0), ofColour(255, 255, 255)), expected, 1e-4);
 }
 
 // Two greys of small difference lie below the bend: 0.95 / 0.4 of their share.
 TEST(Flip, SmallDifferencesFollowTheirPower) {
-  const double once = flipMean(flat(119, 119, 119), flat(124, 124, 124)),
-               twice = flipMean(flat(119, 119, 119), flat(129, 129, 129));
+  const double once = flipMean(ofColour(119, 119, 119), ofColour(124, 124, 124)),
+               twice = flipMean(ofColour(119, 119, 119), ofColour(129, 129, 129));
   const auto lightness = [](double v) { return 116 * std::cbrt(std::pow((v / 255 + 0.055) / 1.055, 2.4)) - 16; };
   const double ratio = (lightness(129) - lightness(119)) / (lightness(124) - lightness(119));
   EXPECT_NEAR(twice / once, std::pow(ratio, 0.7), 1e-3);
@@ -81,7 +81,7 @@ TEST(Flip, FinePatternsFadeAndEdgesStandOut) {
       return std::array{v, v, v};
     });
   };
-  EXPECT_LT(flipMean(chequer(0), chequer(1)), 0.25 * flipMean(flat(110, 110, 110), flat(140, 140, 140)));
+  EXPECT_LT(flipMean(chequer(0), chequer(1)), 0.25 * flipMean(ofColour(110, 110, 110), ofColour(140, 140, 140)));
   const double half = flipMean(disc(0), disc(0.5f)), one = flipMean(disc(0), disc(1)),
                three = flipMean(disc(0), disc(3));
   EXPECT_GT(half, 0);

@@ -22,7 +22,7 @@ Image pattern(int width, int height) {
   return image;
 }
 
-Image flat(int width, int height, std::uint8_t value) {
+Image evenImage(int width, int height, std::uint8_t value) {
   return {width, height, std::vector<std::uint8_t>(4ul * width * height, value)};
 }
 
@@ -74,7 +74,7 @@ TEST_F(ImageTest, EqualPicturesHaveInfinitePsnr) {
 }
 
 TEST_F(ImageTest, DifferencesAreCountedPerPixelByTheWorstChannel) {
-  const Image a = flat(100, 100, 100);
+  const Image a = evenImage(100, 100, 100);
   Image b = a;
   b.pixels[0] += 4;       // not over 4
   b.pixels[4] += 5;       // over 4
@@ -103,7 +103,7 @@ TEST_F(ImageTest, ToleranceHasThreeBounds) {
 }
 
 TEST_F(ImageTest, AmplifiedDifferenceIsOpaqueAndSaturates) {
-  const Image a = flat(2, 1, 10);
+  const Image a = evenImage(2, 1, 10);
   Image b = a;
   b.pixels[0] = 13;
   b.pixels[1] = 200;
