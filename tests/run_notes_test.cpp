@@ -32,6 +32,12 @@ TEST_F(RunNotes, AToolThatClosedBesideTheBodyHeldNothing) {
   EXPECT_EQ(notesOfGrips({0, 1, 0, 0}, 0.3), Notes{});  // it may hold something later
 }
 
+TEST_F(RunNotes, JawsThatComeToWhereTheyCloseAndNoFurther) {
+  EXPECT_EQ(notesOfGrips({0, 0.2, 0.5, 0}, 0.6),
+            Notes{"note: the jaws of tool 'probe' come to where they close and no further: it grips nothing"});
+  EXPECT_EQ(notesOfGrips({0, 0.2, 0.49, 0}, 0.6), Notes{});
+}
+
 TEST_F(RunNotes, AMotionThatDoesNotFitTheScene) {
   const auto notesOf = [&](const std::string& verb, double from, double to, const std::string& more = "") {
     folder.write("own/organ.csv", fmt::format("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n{},0,0,0.5,1,0,0,0,0\n"

@@ -89,6 +89,18 @@ static void printUnplayed(const LoadedScene& loaded, bool isExcerpt) {
   }
 }
 
+// As of a recording whose `closes` is the very least that its jaws come to.
+static void printAlmostClosed(const LoadedScene& loaded) {
+  constexpr double kRounding = 1e-6;
+  for (std::size_t k = 0; k < loaded.trajectories.size(); ++k) {
+    double most = 0;
+    for (const ToolSample& sample : loaded.trajectories[k].samples) most = std::max(most, sample.grip);
+    if (most <= kGripCloses && most > kGripCloses - kRounding)
+      fmt::print(stderr, "note: the jaws of tool '{}' come to where they close and no further: it grips nothing\n",
+                 loaded.scene.tools[k].name);
+  }
+}
+
 // m; how far a ball reaches into a closed surface, below 0 where it does not touch it.
 static double reachInto(const TriangleMesh& surface, const Eigen::Vector3d& centre, double radius) {
   const SurfaceTree tree = makeSurfaceTree(surface);
@@ -128,6 +140,7 @@ static void printUnusedNetworks(const Scene& scene) {
 void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world) {
   const Scene& scene = loaded.scene;
   printUnplayed(loaded, options.isExcerpt);
+  printAlmostClosed(loaded);
   for (const BodyOverlap& o : world.startOverlaps()) {
     const std::string& name = scene.bodies[o.body0].name;
     if (o.body1 < 0)
