@@ -74,6 +74,16 @@ struct LightTables {
   }
 };
 
+// The code above the light or the one below it, above in as many pixels of sixteen as it lies between the two: means of
+// several pixels have lost the tremble by which each hides the steps of what is smooth.
+std::uint8_t ditheredCode(const LightTables& tables, unsigned light, int x, int y) {
+  static constexpr std::uint8_t ordered[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
+  const std::uint8_t nearest = tables.shown[light], below = nearest - (tables.light[nearest] > light);
+  if (below == 255) return below;
+  const unsigned from = tables.light[below], step = tables.light[below + 1] - from;
+  return std::uint8_t(below + (32 * (light - from) > (2 * ordered[y % 4][x % 4] + 1u) * step));
+}
+
 // Each pixel of `out` becomes the mean of `factor`^2 pixels of `fine`, in light: means of coded values darken edges.
 void reduce(const Image& fine, int factor, const LightTables& tables, Image& out) {
   const unsigned count = unsigned(factor * factor);
@@ -87,7 +97,7 @@ void reduce(const Image& fine, int factor, const LightTables& tables, Image& out
           for (int c = 0; c < 3; ++c) sum[c] += tables.light[p[c]];
       }
       std::uint8_t* to = &out.pixels[4 * (std::size_t(y) * out.width + x)];
-      for (int c = 0; c < 3; ++c) to[c] = tables.shown[sum[c] / count];
+      for (int c = 0; c < 3; ++c) to[c] = ditheredCode(tables, sum[c] / count, x, y);
       to[3] = 255;
     }
 }

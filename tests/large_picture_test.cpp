@@ -85,5 +85,34 @@ TEST(ShadowMap, IsAsFineAsThePicture) {
     EXPECT_EQ(shadowSideFor(height) % ShadowMap::kBlockSide, 0) << height;
 }
 
+// Means over squares of eight pixels change by less from one to the next than a step of the eight bits.
+TEST(Renderer, BackgroundsHaveNoStepsThatTheEyeSees) {
+  for (const int supersample : {1, 2, 3}) {
+    RendererSettings settings;
+    settings.width = 32;
+    settings.height = 2048;
+    settings.supersample = supersample;
+    Renderer renderer(settings);
+    Picture picture;
+    picture.endoscopeMask = false;
+    picture.light.haze = Haze{vec3(0.002f, 0.008f, 0.010f), 10};
+    Image image;
+    renderer.render(picture, image);
+    double last = 0, largest = 0, highest = 0, lowest = 255;
+    for (int y = 0; y < image.height; y += 8) {
+      double sum = 0;
+      for (int row = y; row < y + 8; ++row)
+        for (int x = 0; x < 8; ++x) sum += image.pixels[4ul * (std::size_t(row) * image.width + x) + 2];
+      const double mean = sum / 64;
+      if (y > 0) largest = std::max(largest, std::abs(mean - last));
+      last = mean;
+      highest = std::max(highest, mean);
+      lowest = std::min(lowest, mean);
+    }
+    EXPECT_GT(highest - lowest, 20) << supersample;
+    EXPECT_LT(largest, 0.5) << supersample;
+  }
+}
+
 }  // namespace
 }  // namespace medulla
