@@ -163,6 +163,40 @@ const Glyph& glyphOf(char character) {
   return found != std::end(kGlyphs) && found->character == character ? *found : kBox;
 }
 
+// Turns of up to 66 degrees are of arcs: a quarter circle on the grid is two of 45. Bezier curves take their place.
+void appendCorner(vec2 before, vec2 corner, vec2 after, float unit, std::vector<vec2>& path) {
+  constexpr int kPieces = 6;
+  constexpr float kLongest = 0.75f;  // grid units of a stroke that the curve may take; half of it where it is short
+  const vec2 in = corner - before, out = after - corner;
+  const float inLength = glm::length(in), outLength = glm::length(out);
+  if (glm::dot(in, out) < 0.4f * inLength * outLength) {
+    path.push_back(corner);
+    return;
+  }
+  const vec2 from = corner - std::min(0.5f, kLongest * unit / inLength) * in,
+             to = corner + std::min(0.5f, kLongest * unit / outLength) * out;
+  for (int k = 0; k <= kPieces; ++k) {
+    const float t = float(k) / kPieces;
+    path.push_back(glm::mix(glm::mix(from, corner, t), glm::mix(corner, to, t), t));
+  }
+}
+
+// A polyline of the grid, at least two points, with its arcs made round.
+void strokeLine(const std::vector<vec2>& points, float unit, float radius, Ink& ink) {
+  std::vector<vec2> path;
+  const std::size_t last = points.size() - 1;
+  const bool isClosed = last > 1 && points[0] == points[last];
+  if (!isClosed) path.push_back(points[0]);
+  for (std::size_t k = 1; k < last; ++k) appendCorner(points[k - 1], points[k], points[k + 1], unit, path);
+  if (isClosed) {
+    appendCorner(points[last - 1], points[0], points[1], unit, path);
+    path.push_back(path[0]);
+  } else {
+    path.push_back(points[last]);
+  }
+  for (std::size_t k = 1; k < path.size(); ++k) ink.stroke(path[k - 1], path[k], radius);
+}
+
 // Of UTF-8: the bytes that carry a character on have no place of their own.
 bool continues(char c) {
   return (static_cast<unsigned char>(c) & 0xC0) == 0x80;
@@ -182,10 +216,11 @@ void writeText(const std::string& text, vec2 corner, float height, Ink& ink) {
   for (const char c : text) {
     if (continues(c)) continue;
     const Glyph& glyph = glyphOf(c);
-    const auto point = [&](const char* at) { return corner + unit * vec2(float(at[0] - '0'), float(at[1] - '0')); };
-    for (const char* at = glyph.strokes; *at; at += 2) {
-      if (*at == ' ') ++at;
-      if (at[2] && at[2] != ' ') ink.stroke(point(at), point(at + 2), 0.085f * height);
+    for (const char* at = glyph.strokes; *at;) {
+      std::vector<vec2> points;
+      for (; *at && *at != ' '; at += 2) points.push_back(corner + unit * vec2(float(at[0] - '0'), float(at[1] - '0')));
+      strokeLine(points, unit, 0.085f * height, ink);
+      if (*at) ++at;
     }
     corner.x += glyph.advance * unit;
   }
