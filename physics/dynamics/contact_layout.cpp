@@ -145,8 +145,8 @@ void excludeWhatOverlapsAtRest(WorldData& d) {
   for (std::vector<std::uint32_t>& e : c.excluded) sortUnique(e);
 }
 
-// `held`: a point of the body's surface.
-void findWhatHolds(ContactData& c, int sphere, const Vector3d& held) {
+// The sphere meets no shape that lies at `held`, a point of its body's surface that is held, if it reaches there.
+void markFixedTo(ContactData& c, int sphere, const Vector3d& held) {
   const double radius = c.ball[sphere].v[3], near = kTouchingAtRest * radius;
   if ((held - vectorOf(c.ball[sphere])).norm() > radius + near) return;
   for (std::size_t k = 0; k < c.statics.size(); ++k)
@@ -167,8 +167,8 @@ void findWhatIsFixedToStatics(WorldData& d) {
       if (!isHeld[n0] || !isHeld[n1] || !isHeld[n2]) continue;
       std::array<Vector3d, 3> corners{body.model->restNodes[n0], body.model->restNodes[n1], body.model->restNodes[n2]};
       for (Vector3d& corner : corners) corner = body.worldFromModel * corner;
-      for (int i = d.ranges[b].firstSphere; i < d.ranges[b].firstSphere + d.ranges[b].sphereCount; ++i)
-        findWhatHolds(c, i, closestOnTriangle(vectorOf(c.ball[i]), corners));
+      for (const int i : spheresOf(d.ranges[b]))
+        markFixedTo(c, i, closestOnTriangle(vectorOf(c.ball[i]), corners));
     }
   }
 }
