@@ -297,14 +297,26 @@ TEST(Contact, WhatIsFixedToAStaticShapeDoesNotStandOnIt) {
     return world;
   };
   for (const auto& [shape, side] : {std::pair(floor, -1), {ceiling, 1}}) {
-    const World glued = worldWith(shape, [&](const Vector3d& x) { return side * x.y() > 0.8 * radius; });
+    const auto isGlued = [&](const Vector3d& x) { return side * x.y() > -0.001; };
+    const World glued = worldWith(shape, isGlued);
     EXPECT_TRUE(glued.startOverlaps().empty());
     EXPECT_EQ(glued.penetration().statics, 0);
-    const World byAnEnd = worldWith(shape, [&](const Vector3d& x) { return x.x() < 0.005; });
-    EXPECT_EQ(byAnEnd.startOverlaps().size(), 1u);
-    EXPECT_GT(byAnEnd.penetration().statics, 5);
-    EXPECT_EQ(worldWith(shape, [](const Vector3d&) { return false; }).startOverlaps().size(), 1u);
+    // What is glued elsewhere, or not at all, stands on it.
+    for (const double middle : {0.0, 0.04, 1.0}) {
+      const World elsewhere =
+          worldWith(shape, [&](const Vector3d& x) { return isGlued(x) && std::abs(x.x() - middle) < 0.011; });
+      ASSERT_EQ(elsewhere.startOverlaps().size(), 1u) << middle;
+      EXPECT_NEAR(elsewhere.startOverlaps()[0].depth, 0.001, 1e-9);
+      EXPECT_GT(elsewhere.penetration().statics, 5);
+    }
   }
+  // Half a millimetre in the wall of a mesh to whose ceiling it is glued.
+  const double wall = 0.08 + radius - 0.0005;
+  ceiling.mesh.vertices.insert(ceiling.mesh.vertices.end(), {{wall, -1, -1}, {wall, 1, -1}, {wall, 0, 1}});
+  ceiling.mesh.triangles.push_back({3, 5, 4});
+  const World inWall = worldWith(ceiling, [&](const Vector3d& x) { return x.y() > -0.001; });
+  ASSERT_EQ(inWall.startOverlaps().size(), 1u);
+  EXPECT_NEAR(inWall.startOverlaps()[0].depth, 0.0005, 1e-9);
 }
 
 TEST(Contact, OverlapAtTheStartIsReportedAndPushedOutSlowly) {

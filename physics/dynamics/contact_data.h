@@ -105,9 +105,10 @@ struct ContactData {
   std::vector<char> collides;                        // bodies x bodies
   std::vector<double> rootFriction;                  // per body
   std::vector<StaticContactShape> statics;
-  std::vector<char> isFixedTo;  // statics x spheres: the body's surface is held where the two meet
-  double margin = 0;            // m: pairs nearer than this are listed
-  double freeMove = 0;          // m: what a ball may move before the lists are made anew
+  // m, statics x spheres: where the shape is nearest to the ball at the start, if the body is held there; else NaN
+  std::vector<Eigen::Vector3d> fixedAt;
+  double margin = 0;    // m: pairs nearer than this are listed
+  double freeMove = 0;  // m: what a ball may move before the lists are made anew
 
   // Lists, and the balls' places when they were made. Pairs are chosen from those of overlapping boxes, which are wide
   // enough to serve several lists.

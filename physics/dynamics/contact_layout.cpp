@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "physics/dynamics/contact_stages.h"
@@ -145,31 +146,36 @@ void excludeWhatOverlapsAtRest(WorldData& d) {
   for (std::vector<std::uint32_t>& e : c.excluded) sortUnique(e);
 }
 
-// The sphere meets no shape that lies at `held`, a point of its body's surface that is held, if it reaches there.
-void markFixedTo(ContactData& c, int sphere, const Vector3d& held) {
-  const double radius = c.ball[sphere].v[3], near = kTouchingAtRest * radius;
-  if ((held - vectorOf(c.ball[sphere])).norm() > radius + near) return;
-  for (std::size_t k = 0; k < c.statics.size(); ++k)
-    if (isNear(c.statics[k], held, near)) c.isFixedTo[k * c.ball.size() + sphere] = true;
+// Of whose triangles every corner is held; in the world.
+TriangleMesh heldSurface(const BodyDescription& body) {
+  TriangleMesh held;
+  std::vector<char> isHeld(body.model->restNodes.size(), false);
+  for (const int n : body.fixedNodes) isHeld[n] = true;
+  for (const Vector3d& x : body.model->restNodes) held.vertices.push_back(body.worldFromModel * x);
+  for (const auto& t : body.model->triangles)
+    if (isHeld[t[0]] && isHeld[t[1]] && isHeld[t[2]]) held.triangles.push_back(t);
+  return held;
 }
 
 // What is glued to a shape is held by the tissue between. A rigid ball that stood on it besides would bear what that
-// does again: a slab on a table that it is fixed to felt twice as hard to a tool. Of a skin nodes are not held.
+// does again: a slab on a table that it is fixed to felt twice as hard to a tool. So a ball does not stand on the place
+// below it if that is held there, or a quarter of its radius beside; it may still rest on any other. Of a skin nodes
+// are not held.
 void findWhatIsFixedToStatics(WorldData& d) {
+  constexpr double kBeside = 0.25;
   ContactData& c = d.contact;
-  c.isFixedTo.assign(c.statics.size() * c.ball.size(), false);
+  c.fixedAt.assign(c.statics.size() * c.ball.size(), Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     const BodyDescription& body = d.bodies[b];
-    if (c.statics.empty() || (body.surface == SurfaceMode::skin && body.links != LinkModel::identified)) continue;
-    std::vector<char> isHeld(body.model->restNodes.size(), false);
-    for (const int n : body.fixedNodes) isHeld[n] = true;
-    for (const auto& [n0, n1, n2] : body.model->triangles) {
-      if (!isHeld[n0] || !isHeld[n1] || !isHeld[n2]) continue;
-      std::array<Vector3d, 3> corners{body.model->restNodes[n0], body.model->restNodes[n1], body.model->restNodes[n2]};
-      for (Vector3d& corner : corners) corner = body.worldFromModel * corner;
-      for (const int i : spheresOf(d.ranges[b]))
-        markFixedTo(c, i, closestOnTriangle(vectorOf(c.ball[i]), corners));
-    }
+    if (body.surface == SurfaceMode::skin && body.links != LinkModel::identified) continue;
+    const TriangleMesh held = heldSurface(body);
+    if (held.triangles.empty()) continue;
+    const SurfaceTree tree = makeSurfaceTree(held);
+    for (std::size_t k = 0; k < c.statics.size(); ++k)
+      for (const int i : spheresOf(d.ranges[b])) {
+        const Vector3d below = nearestPoint(c.statics[k], vectorOf(c.ball[i]));
+        if (closestPoint(tree, below).distance < kBeside * c.ball[i].v[3]) c.fixedAt[k * c.ball.size() + i] = below;
+      }
   }
 }
 

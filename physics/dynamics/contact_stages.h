@@ -20,8 +20,7 @@ void listNeighbours(WorldData& d);        // both lists anew, at ContactData::ba
 void listStaticNeighbours(WorldData& d);  // contact_static.cpp: the part of it that concerns static shapes
 double farthestMove(const ContactData& c, const std::vector<Quad>& from);  // m, of any ball since it was there
 
-// contact_static.cpp: whether a point is nearer to the shape than `within` (m), or in it; of a mesh, near its surface.
-bool isNear(const StaticContactShape& shape, const Eigen::Vector3d& p, double within);
+Eigen::Vector3d nearestPoint(const StaticContactShape& shape, const Eigen::Vector3d& p);  // contact_static.cpp; m
 
 // Appends a contact for every pair that overlaps or might before the substep's end; ascending in key. `moved` is
 // what the farthest ball has moved since ContactData::ballAtList, or more.

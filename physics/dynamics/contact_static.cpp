@@ -114,6 +114,8 @@ Touches touchesOf(const SurfaceTree& tree, const TriangleDistance* begin, const 
 void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int ordinal) {
   ContactData& c = d.contact;
   const Quad& ball = c.ball[n.sphere];
+  const Vector3d point = vectorOf(ball) - at.distance * at.normal;
+  if ((point - c.fixedAt[n.shape * c.ball.size() + n.sphere]).norm() < ball.v[3]) return;
   const int body = c.bodyOf[n.sphere];
   Contact& contact = c.contacts.emplace_back();
   contact.key =
@@ -136,9 +138,10 @@ std::array<int, 2> bodiesOf(const WorldData& d, std::uint64_t key) {
   return {colliders[key >> 32].body, colliders[key & 0xffffffff].body};
 }
 
-bool isNear(const StaticContactShape& shape, const Vector3d& p, double within) {
-  const bool isMesh = shape.kind == StaticShape::Kind::mesh;
-  return (isMesh ? closestPoint(shape.tree, p, within).distance : nearestOn(shape, p).distance) < within;
+Vector3d nearestPoint(const StaticContactShape& shape, const Vector3d& p) {
+  if (shape.kind == StaticShape::Kind::mesh) return closestPoint(shape.tree, p).point;
+  const Nearest at = nearestOn(shape, p);
+  return p - at.distance * at.normal;
 }
 
 void listStaticNeighbours(WorldData& d) {
@@ -149,7 +152,6 @@ void listStaticNeighbours(WorldData& d) {
     const StaticContactShape& shape = c.statics[k];
     for (std::uint32_t i = 0; i < c.ball.size(); ++i) {
       if (c.inverseCellMass[i] == 0 || d.rest[c.bodyOf[i]].asleep) continue;  // fixed or a pad, or asleep
-      if (c.isFixedTo[k * c.ball.size() + i]) continue;
       const Vector3d p = vectorOf(c.ball[i]);
       const double radius = c.ball[i].v[3];
       const int first = static_cast<int>(c.nearTriangles.size());
