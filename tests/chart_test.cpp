@@ -243,6 +243,21 @@ TEST_F(ChartCommand, MethodsAreWhatTheyAreNamedAfterInAnyScene) {
   EXPECT_NE(errorOf(2), errorOf(3));
 }
 
+// A skin has no nodes to be held by: unless it was asked for, its curve is left out where too little is fixed.
+TEST_F(ChartCommand, AMethodThatDoesNotFitTheSceneIsLeftOut) {
+  std::string text = readFile(folder / "case.xml");
+  const std::size_t fix = text.find("<fix"), end = text.find("/>", fix);
+  folder.write("case.xml", text.replace(fix, end - fix, "<fix sphere='-0.0525 -0.0385 0.02 0.012'"));
+  const std::vector<std::string> quick{"--steps", "0.25", "--set", "clock.duration=0.02", "--set", "output.golden=0"};
+  const ProgramResult r = chart(quick);
+  EXPECT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_NE(r.err.find("note: no curve of skin: "), std::string::npos) << r.err;
+  for (const auto& row : rowsOf(folder / "out/chart.csv")) EXPECT_NE(row[0], "skin");
+  std::vector<std::string> asked = quick;
+  asked.insert(asked.end(), {"--methods", "full,skin"});
+  EXPECT_EQ(chart(asked).exitCode, 1);
+}
+
 TEST_F(ChartCommand, WhereEveryRunFailsPicturesShowThat) {
   if (std::system("gnuplot --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "gnuplot is not installed";
   const std::string assets = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/", model = folder / "three.xml";

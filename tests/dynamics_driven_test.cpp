@@ -43,6 +43,18 @@ TEST(DrivenSphere, IsOnItsPathAtEveryFrame) {
   }
 }
 
+TEST(DrivenSphere, IsSteppedSixteenTimesPerSwing) {
+  for (const double frequency : {0.5, 200.0, 5000.0}) {
+    BodyDescription b = tube(SurfaceMode::skin);
+    b.driven = {{.sphere = 0, .amplitude = 0.001, .frequency = frequency}};
+    WorldSettings settings;
+    settings.integrator = Integrator::implicit;
+    EXPECT_EQ(World(settings, {b}).substepsPerFrame(), std::max(4, int(std::lround(16 * 0.02 * frequency))));
+    settings.substeps = 3;  // as asked for
+    EXPECT_EQ(World(settings, {b}).substepsPerFrame(), 3);
+  }
+}
+
 // Shaken aside and across by its first sphere, a tube turns it, unless its orientation is held, too.
 TEST(DrivenSphere, TurnsAsFarAsItsFreedomSays) {
   for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit}) {

@@ -142,6 +142,21 @@ TEST_F(RunNotes, ABodyOfWhichEveryNodeIsHeld) {
   }
 }
 
+TEST_F(RunNotes, LoadsThatDoNothing) {
+  const std::string text = read("own/organ.xml"), fix = "<fix spheres=\"1\"/>";
+  const auto notesOf = [&](const std::string& fixesAndLoads) {
+    std::string changed = text;
+    folder.write("own/organ.xml", changed.replace(changed.find(fix), fix.size(), fixesAndLoads));
+    return complaints(run({"check", "own/organ.xml"}));
+  };
+  const std::string end = "<fix sphere='-0.0525 -0.0385 0.02 0.012'/>",
+                    load = "<load sphere='-0.0525 -0.0385 0.02 0.012' force='0 0 -0.1'";
+  EXPECT_EQ(notesOf(fix + load + "/>"), Notes{});
+  EXPECT_EQ(notesOf(end + load + "/>"), Notes{"note: every load on body 'organ' acts where it is held"});
+  EXPECT_EQ(notesOf(fix + load + " from='0.48' to='1'/>"),
+            Notes{"note: a load on body 'organ' begins at 0.48 s, and the scene ends at 0.48 s"});
+}
+
 TEST_F(RunNotes, AModelWhoseIdentifiedLinksAreNotTaken) {
   const auto notesOf = [&](const std::string& links) {
     folder.write("own/liver.xml", fmt::format(R"(<scene name="liver"><clock duration="0.1"/>

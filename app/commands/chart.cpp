@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "app/commands/chart_errors.h"
@@ -111,6 +112,19 @@ int chosenSubsteps(LoadedScene loaded) {
   return makeWorld(loaded).substepsPerFrame();
 }
 
+// Of the methods that are drawn where none were asked for one may not fit the scene, as a skin of a body that is glued
+// by less than half of any sphere's surface: it is left out, with a note. Throws what loading throws of any other.
+std::optional<LoadedScene> loadMethod(const ChartRun& run, const ChartOptions& options) {
+  const bool mayBeLeftOut = run.method > 0 && options.methods == chartMethodsOfAnyModel();
+  try {
+    return loadRun(run.options);
+  } catch (const std::runtime_error& error) {
+    if (!mayBeLeftOut) throw;
+    fmt::print(stderr, "note: no curve of {}: {}\n", run.curve, error.what());
+    return {};
+  }
+}
+
 // Every run of the chart. Where the scene names no reference there is one more, the reference, last: the first method
 // on the most spheres, at half of the smallest step.
 std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& base) {
@@ -134,7 +148,9 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
       ChartRun run{name, options.run, 0, 0, number, k};
       for (const auto& overrides : {expanded(method->overrides, base.scene), models[k]})
         run.options.overrides.insert(run.options.overrides.end(), overrides.begin(), overrides.end());
-      const LoadedScene loaded = loadRun(run.options);
+      const std::optional<LoadedScene> perhaps = loadMethod(run, options);
+      if (!perhaps) break;
+      const LoadedScene& loaded = *perhaps;
       requireSameMeshes(base, loaded);
       run.spheres = spheresOf(loaded);
       if (models.size() > 1) run.curve += fmt::format("_{}_spheres", run.spheres);

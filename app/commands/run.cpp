@@ -29,6 +29,7 @@ std::map<std::string, std::string> filesOfTools(const std::string& option, const
                                                 const std::map<std::string, std::string>& files) {
   std::map<std::string, std::string> out;
   for (const auto& [name, path] : files) {
+    if (scene.tools.empty()) throw std::runtime_error(fmt::format("{} {}: the scene has no tool", option, path));
     if (name.empty() && scene.tools.size() != 1)
       throw std::runtime_error(
           fmt::format("{} {}: the scene has {} tools, write TOOL=FILE", option, path, scene.tools.size()));
@@ -66,14 +67,17 @@ void PictureTimes::afterFrame(const Simulation& simulation, const std::function<
   }
 }
 
+// One who shortens a scene knows what is not played.
+static bool isShortened(const Scene& scene, bool isExcerpt) {
+  return isExcerpt || std::any_of(scene.overridden.begin(), scene.overridden.end(),
+                                  [](const OverriddenAttribute& o) { return o.path == "clock.duration"; });
+}
+
 // Scripted motions end before their scenes by intention, and the tool stands still from then on. What lies outside the
 // scene is never seen, and a table whose clock begins late was likely cut out of a longer one.
 static void printUnplayed(const LoadedScene& loaded, bool isExcerpt) {
   constexpr double kLeast = 0.5, kShare = 0.05;  // s; of the motion
   const Scene& scene = loaded.scene;
-  const bool isShortened =
-      isExcerpt || std::any_of(scene.overridden.begin(), scene.overridden.end(),
-                               [](const OverriddenAttribute& o) { return o.path == "clock.duration"; });
   for (std::size_t k = 0; k < loaded.trajectories.size(); ++k) {
     const SceneTool& tool = scene.tools[k];
     const double start = loaded.trajectories[k].samples.front().time, end = motionEnd(loaded.trajectories[k]);
@@ -82,7 +86,7 @@ static void printUnplayed(const LoadedScene& loaded, bool isExcerpt) {
     if (tool.recordingPath.empty() && start > kLeast && length > 0)
       fmt::print(stderr, "note: tool '{}' stands still until {:.6g} s, where {} begins\n", tool.name, start,
                  tool.trajectoryPath);
-    if (!isShortened && outside >= kLeast && outside > kShare * length)
+    if (!isShortened(scene, isExcerpt) && outside >= kLeast && outside > kShare * length)
       fmt::print(stderr,
                  "note: {:.4g} of {:.4g} s of the motion of tool '{}' are not played: the scene is 0 to {:.6g} s\n",
                  outside, length, tool.name, scene.duration);
@@ -127,6 +131,19 @@ static void printBuriedTools(const LoadedScene& loaded, const World& world) {
   }
 }
 
+static void printIdleLoads(const Scene& scene, bool isExcerpt) {
+  for (const SceneBody& body : scene.bodies) {
+    const std::set<int> held(body.fixedNodes.begin(), body.fixedNodes.end());
+    if (!body.deadLoads.empty() && std::all_of(body.deadLoads.begin(), body.deadLoads.end(),
+                                               [&](const DeadLoad& l) { return held.count(l.node) > 0; }))
+      fmt::print(stderr, "note: every load on body '{}' acts where it is held\n", body.name);
+    for (const SceneLoad& load : body.loads)
+      if (load.whole.from >= scene.duration && !isShortened(scene, isExcerpt))
+        fmt::print(stderr, "note: a load on body '{}' begins at {:.6g} s, and the scene ends at {:.6g} s\n", body.name,
+                   load.whole.from, scene.duration);
+  }
+}
+
 // Who had finite elements identify links hardly wants beams by default.
 static void printUnusedNetworks(const Scene& scene) {
   for (const SceneBody& body : scene.bodies)
@@ -159,6 +176,7 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
     if (std::set<int>(body.fixedNodes.begin(), body.fixedNodes.end()).size() == body.model->restNodes.size())
       fmt::print(stderr, "note: every node of body '{}' is held\n", body.name);
   printUnusedNetworks(scene);
+  printIdleLoads(scene, options.isExcerpt);
   if (scene.dynamics.integrator != Integrator::implicit) return;
   if (scene.dynamics.sleepAfter > 0)
     fmt::print(stderr, "warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");

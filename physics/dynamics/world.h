@@ -90,7 +90,9 @@ struct WorldSettings {
   double frameDuration = 0.02;           // s, one dynamics frame
   Integrator integrator = Integrator::explicitEuler;
   int order = 1;     // of the implicit integrator, 1 or 2
-  int substeps = 0;  // per dynamics frame; 0: as many as the stability estimate asks for, implicit: of 5 ms at most
+  // Per dynamics frame; 0: as many as the stability estimate asks for, implicit: of 5 ms at most; 16 or more per swing
+  // of what drives a sphere.
+  int substeps = 0;
   ContactMode contact = ContactMode::none;
   // Dynamics frames before time 0, in which bodies come to rest under weight and contact: dead loads wait, driven
   // spheres stay where they are.
