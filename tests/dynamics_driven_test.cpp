@@ -44,12 +44,13 @@ TEST(DrivenSphere, IsOnItsPathAtEveryFrame) {
 }
 
 TEST(DrivenSphere, IsSteppedSixteenTimesPerSwing) {
-  for (const double frequency : {0.5, 200.0, 5000.0}) {
+  for (const double frequency : {0.5, 200.0, 5000.0, 1e300}) {
     BodyDescription b = tube(SurfaceMode::skin);
     b.driven = {{.sphere = 0, .amplitude = 0.001, .frequency = frequency}};
     WorldSettings settings;
     settings.integrator = Integrator::implicit;
-    EXPECT_EQ(World(settings, {b}).substepsPerFrame(), std::max(4, int(std::lround(16 * 0.02 * frequency))));
+    EXPECT_EQ(World(settings, {b}).substepsPerFrame(),
+              std::clamp(std::lround(16 * 0.02 * std::min(frequency, 1e5)), 4l, 20000l));
     settings.substeps = 3;  // as asked for
     EXPECT_EQ(World(settings, {b}).substepsPerFrame(), 3);
   }

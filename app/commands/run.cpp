@@ -134,8 +134,10 @@ static void printBuriedTools(const LoadedScene& loaded, const World& world) {
 static void printIdleLoads(const Scene& scene, bool isExcerpt) {
   for (const SceneBody& body : scene.bodies) {
     const std::set<int> held(body.fixedNodes.begin(), body.fixedNodes.end());
-    if (!body.deadLoads.empty() && std::all_of(body.deadLoads.begin(), body.deadLoads.end(),
-                                               [&](const DeadLoad& l) { return held.count(l.node) > 0; }))
+    const bool holdsNodes = body.surface != SurfaceMode::skin || body.links == LinkModel::identified;
+    if (holdsNodes && !body.deadLoads.empty() &&
+        std::all_of(body.deadLoads.begin(), body.deadLoads.end(),
+                    [&](const DeadLoad& l) { return held.count(l.node) > 0; }))
       fmt::print(stderr, "note: every load on body '{}' acts where it is held\n", body.name);
     for (const SceneLoad& load : body.loads)
       if (load.whole.from >= scene.duration && !isShortened(scene, isExcerpt))

@@ -185,11 +185,11 @@ std::vector<BodyMechanics> mechanicsOf(const std::vector<BodyDescription>& bodie
 
 // Per dynamics frame. Steps that are stable may still miss what drives a body: of 5 ms, all that swings at 200 Hz.
 static int chosenSubsteps(const WorldSettings& settings, const std::vector<BodyDescription>& bodies, double stable) {
-  constexpr double kPerSwing = 16;
+  constexpr double kPerSwing = 16, kShortest = 1e-6;  // s; nobody waits for what swings faster
   double longest = settings.integrator == Integrator::implicit ? kImplicitStep : kStepSafety * stable;
   for (const BodyDescription& body : bodies)
     for (const DrivenSphere& driven : body.driven)
-      if (driven.amplitude > 0) longest = std::min(longest, 1 / (kPerSwing * driven.frequency));
+      if (driven.amplitude > 0) longest = std::min(longest, std::max(kShortest, 1 / (kPerSwing * driven.frequency)));
   return std::max(1, static_cast<int>(std::ceil(settings.frameDuration / longest)));
 }
 
