@@ -296,7 +296,8 @@ TEST(Contact, WhatIsFixedToAStaticShapeDoesNotStandOnIt) {
     world.advance({});
     return world;
   };
-  for (const auto& [shape, side] : {std::pair(floor, -1), {ceiling, 1}}) {
+  for (const int side : {-1, 1}) {
+    const StaticShape& shape = side < 0 ? floor : ceiling;
     const auto isGlued = [&](const Vector3d& x) { return side * x.y() > -0.001; };
     const World glued = worldWith(shape, isGlued);
     EXPECT_TRUE(glued.startOverlaps().empty());

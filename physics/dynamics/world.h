@@ -89,7 +89,7 @@ struct WorldSettings {
   double ambientDrag = 0;                // 1/s, >= 0: everything loses this share of its speed; 0 but under water
   double frameDuration = 0.02;           // s, one dynamics frame
   Integrator integrator = Integrator::explicitEuler;
-  int order = 1;     // of the implicit integrator, 1 or 2
+  int order = 1;  // of the implicit integrator, 1 or 2
   // Per dynamics frame; 0: as many as the stability estimate asks for, implicit: of 5 ms at most; 16 or more per swing
   // of what drives a sphere.
   int substeps = 0;
