@@ -11,6 +11,7 @@
 #include "app/commands/run_recorders.h"
 #include "app/files/text.h"
 #include "app/interrupt.h"
+#include "physics/dynamics/rigid_support.h"
 #include "physics/model/surface_queries.h"
 
 namespace medulla {
@@ -134,8 +135,7 @@ static void printBuriedTools(const LoadedScene& loaded, const World& world) {
 static void printIdleLoads(const Scene& scene, bool isExcerpt) {
   for (const SceneBody& body : scene.bodies) {
     const std::set<int> held(body.fixedNodes.begin(), body.fixedNodes.end());
-    const bool holdsNodes = body.surface != SurfaceMode::skin || body.links == LinkModel::identified;
-    if (holdsNodes && !body.deadLoads.empty() &&
+    if (holdsByNodes(body) && !body.deadLoads.empty() &&
         std::all_of(body.deadLoads.begin(), body.deadLoads.end(),
                     [&](const DeadLoad& l) { return held.count(l.node) > 0; }))
       fmt::print(stderr, "note: every load on body '{}' acts where it is held\n", body.name);

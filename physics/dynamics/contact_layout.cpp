@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "physics/dynamics/contact_stages.h"
+#include "physics/dynamics/rigid_support.h"
 #include "physics/sort_unique.h"
 
 namespace medulla {
@@ -167,7 +168,7 @@ void findWhatIsFixedToStatics(WorldData& d) {
   c.fixedAt.assign(c.statics.size() * c.ball.size(), Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
     const BodyDescription& body = d.bodies[b];
-    if (body.surface == SurfaceMode::skin && body.links != LinkModel::identified) continue;
+    if (!holdsByNodes(body)) continue;
     const TriangleMesh held = heldSurface(body);
     if (held.triangles.empty()) continue;
     const SurfaceTree tree = makeSurfaceTree(held);
