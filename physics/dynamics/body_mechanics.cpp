@@ -39,8 +39,8 @@ constexpr double kFoundationFactor = 0.8;
 constexpr double kLayerThicknessOverDepth = 1.0 / 20;
 
 // Volume pressure: the bulk modulus E / 3 (1 - 2 nu), of Young's modulus not more than this. More keeps the volume
-// little better, and would alone bound the step.
-constexpr double kLargestBulk = 1.2;
+// little better, and would alone bound the step. Identified layers are fitted, and their figures measured, beside E.
+constexpr double kLargestBulk = 1.2, kLargestIdentifiedBulk = 1;
 
 // Of the bulk modulus: beyond a tenth of the volume the pressure stays. Where a body lies inside out it would be any
 // number.
@@ -132,7 +132,8 @@ std::vector<Attachment> attachmentsToSpans(const SoftBodyModel& m, const std::ve
 // floor: a pressure so is never more than a few times as stiff as the attachments that it presses.
 void setBulk(const BodyDescription& body, double volume, const std::vector<double>& depth, BodyMechanics& out) {
   const double compression = 1 / (3 * (1 - 2 * body.tissue.poisson));
-  const double bulk = std::min(compression, kLargestBulk) * body.tissue.young;
+  const double largest = isIdentified(body) ? kLargestIdentifiedBulk : kLargestBulk;
+  const double bulk = std::min(compression, largest) * body.tissue.young;
   out.largestPressure = kLargestSwelling * bulk;
   out.linkBulk.assign(body.model->links.size(), 0);
   out.sphereBulk.assign(body.model->spheres.size(), 0);
