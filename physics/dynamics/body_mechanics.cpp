@@ -27,7 +27,7 @@ using Eigen::Vector3d;
 // What is pressed is a foundation of two parameters (Vlasov 1966): tissue whose displacement falls off evenly from the
 // surface to the skeleton resists being pressed and being sheared, the latter like a membrane of tension G depth / 3,
 // which hands a dent on to its surroundings. Springs side by side alone let a tool sink the deeper, the finer the mesh.
-// The three factors are those that bring pokes on beds nearest to finite elements without making others worse
+// The three factors are those that bring pokes on beds nearest to finite elements without making slender bodies worse
 // (tests/accuracy); the valley is flat.
 
 // Attachment: k = c E area / depth, with depth the distance to the skeleton. The column is never taken shorter than it
