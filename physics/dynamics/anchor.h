@@ -29,6 +29,7 @@ struct LinkHost {
   Lanes thickness, thicknessRate;
   Lanes3 bow, bowVelocity;
   Lanes slopeU, slopeV, slopeUAlong, slopeVAlong, slopeURate, slopeVRate, slopeUAlongRate, slopeVAlongRate;
+  Lanes curveU, curveV, curveURate, curveVRate;
 };
 
 inline LinkHost linkHost(const WorldData& d, int link) {
@@ -60,6 +61,10 @@ inline LinkHost linkHost(const WorldData& d, int link) {
   h.slopeVRate = splat(f.slopeVRate[lane]);
   h.slopeUAlongRate = splat(f.slopeUAlongRate[lane]);
   h.slopeVAlongRate = splat(f.slopeVAlongRate[lane]);
+  h.curveU = splat(f.curveU[lane]);
+  h.curveV = splat(f.curveV[lane]);
+  h.curveURate = splat(f.curveURate[lane]);
+  h.curveVRate = splat(f.curveVRate[lane]);
   return h;
 }
 
@@ -78,16 +83,37 @@ inline Slope slopeAt(const LinkHost& h, const NodeGroup& g) {
   return {fma(g.along, h.slopeUAlong, h.slopeU), fma(g.along, h.slopeVAlong, h.slopeV)};
 }
 
+// Where a bar bends, its sections widen inside of the bend and narrow outside (Saint-Venant): at (y, z) by nu kappa.(y,
+// z), the same along both, kappa being the curvature. With o = y + i z and c = nu / 2 (kappaU - i kappaV) that is o + c
+// o^2, to first order; o / (1 - c o), which never folds where |c o| < 1, moves with c by the square of itself: rates
+// and loads ask for where the node belongs alone.
+struct Section {
+  Lanes y, z;
+};
+MEDULLA_INLINE Section curved(const LinkHost& h, Lanes y, Lanes z) {
+  const Lanes real = fnma(h.curveU, y, fnma(h.curveV, z, splat(1))), imaginary = fnma(h.curveV, y, h.curveU * z);
+  const Lanes scale = splat(1) / fma(real, real, imaginary * imaginary);
+  return {scale * fnma(imaginary, z, real * y), scale * fma(imaginary, y, real * z)};
+}
+// How (y, z) moves where the curve c = u - i v changes by (u, v): a symmetric matrix.
+MEDULLA_INLINE Section byCurve(Lanes y, Lanes z, Lanes u, Lanes v) {
+  const Lanes a = fnma(z, z, y * y), b = splat(2) * (y * z);
+  return {fma(a, u, b * v), fnma(a, v, b * u)};
+}
+
 // Velocity of the point of the skeleton, and what changes about the offset, with (y, z) on U and V, otherwise than by
 // turning.
 MEDULLA_INLINE Lanes3 baseVelocityOf(const LinkHost& h, const NodeGroup& g, const Lanes3& offset, Lanes y, Lanes z) {
   const Lanes3 straight = fma(g.along, h.lineVelocity, h.originVelocity);
   if (!h.isBeam) return straight;
   const Slope slope = slopeAt(h, g);
-  const Lanes swirl = (g.twistShare * h.spinAlong) * (y * slope.v - z * slope.u);
-  const Lanes leaning = fma(y, fma(g.along, h.slopeUAlongRate, h.slopeURate),
-                            fma(z, fma(g.along, h.slopeVAlongRate, h.slopeVRate), swirl));
-  return fnma(leaning, h.n, fma(bump(g), h.bowVelocity, fma(h.thicknessRate, offset, straight)));
+  const Lanes spin = g.twistShare * h.spinAlong, swirl = spin * (y * slope.v - z * slope.u);
+  const Section wider = byCurve(y, z, fma(spin, h.curveV, h.curveURate), fnma(spin, h.curveU, h.curveVRate));
+  const Lanes leaning =
+      fma(y, fma(g.along, h.slopeUAlongRate, h.slopeURate),
+          fma(z, fma(g.along, h.slopeVAlongRate, h.slopeVRate), fma(wider.y, slope.u, fma(wider.z, slope.v, swirl))));
+  const Lanes3 across = fma(wider.y, h.axisU, wider.z * h.axisV);
+  return fnma(leaning, h.n, fma(bump(g), h.bowVelocity, fma(h.thicknessRate, offset, straight + across)));
 }
 
 // The point at `along` of the centre line, slid with its stretch, plus the offset in the frame of sphere 0 carried onto
@@ -102,7 +128,12 @@ MEDULLA_INLINE Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
     c = c * h.thickness;
     s = s * h.thickness;
   }
-  const Lanes y = fnma(g.restOffset.z, s, g.restOffset.y * c), z = fma(g.restOffset.y, s, g.restOffset.z * c);
+  Lanes y = fnma(g.restOffset.z, s, g.restOffset.y * c), z = fma(g.restOffset.y, s, g.restOffset.z * c);
+  if (h.isBeam) {
+    const Section section = curved(h, y, z);
+    y = section.y;
+    z = section.z;
+  }
   a.base = fma(g.along, h.line, h.origin);
   a.omega = fma(fma(g.twistShare, h.spinAlong, h.spin0), h.n, h.turning);
   a.offset = fma(y, h.axisU, z * h.axisV);
@@ -118,7 +149,7 @@ MEDULLA_INLINE Anchor anchorOnLink(const LinkHost& h, const NodeGroup& g) {
 inline AnchorLoads noLoads() {
   const Lanes zero = splat(0);
   const Lanes3 none = zeroVectors();
-  return {none, none, none, none, zero, zero, zero, zero, zero, zero};
+  return {none, none, none, none, zero, zero, zero, zero, zero, zero, zero, zero};
 }
 
 // Adds forces on the anchors of four nodes, whose moments about the bases are `turn`: the transpose of the anchors'
@@ -131,14 +162,19 @@ MEDULLA_INLINE void addLoads(const LinkHost& h, const NodeGroup& g, const Lanes3
   Lanes about = dot(h.n, turn);
   if (h.isBeam) {
     const Slope slope = slopeAt(h, g);
-    const Lanes forward = dot(h.n, force), y = forward * dot(h.axisU, offset), z = forward * dot(h.axisV, offset);
+    const Lanes forward = dot(h.n, force), ownY = dot(h.axisU, offset), ownZ = dot(h.axisV, offset);
+    const Lanes y = forward * ownY, z = forward * ownZ;
+    const Section curve =
+        byCurve(ownY, ownZ, fnma(forward, slope.u, dot(h.axisU, force)), fnma(forward, slope.v, dot(h.axisV, force)));
+    sum.curveU = sum.curveU + curve.y;
+    sum.curveV = sum.curveV + curve.z;
     sum.thickness = sum.thickness + dot(offset, force);
     sum.bow = fma(bump(g), force, sum.bow);
     sum.slopeU = sum.slopeU + y;
     sum.slopeV = sum.slopeV + z;
     sum.slopeUAlong = fma(g.along, y, sum.slopeUAlong);
     sum.slopeVAlong = fma(g.along, z, sum.slopeVAlong);
-    about = about - (y * slope.v - z * slope.u);
+    about = about - (y * slope.v - z * slope.u) + (h.curveV * curve.y - h.curveU * curve.z);
   }
   sum.twist = fma(g.twistShare, about, sum.twist);
 }
@@ -150,7 +186,7 @@ inline void setLoads(const LinkHost& h, const AnchorLoads& sum, LinkLoads& to) {
   store(to.momentSlopeU, sumOfLanes(sum.moment, sum.slopeU));
   if (!h.isBeam) return;
   store(to.bowSlopeV, sumOfLanes(sum.bow, sum.slopeV));
-  store(to.slopesAlong, sumsOfLanes(sum.slopeUAlong, sum.slopeVAlong, splat(0), splat(0)));
+  store(to.slopesAlongCurve, sumsOfLanes(sum.slopeUAlong, sum.slopeVAlong, sum.curveU, sum.curveV));
 }
 
 // Of four links.
@@ -164,10 +200,10 @@ inline AnchorLoads gatherLoads(const LinkLoads* links, bool bend) {
   out.moment = gatherAll(&LinkLoads::momentSlopeU, out.slopeU);
   if (!bend) return out;
   out.bow = gatherAll(&LinkLoads::bowSlopeV, out.slopeV);
-  Lanes unused;
-  const Lanes3 along = gatherAll(&LinkLoads::slopesAlong, unused);
+  const Lanes3 along = gatherAll(&LinkLoads::slopesAlongCurve, out.curveV);
   out.slopeUAlong = along.x;
   out.slopeVAlong = along.y;
+  out.curveU = along.z;
   return out;
 }
 

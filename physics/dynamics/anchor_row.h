@@ -24,13 +24,16 @@ inline OneLink oneLink(const WorldData& d, int link) {
   out.host = linkHost(d, link);
   out.group.beam = splat(g.beam[lane]);
   out.group.hasBeams = out.host.isBeam;
+  out.group.widest = splat(g.widest[lane]);
   for (Lanes3 LinkFrame::*member :
        {&LinkFrame::n, &LinkFrame::line, &LinkFrame::axisU, &LinkFrame::axisV, &LinkFrame::arm0, &LinkFrame::arm1,
         &LinkFrame::t0, &LinkFrame::t1, &LinkFrame::bow, &LinkFrame::spinAxis0, &LinkFrame::spinAxis1,
         &LinkFrame::spinLever0, &LinkFrame::spinLever1})
     put(splatLane(f.*member, lane), out.frame.*member);
   out.frame.inverseLength = splat(f.inverseLength[lane]);
-  out.frame.thicknessSlope = splat(f.thicknessSlope[lane]);
+  for (Lanes LinkFrame::*member : {&LinkFrame::thickness, &LinkFrame::thicknessSlope, &LinkFrame::curveU,
+                                   &LinkFrame::curveV, &LinkFrame::curveEase})
+    out.frame.*member = splat((f.*member)[lane]);
   return out;
 }
 

@@ -32,11 +32,11 @@ using Eigen::Vector3d;
 
 // Attachment: k = c E area / depth, with depth the distance to the skeleton. The column is never taken shorter than it
 // is wide: a load on a small disc reaches about as deep as the disc is wide, whatever lies below.
-constexpr double kFoundationFactor = 0.8;
+constexpr double kFoundationFactor = 0.7;
 
 // Edge springs: Van Gelder (1998), k = E t sum(triangle areas) / length^2. On equilateral triangles they are a membrane
 // of tension 3/2 E t: of G depth / 3 at t = depth / 9 (1 + nu), which is depth / 13 in soft tissue.
-constexpr double kLayerThicknessOverDepth = 1.0 / 20;
+constexpr double kLayerThicknessOverDepth = 1.0 / 17;
 
 // Volume pressure: the bulk modulus E / 3 (1 - 2 nu), of Young's modulus not more than this. More keeps the volume
 // little better, and would alone bound the step. Identified layers are fitted, and their figures measured, beside E.

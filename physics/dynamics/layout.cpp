@@ -44,6 +44,9 @@ void addSpheres(WorldData& d, const BodyDescription& body, const BodyMechanics& 
 
 void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& mechanics, int firstSphere) {
   const SoftBodyModel& m = *body.model;
+  std::vector<double> widest(m.links.size(), 0);
+  for (const Attachment& a : mechanics.attachments)
+    if (a.onLink) widest[a.host] = std::max(widest[a.host], a.restOffset.norm());
   for (std::size_t i = 0; i < m.links.size(); ++i) {
     const int k = d.links.count++, lane = k % 4;
     if (lane == 0) d.links.groups.push_back(LinkGroup{});
@@ -80,6 +83,8 @@ void addLinks(WorldData& d, const BodyDescription& body, const BodyMechanics& me
       setLane(g.restArm1, l, arm1);
       g.beam[l] = beam ? 1 : 0;
       g.thinning[l] = beam ? 2 * body.tissue.poisson : 0;
+      g.curving[l] = beam ? body.tissue.poisson / (2 * length) : 0;
+      g.widest[l] = 2 * widest[i];
       g.relaxation[l] = mechanics.linkRelaxation;
     }
   }

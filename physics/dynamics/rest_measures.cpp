@@ -111,8 +111,13 @@ std::vector<HostRate> linkAnchorRates(const BodyDescription& body, const BodyMec
   Matrix3d way = a.along * one;
   if (beam) way -= body.tissue.poisson / length * a.restOffset * n.transpose();
   if (!beam) way += turn * crossMatrix(n) / length;
-  const Matrix3d turn0 = turn * ((1 - a.along) * leaning + (1 - share) * about) - bump * crossMatrix(n),
-                 turn1 = turn * (a.along * leaning + share * about) + bump * crossMatrix(n);
+  // The ends' turns against each other curve the link and its sections (anchor.h).
+  const Matrix3d curving =
+      beam ? Matrix3d(body.tissue.poisson / (2 * length) *
+                      (2 * a.restOffset * a.restOffset.transpose() - a.restOffset.squaredNorm() * one) * crossMatrix(n))
+           : Matrix3d(Matrix3d::Zero());
+  const Matrix3d turn0 = turn * ((1 - a.along) * leaning + (1 - share) * about) - bump * crossMatrix(n) + curving,
+                 turn1 = turn * (a.along * leaning + share * about) + bump * crossMatrix(n) - curving;
   const Vector3d arm0 = span.end0 - m.spheres[l.sphere0].restFrame, arm1 = span.end1 - m.spheres[l.sphere1].restFrame;
   return {{l.sphere0, one - way, turn0 - (one - way) * crossMatrix(arm0)},
           {l.sphere1, way, turn1 - way * crossMatrix(arm1)}};

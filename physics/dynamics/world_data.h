@@ -79,6 +79,8 @@ struct LinkGroup {  // constants of four links
   Lanes beam;                           // 1, or 0: a spring, linear along, whose nodes keep to its chord
   bool hasBeams;                        // some link of the four is one
   Lanes thinning;                       // twice the Poisson's ratio that what hangs on a beam follows
+  Lanes curving;                        // 1/m: Poisson's ratio over twice the rest length, 0 of springs
+  Lanes widest;                         // m: twice the longest offset of what hangs on the link
   Lanes relaxation;                     // s, damping over stiffness (Rayleigh's beta)
 };
 
@@ -90,6 +92,7 @@ struct AnchorLoads {
   Lanes twist;                                     // twistShare of what turns the anchors about n
   Lanes thickness;                                 // offset . f
   Lanes slopeU, slopeV, slopeUAlong, slopeVAlong;  // n.f times the offset's U and V, and along times these
+  Lanes curveU, curveV;                            // N m2: f times how the offset moves with the curve
 };
 
 // The four links as the surface sees them, and what the surface gives back.
@@ -110,13 +113,16 @@ struct LinkFrame {
   Lanes3 bow, bowVelocity;                         // m, m/s: length (t0 - t1) across the chord
   Lanes slopeU, slopeV, slopeUAlong, slopeVAlong;  // t0 on U and V, and t1's less it
   Lanes slopeURate, slopeVRate, slopeUAlongRate, slopeVAlongRate;  // 1/s
+  Lanes curveU, curveV;             // 1/m: nu / 2 times the curvature, over the thickness (anchor.h)
+  Lanes curveURate, curveVRate;     // 1/(m s), less what the thickness changes
+  Lanes curveEase;                  // 1/m: the curve over the slopes' increase
   Lanes3 force1, torque0, torque1;  // N on sphere 1 (and minus it on sphere 0), N m: elongation and flexion
   Lanes twistMoment;                // N m, of torsion
 };
 
 // AnchorLoads of one link, summed over its nodes. Of a link whose nodes do not move by themselves: 0.
 struct LinkLoads {
-  Quad sumTwist, alongThickness, momentSlopeU, bowSlopeV, slopesAlong;
+  Quad sumTwist, alongThickness, momentSlopeU, bowSlopeV, slopesAlongCurve;
 };
 
 struct Slot {
