@@ -208,16 +208,22 @@ static double sumOf(const std::array<double, 3>& pressure, int count) {
 
 // Where the device would draw the proxy if there were no friction, along the planes alone that stop it right here, and
 // what then presses on these, summed (m). False where none does. The triangles touched a tick ago do not tell: a proxy
-// that slid off one is within kTouching of it for a tenth of a millimetre more, and their normal leans by then.
+// that slid off one is within kTouching of it for a tenth of a millimetre more, and their normal leans by then. Of the
+// two walls of a dent that moves, all but one have come off it by a few micrometres: those that are met on the way to
+// where the first would let it slide count, too. Else it would seem to slide across, back and forth.
 static bool freeOfTouched(const Buckets& buckets, double alpha, Proxy proxy, const Vector3d& device, Vector3d& free,
                           double& pressed) {
-  const Vector3d way = device - proxy.centre;
   constexpr double kNear = 2e-5;  // m: of several touched surfaces that move apart only their mean is kept up with
-  const double step = std::min(1.0, kNear / way.norm());
-  const TouchedPlanes touched = slideTo(buckets, alpha, proxy.centre + step * way, proxy);
+  const auto step = [](const Vector3d& way) { return std::min(1.0, kNear / way.norm()) * way; };
+  const Vector3d start = proxy.centre, inwards = start + step(device - start);
+  TouchedPlanes touched = slideTo(buckets, alpha, inwards, proxy);
   std::array<double, 3> pressure;
   if (touched.count == 0 || !nearestInHalfSpaces(device, touched.planes.data(), touched.count, free, pressure))
     return false;
+  proxy.centre = start;
+  const TouchedPlanes ahead = slideTo(buckets, alpha, inwards + step(free - start), proxy);
+  for (int k = 0; k < ahead.count; ++k) addPlane(touched, ahead.planes[k], ahead.triangles[k]);
+  if (!nearestInHalfSpaces(device, touched.planes.data(), touched.count, free, pressure)) return false;
   pressed = sumOf(pressure, touched.count);
   return (free - device).norm() > kArrived;
 }

@@ -204,6 +204,31 @@ TEST(ProxyFigures, BothWallsOfAGrooveHoldBack) {
   }
 }
 
+// In a dent that goes along with it, over a line of the mesh: the tool comes off one of the dent's walls by micrometres
+// each tick, and both hold it back.
+TEST(ProxyFigures, BothWallsOfADentThatMovesHoldBack) {
+  for (const int n : {8, 20}) {
+    ProxyRun r;
+    r.shape = plate(n, 0.03, 0.01, 5);
+    r.tool.radius = 0.005;
+    r.tool.staticFriction = 0.25;
+    r.tool.dynamicFriction = 0.2;
+    const auto place = [](double t) { return 0.015 * (std::max(0.0, t - 0.2) - 1); };
+    const auto pressed = [](double t) { return std::min(1.0, t / 0.1); };
+    r.motion = [=](const Vector3d& x, double t) {
+      const double away = std::hypot(x.x() - place(t), x.z()) / 0.008;
+      return Vector3d(x.x(), x.y() - (x.y() > 0 ? 0.0025 * pressed(t) * std::exp(-away * away / 2) : 0), x.z());
+    };
+    r.device = [=](double t) { return Vector3d(place(t), 0.010 - 0.0035 * pressed(t), 0); };
+    r.duration = 2.2;
+    double off = 0;
+    r.run([&](double t, const ToolState& tool, const BlendedSurface&, double) {
+      if (t > 0.5) off = std::max(off, std::abs(tool.force.z()) / tool.force.y());
+    });
+    expectReached("friction of 0.2 in a dent that moves, beside its way", off, 0.02);
+  }
+}
+
 // Ratio of drag to press, over the way (m) from pressing 2 mm deep on.
 static void slideOnPlane(double speed, double way, const std::function<void(double slid, double ratio)>& each) {
   ProxyRun r;
