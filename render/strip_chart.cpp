@@ -12,6 +12,8 @@ using glm::vec2;
 
 constexpr glm::vec3 kPaper{0.004f, 0.005f, 0.007f}, kGrid{0.12f, 0.13f, 0.15f}, kGrey{0.50f, 0.52f, 0.55f};
 
+constexpr float kReadable = 6.5f, kLegible = 5;  // px, the height of letters: those of forces, and any
+
 // Corners and sizes in pixels.
 struct Layout {
   vec2 low, high;          // of the paper
@@ -25,7 +27,6 @@ struct Layout {
     const float width = std::round(std::min(0.52f * h, 0.45f * float(image.width)));
     low = {margin, bottom - margin - std::round(0.2f * h)};
     high = {margin + width, bottom - margin};
-    constexpr float kReadable = 6.5f, kLegible = 5;  // px
     text = image.height < 120 ? 0 : std::max(0.026f * h, kReadable);
     small = std::max(0.62f * text, kLegible);
     plotLow = low + vec2(0.016f * h, text > 0 ? 0.008f * h + 2 * text : 0.016f * h);
@@ -71,16 +72,21 @@ void drawCurve(const StripChart& chart, const StripCurve& curve, const Layout& l
   ink.apply(glm::vec3(curve.colour), 1);
 }
 
+// Of many tools smaller letters, and then none that do not fit; the window's length only where there is room for it.
 void writeLabels(const StripChart& chart, const Layout& layout, Ink& ink) {
   const float header = layout.low.y + 0.75f * layout.text, small = layout.small;
-  vec2 corner(layout.plotLow.x, header);
+  const float windowAt = layout.plotHigh.x - textWidth(chart.windowLabel, small);
+  float wide = 0;
+  for (const StripCurve& curve : chart.curves) wide += textWidth(curve.label + "   ", layout.text);
+  const float text = std::max(layout.text * std::min(1.f, (windowAt - layout.plotLow.x) / wide), kLegible);
+  vec2 corner(layout.plotLow.x, header + layout.text - text);
   for (const StripCurve& curve : chart.curves) {
-    writeText(curve.label, corner, layout.text, ink);
+    if (corner.x + textWidth(curve.label, text) > layout.plotHigh.x) break;
+    writeText(curve.label, corner, text, ink);
     ink.apply(glm::vec3(curve.colour), 1);
-    corner.x += textWidth(curve.label + "   ", layout.text);
+    corner.x += textWidth(curve.label + "   ", text);
   }
-  writeText(chart.windowLabel, {layout.plotHigh.x - textWidth(chart.windowLabel, small), header + layout.text - small},
-            small, ink);
+  if (corner.x <= windowAt) writeText(chart.windowLabel, {windowAt, header + layout.text - small}, small, ink);
   writeText(chart.rangeLabel, rangeCorner(layout), small, ink);
   ink.apply(kGrey, 1);
 }

@@ -35,6 +35,21 @@ glm::vec2 unroll(vec3 p, vec3 n, float radius) {
   return glm::vec2(p) + radius * excess * glm::vec2(n);
 }
 
+// Which way a flat part faces; +z of any other, which the unrolling goes around.
+vec3 facingOf(const SceneMesh& mesh, const MeshPart& part) {
+  vec3 sum(0);
+  for (std::uint32_t i = 0; i < part.vertexCount; ++i) sum += mesh.normal[part.firstVertex + i];
+  const float length = glm::length(sum);
+  return length > 0.999f * float(part.vertexCount) ? sum / length : vec3(0, 0, 1);
+}
+
+// By the smallest rotation that takes `facing` to +z.
+vec3 turnedToZ(vec3 v, vec3 facing) {
+  const vec3 both = facing + vec3(0, 0, 1);
+  if (both.z < 1e-6f) return {v.x, -v.y, -v.z};
+  return v - both * (glm::dot(both, v) / both.z) + vec3(0, 0, 2 * glm::dot(facing, v));
+}
+
 struct Bounds {
   vec3 low{1e30f}, high{-1e30f};
   void add(vec3 p) {
@@ -202,7 +217,11 @@ void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
   std::vector<vec3> normal = mesh.normal;
   if (part.look->unrollRadius <= 0)
     smoothOverEdges(mesh, part.firstIndex, part.firstIndex + part.indexCount, kUnrollPasses, normal);
-  const auto tilted = [c, s](vec3 v) { return vec3(v.x, c * v.y - s * v.z, s * v.y + c * v.z); };
+  const vec3 facing = facingOf(mesh, part);
+  const auto tilted = [&](vec3 v) {
+    v = turnedToZ(v, facing);
+    return vec3(v.x, c * v.y - s * v.z, s * v.y + c * v.z);
+  };
   for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
     mesh.uv[i] = unroll(tilted(mesh.position[i]), tilted(glm::normalize(normal[i])), radius) * part.look->detailScale;
   if (occludes(part)) bakeDetail(mesh, part);

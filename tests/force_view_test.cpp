@@ -24,6 +24,26 @@ bool isYellow(const std::uint8_t* p) {
   return p[0] > 180 && p[1] > 180 && p[2] < 100;
 }
 
+struct Box {
+  int left, right, top, bottom;
+  bool operator==(const Box&) const = default;
+};
+
+// Where it is not grey any more.
+Box drawnIn(const Image& image) {
+  const Image before = greyImage(image.width, image.height);
+  Box b{image.width, 0, image.height, 0};
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      if (std::equal(pixelAt(image, x, y), pixelAt(image, x, y) + 4, pixelAt(before, x, y))) continue;
+      b.left = std::min(b.left, x);
+      b.right = std::max(b.right, x);
+      b.top = std::min(b.top, y);
+      b.bottom = std::max(b.bottom, y);
+    }
+  return b;
+}
+
 StripChart ramp() {
   StripChart chart;
   chart.range = 2;
@@ -37,18 +57,9 @@ StripChart ramp() {
 }  // namespace
 
 TEST(StripChart, StaysInItsCornerAndShowsWhatItIsGiven) {
-  const Image before = greyImage(640, 360);
-  Image image = before;
+  Image image = greyImage(640, 360);
   drawStripChart(ramp(), image);
-  int left = 640, right = 0, top = 360, bottom = 0;
-  for (int y = 0; y < 360; ++y)
-    for (int x = 0; x < 640; ++x) {
-      if (std::equal(pixelAt(image, x, y), pixelAt(image, x, y) + 4, pixelAt(before, x, y))) continue;
-      left = std::min(left, x);
-      right = std::max(right, x);
-      top = std::min(top, y);
-      bottom = std::max(bottom, y);
-    }
+  const auto [left, right, top, bottom] = drawnIn(image);
   EXPECT_GE(left, 5);
   EXPECT_LE(right, 640 * 0.45);
   EXPECT_GE(top, 360 * 0.7);
@@ -61,6 +72,18 @@ TEST(StripChart, StaysInItsCornerAndShowsWhatItIsGiven) {
   }
   EXPECT_NEAR(bottom - lowest, 6, 3);
   EXPECT_NEAR((lowest - highest) / double(lowest - (top + 0.06 * 360)), 0.5, 0.1);
+}
+
+TEST(StripChart, OfManyToolsStaysInItsCorner) {
+  for (const int width : {1280, 640, 240}) {
+    Image one = greyImage(width, 9 * width / 16), many = one;
+    StripChart chart = ramp();
+    chart.windowLabel = "5 s";
+    drawStripChart(chart, one);
+    chart.curves.resize(6, chart.curves[0]);
+    drawStripChart(chart, many);
+    EXPECT_EQ(drawnIn(many), drawnIn(one)) << width;
+  }
 }
 
 TEST(StripChart, IsDrawnIntoPicturesOfAnySize) {

@@ -30,4 +30,27 @@ TEST(SurfaceBake, ADolphinHasAnEyeOnEachSideOfItsHead) {
   }
 }
 
+// Whichever way it faces, its texture is neither stretched nor squeezed along any direction.
+TEST(SurfaceBake, APlanesTextureHasTheSameScaleAlongAll) {
+  for (const glm::vec3 facing : {glm::vec3(0, 1, 0), {1, 0, 0}, {0, 0, -1}, {0, 0, 1}, {0.6f, -0.8f, 0}}) {
+    const glm::vec3 aside = glm::normalize(glm::cross(facing, glm::vec3(0.3f, 0.5f, -0.81f))),
+                    up = glm::cross(facing, aside);
+    SceneMesh mesh;
+    MeshPart part;
+    part.look = &findLook("wall");
+    part.vertexCount = 4;
+    part.indexCount = 6;
+    mesh.resizeVertices(4);
+    mesh.position = {glm::vec3(0), 0.1f * aside, 0.1f * up, 0.1f * (aside + up)};
+    mesh.index = {0, 1, 3, 0, 3, 2};
+    std::fill(mesh.normal.begin(), mesh.normal.end(), facing);
+    bakeTextureCoordinates(mesh, part);
+    const glm::vec2 u = mesh.uv[1] - mesh.uv[0], v = mesh.uv[2] - mesh.uv[0];
+    const float scale = 0.1f * part.look->detailScale;
+    EXPECT_NEAR(glm::length(u), scale, 1e-4f * scale);
+    EXPECT_NEAR(glm::length(v), scale, 1e-4f * scale);
+    EXPECT_NEAR(glm::dot(u, v), 0, 1e-4f * scale * scale);
+  }
+}
+
 }  // namespace medulla
