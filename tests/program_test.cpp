@@ -240,7 +240,8 @@ TEST(Program, TellsMistakesInWhatIsHeldBeforeItPlacesSpheres) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a.xml"));
 }
 
-TEST(Program, IdentifiesWhereFormulasHaveNoAnswer) {
+// Beams then hang from their held nodes' attachments.
+TEST(Program, IdentifiesWhereNoSphereIsFixed) {
   const TemporaryFolder folder;
   const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
   const std::vector<std::string> command{"build", mesh, "--render-levels", "0", "--identify", "-o", folder / "a.xml"};
@@ -251,7 +252,7 @@ TEST(Program, IdentifiesWhereFormulasHaveNoAnswer) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a.xml"));
   const ProgramResult r = runProgram(small);
   EXPECT_EQ(r.exitCode, 0) << r.err;
-  EXPECT_EQ(r.out.find("formulas_error"), std::string::npos);
+  EXPECT_LT(std::stod(valueOf(r.out, "formulas_error_rms")), 30);
 }
 
 TEST(Program, BuildsSeveralBodiesAsEachAlone) {

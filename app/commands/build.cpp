@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <optional>
 
@@ -221,7 +222,7 @@ void buildAll(std::vector<BuildJob>& jobs) {
 }
 
 // Of the beams' formulas, on the loads that the identified network was measured on; both without regard to dents, which
-// formulas leave to the surface. None where what is held is too small to fix a sphere: beams then have no answer.
+// formulas leave to the surface. None where what is held leaves the body free to move.
 std::optional<IdentifiedError> errorOfFormulas(const BuildJob& job, const Identification& found) {
   BodyDescription body;
   body.model = std::make_shared<SoftBodyModel>(job.model);
@@ -231,8 +232,9 @@ std::optional<IdentifiedError> errorOfFormulas(const BuildJob& job, const Identi
     body.fixedNodes.insert(body.fixedNodes.end(), patch.nodes.begin(), patch.nodes.end());
   sortUnique(body.fixedNodes);
   for (const int sphere : spheresHeldBy(job.model, body.fixedNodes)) body.fixed.push_back({sphere});
-  if (body.fixed.empty()) return std::nullopt;
-  return errorOf(skeletonResponse(body, bodyMechanics(body), found.forces), found.displacements);
+  const auto response = skeletonResponse(body, bodyMechanics(body), found.forces);
+  if (!response) return std::nullopt;
+  return errorOf(*response, found.displacements);
 }
 
 // Keeps the formulas where they are nearer: links and skin are then left out.
@@ -248,6 +250,7 @@ void chooseFormulasIfBetter(BuildJob& job, IdentifiedNetwork& network, const Ide
 }
 
 void identifyModel(const BuildOptions& options, BuildJob& job) {
+  const auto start = std::chrono::steady_clock::now();
   Progress progress("identify", 100, "%");
   const auto tick = [&](double share) {
     checkInterrupt();
@@ -260,6 +263,7 @@ void identifyModel(const BuildOptions& options, BuildJob& job) {
     if (!network->usesFormulas) shareOutMassByLayer(network->layer, job.settings.surfaceMassFraction, job.model);
     return network;
   });
+  job.report.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 std::vector<Result> resultsOf(const std::vector<BuildJob>& jobs) {

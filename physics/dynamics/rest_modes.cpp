@@ -4,8 +4,8 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
-#include <stdexcept>
 
 #include "physics/dynamics/identified_mechanics.h"
 #include "physics/dynamics/rest_model.h"
@@ -249,16 +249,19 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
   return step;
 }
 
-MatrixXd skeletonResponse(const BodyDescription& body, const BodyMechanics& mechanics, const MatrixXd& forces) {
+std::optional<MatrixXd> skeletonResponse(const BodyDescription& body, const BodyMechanics& mechanics,
+                                         const MatrixXd& forces) {
   const RestModel model(body, mechanics);
   const std::vector<int> free = freeFreedoms(mechanics);
-  bool held = false;
-  for (std::size_t i = 0; i < mechanics.moves.size(); ++i) held = held || !(mechanics.moves[i] || mechanics.turns[i]);
-  if (!held) throw std::runtime_error("no sphere is fixed: forces have no answer at rest");
-  const MatrixXd stiffness = model.linkStiffness()(free, free), loads = model.onSpheres(forces);
-  const MatrixXd solved = stiffness.llt().solve(loads(free, Eigen::all));
+  const RestRates attachments = heldAttachmentRates(body, mechanics);
+  const MatrixXd all = model.linkStiffness() + MatrixXd(attachments.transpose() * attachments);
+  const MatrixXd stiffness = all(free, free), loads = model.onSpheres(forces);
+  const VectorXd unit = stiffness.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
+  const Eigen::LDLT<MatrixXd> factor(unit.asDiagonal() * stiffness * unit.asDiagonal());
+  constexpr double kFree = 1e-9;  // of what each freedom bears alone: a motion that nothing holds
+  if (!free.empty() && !(factor.vectorD().minCoeff() > kFree)) return std::nullopt;
   MatrixXd motions = MatrixXd::Zero(loads.rows(), loads.cols());
-  motions(free, Eigen::all) = solved;
+  motions(free, Eigen::all) = unit.asDiagonal() * factor.solve(unit.asDiagonal() * loads(free, Eigen::all));
   MatrixXd out = model.carried(motions);
   for (const int n : body.fixedNodes) out.middleRows<3>(3 * static_cast<Eigen::Index>(n)).setZero();
   return out;

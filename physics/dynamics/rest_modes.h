@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "physics/dynamics/body_mechanics.h"
 
 // A body linearised at rest: how slowly its links swing and how fast its stiffest parts do. The first sets the damping,
@@ -27,8 +29,9 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
 std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMechanics& mechanics, int count);
 
 // m, 3 nodes x loads: where small forces on the surface's nodes (N, 3 nodes x loads) bring them through links and
-// spheres, the surface itself giving way nowhere. Throws std::runtime_error where no sphere is fixed in all six.
-Eigen::MatrixXd skeletonResponse(const BodyDescription& body, const BodyMechanics& mechanics,
-                                 const Eigen::MatrixXd& forces);
+// spheres, the surface itself giving way nowhere but at held nodes, from which the skeleton hangs by their attachments.
+// None where what is held leaves the body free to move.
+std::optional<Eigen::MatrixXd> skeletonResponse(const BodyDescription& body, const BodyMechanics& mechanics,
+                                                const Eigen::MatrixXd& forces);
 
 }  // namespace medulla
