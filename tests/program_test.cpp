@@ -240,13 +240,12 @@ TEST(Program, TellsMistakesInWhatIsHeldBeforeItPlacesSpheres) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a.xml"));
 }
 
-// Beams then hang from their held nodes' attachments.
 TEST(Program, IdentifiesWhereNoSphereIsFixed) {
   const TemporaryFolder folder;
   const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
   const std::vector<std::string> command{"build", mesh, "--render-levels", "0", "--identify", "-o", folder / "a.xml"};
   std::vector<std::string> small = command, single = command;
-  small.insert(small.end(), {"--spheres", "2", "--fix", "plane=1,0,0,0.001"});  // fixes neither sphere
+  small.insert(small.end(), {"--spheres", "2", "--fix", "plane=1,0,0,0.001"});  // held nodes alone
   single.insert(single.end(), {"--spheres", "1"});
   expectRefusal(runProgram(single), 1, {"cylinder.obj", "single sphere", "--fix"});
   EXPECT_FALSE(std::filesystem::exists(folder / "a.xml"));
