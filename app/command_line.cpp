@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <string_view>
 
 #include "app/commands/commands.h"
@@ -12,6 +14,7 @@
 #include "app/files/number_text.h"
 #include "app/files/text.h"
 #include "app/interrupt.h"
+#include "app/standard_streams.h"
 #include "app/verbs.h"
 
 namespace medulla {
@@ -76,8 +79,13 @@ void refuseOtherKinds(const std::string& option, const std::string& path, const 
   constexpr std::string_view kinds[] = {".xml", ".xsd", ".csv",  ".cache", ".obj",  ".off",  ".ply", ".stl",
                                         ".mp4", ".gif", ".webm", ".png",   ".webp", ".html", ".svg", ".md",
                                         ".c",   ".h",   ".cpp",  ".py",    ".sh",   ".json", ".yml"};
-  for (const std::string_view kind : kinds)
-    if (kind != ending && path.ends_with(kind)) usageError(option, path, "a file that ends in " + ending);
+  std::string own = std::filesystem::path(path).extension().string();
+  std::transform(own.begin(), own.end(), own.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (own.empty() || own == ending) return;
+  if (std::find(std::begin(kinds), std::end(kinds), own) != std::end(kinds))
+    usageError(option, path, "a file that ends in " + ending);
+  if (std::filesystem::exists(path))
+    usageError(option, path, "a file that ends in " + ending + ", or one that does not exist yet");
 }
 
 template <typename T>
@@ -155,12 +163,6 @@ void addContext(CLI::App& command, std::string& context) {
       ->capture_default_str();
 }
 
-// What an earlier write met is told as well: flushing again would succeed.
-void flushResults() {
-  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
-    throw std::runtime_error("standard output cannot be written");
-}
-
 namespace {
 
 // CLI11 would say that all words were not expected, the first of them last.
@@ -226,7 +228,7 @@ int dispatch(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "medulla: %s (see medulla %s--help)\n", error.what(), command.c_str());
+    tell("medulla: {} (see medulla {}--help)\n", error.what(), command);
     return 2;
   }
   std::fputs(app.help().c_str(), stderr);
@@ -236,6 +238,7 @@ int dispatch(int argc, char** argv) {
 }  // namespace
 
 int runCommandLine(int argc, char** argv) {
+  openStandardStreams();
   watchInterrupts();
   try {
     const int code = dispatch(argc, argv);
@@ -245,13 +248,13 @@ int runCommandLine(int argc, char** argv) {
     std::fputs("medulla: interrupted, nothing unfinished has its final name\n", stderr);
     return 130;
   } catch (const NotAtRest& error) {
-    std::fprintf(stderr, "medulla: %s\n", error.what());
+    tell("medulla: {}\n", error.what());
     return 4;
   } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "medulla: out of memory: %s %s\n", argc > 1 ? argv[1] : "", argc > 2 ? argv[2] : "");
+    tell("medulla: out of memory: {} {}\n", argc > 1 ? argv[1] : "", argc > 2 ? argv[2] : "");
     return 1;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "medulla: %s\n", error.what());
+    tell("medulla: {}\n", error.what());
     return 1;
   }
 }

@@ -10,7 +10,8 @@ struct Interrupted : std::exception {
 };
 
 // From now on SIGINT, SIGTERM and SIGHUP only raise a flag, however often they come: ending at once would leave
-// unfinished files behind. SIGQUIT still ends the process. Nor does a limit on the size of files: writing fails there.
+// unfinished files behind. What the program was started to ignore (nohup, jobs in the background) stays ignored.
+// SIGQUIT still ends the process. Nor does a limit on the size of files or a reader that left: writing fails there.
 void watchInterrupts();
 bool interruptRequested();
 void checkInterrupt();  // throws Interrupted once a signal came

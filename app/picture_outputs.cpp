@@ -19,11 +19,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kRunFile = "run";  // in the folder where pictures collect: which run's they are
 
-std::string withoutSlash(std::string path) {
-  while (path.size() > 1 && path.back() == '/') path.pop_back();
-  return path;
-}
-
 std::string pngName(int number) {
   return fmt::format("{:05d}.png", number);
 }
@@ -56,7 +51,7 @@ PngFolder::PngFolder(const std::string& path, const Slice& slice)
     : slice_(slice),
       made_(path),
       folder_(path),
-      collecting_(fmt::format("{}.{}-{}.part", withoutSlash(path), slice.first, slice.last)),
+      collecting_(folder_ / fmt::format("{}-{}.part", slice.first, slice.last)),
       keep_(slice.resume) {
   requireReplaceable();
   std::error_code error;
@@ -83,6 +78,12 @@ void PngFolder::requireReplaceable() const {
   }
 }
 
+// Of those that collect; also what a writer that was killed has left. Whatever else somebody put there stays.
+bool PngFolder::isOurs(const fs::path& path) const {
+  const int number = numberOf(path);
+  return (slice_.first <= number && number < slice_.last) || path.filename() == kRunFile || path.extension() == ".part";
+}
+
 void PngFolder::takeOver() const {
   const std::string run = fmt::format("{:016x}\n", slice_.run);
   const fs::path name = collecting_ / kRunFile;
@@ -93,14 +94,17 @@ void PngFolder::takeOver() const {
         collecting_.string()));
   for (const auto& entry : fs::directory_iterator(collecting_)) {
     const bool picture = entry.path().extension() == ".png" && isWholePng(entry.path());
-    if (!(slice_.resume && same && picture)) fs::remove_all(entry.path());
+    if (isOurs(entry.path()) && !(slice_.resume && same && picture)) fs::remove_all(entry.path());
   }
   writeTextFile(name.string(), run);
 }
 
 PngFolder::~PngFolder() {
+  if (keep_) return;
   std::error_code ignored;
-  if (!keep_) fs::remove_all(collecting_, ignored);
+  for (const auto& entry : fs::directory_iterator(collecting_, ignored))
+    if (isOurs(entry.path())) fs::remove_all(entry.path(), ignored);
+  fs::remove(collecting_, ignored);  // if it is empty
 }
 
 bool PngFolder::has(int number) const {
@@ -114,8 +118,7 @@ void PngFolder::write(int number, const Image& image) const {
 int PngFolder::finish() {
   std::vector<fs::path> pictures;
   for (const auto& entry : fs::directory_iterator(collecting_))
-    if (entry.path().extension() == ".png") pictures.push_back(entry.path());
-  fs::create_directories(folder_);  // another slice that failed may have taken it away
+    if (numberOf(entry.path()) >= 0 && isOurs(entry.path())) pictures.push_back(entry.path());
   for (const fs::path& picture : pictures) fs::rename(picture, folder_ / picture.filename());
   keep_ = false;
   return slice_.whole ? removeLater() : 0;

@@ -12,9 +12,10 @@
 
 namespace medulla {
 
-// A folder of numbered PNG files. They collect in DIR.A-B.part beside it and move in when all are there: a run that
-// ends early harms no earlier picture. Runs of other slices may fill the same folder at the same time; one of every
-// picture takes away what a longer run before it has left: the PNG files that follow its last without a gap.
+// A folder of numbered PNG files. They collect in DIR/A-B.part, on DIR's own disk wherever links to it lie, and move
+// up when all are there: a run that ends early harms no earlier picture. Runs of other slices may fill the same folder
+// at the same time; one of every picture takes away what a longer run before it has left: the PNG files that follow its
+// last without a gap.
 class PngFolder {
  public:
   struct Slice {
@@ -36,6 +37,7 @@ class PngFolder {
 
  private:
   void requireReplaceable() const;
+  bool isOurs(const std::filesystem::path& path) const;
   void takeOver() const;
   int removeLater() const;
 

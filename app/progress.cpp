@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "app/standard_streams.h"
+
 namespace medulla {
 
 static double secondsBetween(std::chrono::steady_clock::time_point a, std::chrono::steady_clock::time_point b) {
@@ -40,13 +42,12 @@ void Progress::update(double done) {
   last_ = now;
   drawn_ = true;
   if (!terminal_) {
-    fmt::print(stderr, "{}\n", text(done, elapsed));
+    tell("{}\n", text(done, elapsed));
     return;
   }
   constexpr int kWidth = 30;
   const int filled = static_cast<int>(kWidth * std::clamp(done / total_, 0.0, 1.0));
-  fmt::print(stderr, "\r\x1b[K[{}{}] {}", std::string(filled, '#'), std::string(kWidth - filled, '.'),
-             text(done, elapsed));
+  tell("\r\x1b[K[{}{}] {}", std::string(filled, '#'), std::string(kWidth - filled, '.'), text(done, elapsed));
   std::fflush(stderr);
 }
 

@@ -9,6 +9,7 @@
 #include "app/files/number_text.h"
 #include "app/files/output_file.h"
 #include "app/files/text.h"
+#include "app/standard_streams.h"
 #include "app/verbs.h"
 #include "render/video_writer.h"
 
@@ -141,16 +142,27 @@ void checkRender(const RenderArguments& a) {
     if (isVideoName(output)) usageError("--resume", output, "a folder: videos are made in one go");
 }
 
+// Before any film, since what one run writes may be what another reads. Scenes that cannot be read show as well.
+void requireDistinctRuns(const std::vector<RenderOptions>& all) {
+  std::vector<std::string> outputs, inputs;
+  const auto append = [](const std::vector<std::string>& files, std::vector<std::string>& to) {
+    to.insert(to.end(), files.begin(), files.end());
+  };
+  for (const RenderOptions& options : all) {
+    append(options.outputs, outputs);
+    append(outputFiles(options.run), outputs);
+    append(inputFiles(readScene(options.run.scene, options.run.overrides)), inputs);
+    for (const auto& [tool, path] : options.run.trajectories) inputs.push_back(path);
+    if (!options.cacheToRead.empty()) inputs.push_back(options.cacheToRead);
+  }
+  requireDistinctFiles(outputs, inputs);
+}
+
 int runRenders(const RenderArguments& a) {
   checkRender(a);
   std::vector<RenderOptions> all;
   for (const std::string& scene : a.scenes) all.push_back(renderOptions(a, scene));
-  std::vector<std::string> files;
-  for (const RenderOptions& options : all) files.insert(files.end(), options.outputs.begin(), options.outputs.end());
-  if (all.size() > 1) {
-    requireDistinctFiles(files, a.scenes);
-    for (const RenderOptions& options : all) readScene(options.run.scene, options.run.overrides);  // before any film
-  }
+  if (all.size() > 1) requireDistinctRuns(all);
   for (const RenderOptions& options : all) {
     runRender(options);
     flushResults();

@@ -20,7 +20,7 @@ struct Verb {
 [[noreturn]] void usageError(const std::string& option, const std::string& value, const std::string& expected);
 
 // A usage error where the file that an option is to write has the ending of another kind: what stands under that name
-// would be lost by mistake. Endings of no known kind pass.
+// would be lost by mistake. Endings of no known kind pass for a file that does not exist yet.
 void refuseOtherKinds(const std::string& option, const std::string& path, const std::string& ending);
 
 inline constexpr double kEndless = std::numeric_limits<double>::infinity();
@@ -38,8 +38,6 @@ void addOverrides(CLI::App& command, RunArguments& a);     // --set, --trajector
 void addSceneOptions(CLI::App& command, RunArguments& a);  // SCENE and these
 RunOptions runOptions(const RunArguments& a);
 void addContext(CLI::App& command, std::string& context);
-
-void flushResults();  // throws std::runtime_error where standard output cannot be written
 
 // running_verbs.cpp
 Verb addRender(CLI::App& app);

@@ -1,10 +1,12 @@
 #include "render/partial_file.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <climits>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -25,6 +27,15 @@ static std::string behindLink(const std::string& path) {
   return target.string();
 }
 
+// What was written to the stream before, and is still to come, would be in the file that is replaced.
+static bool isStandardStream(const struct stat& file) {
+  for (const int descriptor : {STDOUT_FILENO, STDERR_FILENO}) {
+    struct stat stream {};
+    if (::fstat(descriptor, &stream) == 0 && stream.st_dev == file.st_dev && stream.st_ino == file.st_ino) return true;
+  }
+  return false;
+}
+
 // Renaming onto a device would replace that.
 static std::string resolveTarget(const std::string& path) {
   if (path.empty() || path.back() == '/') throw std::runtime_error(path + ": expected the name of a file to write");
@@ -34,16 +45,23 @@ static std::string resolveTarget(const std::string& path) {
   if (::stat(path.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) throw std::runtime_error(path + ": is a folder, expected the name of a file to write");
     if (!S_ISREG(status.st_mode)) throw std::runtime_error(path + ": is not a regular file");
+    if (isStandardStream(status)) throw std::runtime_error(path + ": is where results or notes go");
     if (::access(target.c_str(), W_OK) != 0) throw unwritable(path);
   }
   return target;
+}
+
+// TARGET + ending, in the target's folder.
+static std::string besideTarget(const std::filesystem::path& target, const std::string& ending) {
+  const std::string name = target.filename().string();
+  return (target.parent_path() / (name.substr(0, NAME_MAX - ending.size()) + ending)).string();
 }
 
 PartialFile::PartialFile(const std::string& target) : target_(resolveTarget(target)) {
   const mode_t readAndWrite = 0666;  // less the user's mask
   // Names left by killed runs are stepped over: O_EXCL never touches a file that somebody else made.
   for (int attempt = 0;; ++attempt) {
-    path_ = target_ + "." + std::to_string(::getpid()) + "-" + std::to_string(attempt) + ".part";
+    path_ = besideTarget(target_, fmt::format(".{}-{}.part", ::getpid(), attempt));
     const int descriptor = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, readAndWrite);
     if (descriptor < 0 && errno != EEXIST) throw unwritable(target);
     if (descriptor < 0) continue;

@@ -8,13 +8,14 @@ namespace medulla {
 // Of what the system has just refused to write.
 std::runtime_error unwritable(const std::string& path);
 
-// A file beside its target that takes the target's name only when it is whole: TARGET.PID-N.part up to commit().
+// A file beside its target that takes the target's name only when it is whole: TARGET.PID-N.part up to commit(), or
+// as much of the target's name as a name has room for.
 // Destroyed before that it is removed, and an earlier file of that name stays as it was. What a symbolic link stands
 // for is replaced, not the link, also where there is nothing yet.
 class PartialFile {
  public:
   // There at once, and empty. Throws std::runtime_error with path and reason where the target cannot be written: no
-  // such folder, not permitted, a folder or a device of that name.
+  // such folder, not permitted, a folder or a device of that name, or where standard output or standard error goes.
   explicit PartialFile(const std::string& target);
   ~PartialFile();
   PartialFile(const PartialFile&) = delete;

@@ -3,6 +3,7 @@
 #include <cassert>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <stdexcept>
@@ -118,6 +119,7 @@ void writePng(const std::string& path, const Image& image, const std::vector<Png
 }
 
 Image readPng(const std::string& path, std::vector<PngText>* texts) {
+  if (std::filesystem::is_directory(path)) throw std::runtime_error(path + ": is a folder, expected a PNG file");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw std::runtime_error(path + ": cannot be read: " + std::strerror(errno));
   const std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());

@@ -120,6 +120,17 @@ TEST_F(BadInput, OutputsThatAreCalledAsAnotherKindOfFileAreWrongUsage) {
   EXPECT_EQ(read("own/organ.xml"), victim);
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"own"});
   EXPECT_EQ(run({"replay", "own/organ.xml", "--log", "own/log.txt"}).exitCode, 0);
+  folder.write("photo.jpg", "seen once");
+  for (const char* name : {"photo.jpg", "own/organ.XML"})
+    expectRefused(run({"replay", "own/organ.xml", "--log", name}), "expected a file that ends in .csv", 2);
+  EXPECT_EQ(read("photo.jpg"), "seen once");
+}
+
+TEST_F(BadInput, AReportIsNotWrittenOverTheVerticesThatAreHeld) {
+  const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
+  folder.write("held.csv", "0\n1\n");
+  expectRefused(run({"build", mesh, "-o", "m.xml", "--identify", "--fix", "vertices=held.csv", "--report", "held.csv"}),
+                "held.csv: would be written over an input");
 }
 
 TEST_F(BadInput, AModelReplacesNoOtherXml) {

@@ -78,6 +78,13 @@ TEST(OutputFile, NeverTouchesATemporaryFileOfAnother) {
   EXPECT_EQ(readTextFile(folder / stale), "left by a killed run");
 }
 
+TEST(OutputFile, ItsNameMayBeAsLongAsNamesMayBe) {
+  const TemporaryFolder folder;
+  const std::string name(255, 'n');
+  writeTextFile(folder / name, "text");
+  EXPECT_EQ(readTextFile(folder / name), "text");
+}
+
 TEST(OutputFile, WritesThroughALink) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "elsewhere");

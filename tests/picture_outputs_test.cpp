@@ -53,7 +53,7 @@ TEST_F(Outputs, BytesDependOnNeitherRunNorThreadsNorContext) {
 TEST_F(Outputs, AKilledRunIsResumedToTheSameBytes) {
   write({.golden = "0", .duration = 2});
   const std::vector<std::string> small{"--size", "64x48", "-o", "frames", "--resume"};
-  const fs::path collecting = folder / "frames.0-50.part";
+  const fs::path collecting = folder / "frames/0-50.part";
   ProgramOptions killed;
   killed.signal = SIGKILL;
   killed.interruptWhen = [&] { return fs::exists(collecting / "00006.png"); };
@@ -62,7 +62,7 @@ TEST_F(Outputs, AKilledRunIsResumedToTheSameBytes) {
   EXPECT_FALSE(fs::exists(folder / "frames/00000.png"));
   // As a power cut would leave them: a name without its bytes, and a file under a temporary name.
   fs::resize_file(collecting / "00003.png", 50);
-  folder.write("frames.0-50.part/00049.png.1-0.part", "x");
+  folder.write("frames/0-50.part/00049.png.1-0.part", "x");
   const auto earlier = fs::last_write_time(collecting / "00005.png");
 
   // ^C keeps them, too.
@@ -82,11 +82,34 @@ TEST_F(Outputs, AKilledRunIsResumedToTheSameBytes) {
 
 TEST_F(Outputs, WithoutResumeWhatAKilledRunLeftIsDrawnAnew) {
   folder.write("x", "");
-  fs::create_directory(folder / "frames.0-12.part");
-  folder.write("frames.0-12.part/00000.png", "left by a killed run");
+  fs::create_directories(folder / "frames/0-12.part");
+  folder.write("frames/0-12.part/00000.png", "left by a killed run");
   ASSERT_EQ(render({"--size", "64x48", "-o", "frames"}).exitCode, 0);
   EXPECT_EQ(read("frames/00000.png").substr(1, 3), "PNG");
-  EXPECT_FALSE(fs::exists(folder / "frames.0-12.part"));
+  EXPECT_FALSE(fs::exists(folder / "frames/0-12.part"));
+}
+
+TEST_F(Outputs, WhatSomebodyPutWherePicturesCollectStaysThere) {
+  fs::create_directories(folder / "frames/0-2.part");
+  for (const char* name : {"frames/0-2.part/00007.png", "frames/00007.png", "frames/0-2.part/notes.png"})
+    folder.write(name, name);
+  ASSERT_EQ(render({"--size", "64x48", "-o", "frames", "--frames", "0:2"}).exitCode, 0);
+  EXPECT_EQ(read("frames/00001.png").substr(1, 3), "PNG");
+  for (const char* name : {"frames/0-2.part/00007.png", "frames/00007.png", "frames/0-2.part/notes.png"})
+    EXPECT_EQ(read(name), name);
+  EXPECT_EQ(read("frames/notes.png"), "");
+}
+
+// A link from a disk to another: a file is renamed only within one.
+TEST_F(Outputs, PicturesGoWhereALinkToAnotherDiskLeads) {
+  char elsewhere[] = "/dev/shm/medulla_pictures_XXXXXX";
+  if (!::mkdtemp(elsewhere)) GTEST_SKIP() << "no other disk";
+  fs::create_directory_symlink(elsewhere, folder / "frames");
+  const ProgramResult r = render({"--size", "64x48", "-o", "frames", "--frames", "0:2"});
+  EXPECT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_TRUE(fs::exists(std::string(elsewhere) + "/00001.png"));
+  EXPECT_TRUE(fs::is_symlink(folder / "frames"));
+  fs::remove_all(elsewhere);
 }
 
 TEST_F(Outputs, TwoRunsDoNotDrawTheSamePicturesAtOnce) {
@@ -136,6 +159,9 @@ TEST_F(Outputs, SeveralScenesInOneProcessHaveFilesOfTheirOwn) {
   EXPECT_EQ(read("second.gif").substr(0, 6), "GIF89a");
   expectRefused(run({"render", "own/organ.xml", "own/second.xml", "-o", "film.mp4"}), "{scene}", 2);
   expectRefused(run({"render", "own/organ.xml", "own/organ.xml", "-o", "{scene}.mp4"}), "two outputs");
+  expectRefused(run({"render", "own/second.xml", "own/organ.xml", "-o", "{scene}.gif", "--log", "own/{scene}.csv"}),
+                "own/organ.csv: would be written over an input");
+  EXPECT_FALSE(fs::exists(folder / "own/second.csv"));
 }
 
 TEST_F(Outputs, FoldersThatAreMissingAreMade) {
@@ -221,7 +247,7 @@ TEST_F(Outputs, AFullDiskStopsTheRunAndLeavesNothing) {
     std::vector<std::string> words{"--size", "96x64", "-o", resume ? "frames" : name};
     if (resume) words.push_back("--resume");
     expectRefused(render(words, full), "File too large");
-    if (resume) fs::remove_all(folder / "frames.0-12.part");  // the pictures before, for another try
+    if (resume) fs::remove_all(folder / "frames");  // the pictures before, for another try
     EXPECT_TRUE(contents().empty()) << name << " left " << contents()[0];
   }
   expectRefused(render({"--still", "0", "-o", "a.png"}, full), "a.png: cannot be written: File too large");
@@ -272,10 +298,10 @@ TEST_F(Outputs, AFolderThatCannotTakeEveryPictureIsRefusedBeforeTheFilm) {
   expectRefused(render({"-o", "frames", "--frames", "0:3"}), "frames/00002.png: is a folder");
   EXPECT_EQ(read("frames/00000.png"), "earlier");
   EXPECT_EQ(render({"-o", "frames", "--frames", "3:4", "--size", "64x48"}).exitCode, 0);
-  folder.write("other.0-12.part", "somebody's");
-  expectRefused(render({"-o", "other"}), "other.0-12.part: cannot be made");
-  EXPECT_EQ(read("other.0-12.part"), "somebody's");
-  EXPECT_FALSE(fs::exists(folder / "other"));
+  fs::create_directory(folder / "other");
+  folder.write("other/0-12.part", "somebody's");
+  expectRefused(render({"-o", "other"}), "other/0-12.part: cannot be made");
+  EXPECT_EQ(read("other/0-12.part"), "somebody's");
   expectRefused(render({"-o", ".mp4"}), ".mp4: expected a name before the dot");
   EXPECT_EQ(contents().size(), 2u);
   if (::geteuid() == 0) return;  // nothing is forbidden to root

@@ -7,6 +7,7 @@
 #include "app/interrupt.h"
 #include "app/picture_sources.h"
 #include "app/progress.h"
+#include "app/standard_streams.h"
 #include "physics/content_hash.h"
 #include "render/caption.h"
 
@@ -223,7 +224,7 @@ void Artist::finish() {
   changed_.notify_all();
   thread_.join();
   rethrow();
-  for (const std::string& note : notes_) fmt::print(stderr, "note: {}\n", note);  // now that no bar is in the way
+  for (const std::string& note : notes_) tell("note: {}\n", note);  // now that no bar is in the way
 }
 
 }  // namespace medulla

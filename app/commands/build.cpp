@@ -16,6 +16,7 @@
 #include "app/files/text.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
+#include "app/standard_streams.h"
 #include "physics/dynamics/fixation.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/model/ball_choice.h"
@@ -71,8 +72,7 @@ auto naming(const std::string& path, const Work& work) {
 // An organ of 60 m is a mesh in millimetres read as metres.
 void warnOfSize(const std::string& path, const TriangleMesh& mesh) {
   const double size = boundsDiagonal(mesh);
-  if (size > 5 || size < 0.005)
-    fmt::print(stderr, "{}: note: the mesh is {:.3g} m across; is --unit right?\n", path, size);
+  if (size > 5 || size < 0.005) tell("{}: note: the mesh is {:.3g} m across; is --unit right?\n", path, size);
 }
 
 // A scene of it would move as bags of skin do, or turn inside out.
@@ -80,18 +80,18 @@ void warnOfCover(const BuildJob& job) {
   constexpr double kLeast = 40;  // %; the scenes' leanest model, of limbs, has 58
   if (job.report.cover >= kLeast) return;
   const bool chosen = job.settings.method == BuildMethod::cover;  // how many there are of a skeleton follows from it
-  fmt::print(stderr, "{}: note: the spheres cover {:.2g} % of the volume{}\n", job.meshPath, job.report.cover,
-             chosen ? "; do more of them (--spheres) fit it better?" : "");
+  tell("{}: note: the spheres cover {:.2g} % of the volume{}\n", job.meshPath, job.report.cover,
+       chosen ? "; do more of them (--spheres) fit it better?" : "");
 }
 
 // What no number of spheres makes good.
 void warnOfShape(const BuildJob& job) {
   constexpr double kManyLinks = 0.25;
   if (const std::optional<LongEdges>& coarse = job.report.longEdges)
-    fmt::print(stderr,
-               "{}: note: edges of {:.3g} mm on a body {:.3g} mm thick: split them to {:.3g} mm or use a finer mesh; "
-               "results may be off by a third, mostly too soft\n",
-               job.meshPath, 1e3 * coarse->edge, 1e3 * coarse->thickness, 500 * coarse->thickness);
+    tell(
+        "{}: note: edges of {:.3g} mm on a body {:.3g} mm thick: split them to {:.3g} mm or use a finer mesh; "
+        "results may be off by a third, mostly too soft\n",
+        job.meshPath, 1e3 * coarse->edge, 1e3 * coarse->thickness, 500 * coarse->thickness);
   if (!job.model.identified && job.report.hollowLinks > kManyLinks * job.report.links)
     fmt::print(
         stderr,
@@ -118,17 +118,16 @@ void warnOfErrors(const BuildJob& job) {
   const IdentifiedNetwork& n = *job.model.identified;
   const double links = n.usesFormulas ? job.formulas->rms : n.bulk.rms;
   if (links > kLinks || n.ofFiniteElements.rms > kElements)
-    fmt::print(stderr,
-               "{}: note: the links are off by {:.2g} % RMS, finite elements by {:.2g}; {} fit better, or more that "
-               "is held?\n",
-               job.meshPath, links, n.ofFiniteElements.rms,
-               job.report.longEdges ? "does a finer mesh" : "do more spheres");
+    tell(
+        "{}: note: the links are off by {:.2g} % RMS, finite elements by {:.2g}; {} fit better, or more that "
+        "is held?\n",
+        job.meshPath, links, n.ofFiniteElements.rms, job.report.longEdges ? "does a finer mesh" : "do more spheres");
 }
 
 // All that was repaired and found in one line.
 void tellRepairs(const std::string& path, const std::vector<std::string>& notes) {
   if (notes.empty()) return;
-  fmt::print(stderr, "{}: mesh repair: {}\n", path, joined(notes, "; "));
+  tell("{}: mesh repair: {}\n", path, joined(notes, "; "));
 }
 
 std::vector<BuildJob> jobsOf(const BuildOptions& options) {
@@ -157,6 +156,8 @@ void requireDistinct(const BuildOptions& options, const std::vector<BuildJob>& j
     outputs.push_back(job.modelPath);
     inputs.push_back(job.meshPath);
   }
+  for (const std::string& text : options.fix)
+    if (const std::string file = vertexFileOf(text); !file.empty()) inputs.push_back(file);
   requireDistinctFiles(outputs, inputs);
   requireWritable(outputs);
   for (const BuildJob& job : jobs) requireReplaceable(job.modelPath);
@@ -242,8 +243,8 @@ void chooseFormulasIfBetter(BuildJob& job, IdentifiedNetwork& network, const Ide
   if (network.patches.empty()) return;  // beams alone do not answer a free body's loads at rest
   job.formulas = errorOfFormulas(job, found);
   if (!job.formulas || job.formulas->rms >= network.bulk.rms) return;
-  fmt::print(stderr, "{}: note: beams' formulas are nearer to finite elements ({:.2g} against {:.2g} % RMS): kept\n",
-             job.meshPath, job.formulas->rms, network.bulk.rms);
+  tell("{}: note: beams' formulas are nearer to finite elements ({:.2g} against {:.2g} % RMS): kept\n", job.meshPath,
+       job.formulas->rms, network.bulk.rms);
   network.usesFormulas = true;
   network.links.clear();
   network.skin.clear();

@@ -15,6 +15,7 @@
 #include "app/files/sphere_chart.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
+#include "app/standard_streams.h"
 #include "physics/model/build_report.h"
 
 namespace medulla {
@@ -120,7 +121,7 @@ std::optional<LoadedScene> loadMethod(const ChartRun& run, const ChartOptions& o
     return loadRun(run.options);
   } catch (const std::runtime_error& error) {
     if (!mayBeLeftOut) throw;
-    fmt::print(stderr, "note: no curve of {}: {}\n", run.curve, error.what());
+    tell("note: no curve of {}: {}\n", run.curve, error.what());
     return {};
   }
 }

@@ -6,6 +6,7 @@
 #include "app/commands/commands.h"
 #include "app/files/log_table.h"
 #include "app/files/state_cache.h"
+#include "app/standard_streams.h"
 
 namespace medulla {
 
@@ -158,8 +159,8 @@ int compareCaches(const CompareOptions& options) {
 
 void noteCut(const LogTable& log) {
   if (log.isCut)
-    fmt::print(stderr, "note: {} ends in the midst of row {}: only the rows before it are compared\n", log.path,
-               log.value.size() + 1);
+    tell("note: {} ends in the midst of row {}: only the rows before it are compared\n", log.path,
+         log.value.size() + 1);
 }
 
 int compareLogs(const CompareOptions& options) {

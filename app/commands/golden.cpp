@@ -11,6 +11,7 @@
 #include "app/files/output_file.h"
 #include "app/files/text.h"
 #include "app/interrupt.h"
+#include "app/standard_streams.h"
 #include "physics/content_hash.h"
 #include "render/flip.h"
 
@@ -300,8 +301,8 @@ void compareRest(const std::vector<std::string>& scenes, const GoldenOptions& op
       else if (!image.scene.empty() && !fs::exists(image.scene) && !isCompared)
         addFailure(image.name, image.scene, fmt::format("its scene {} does not exist", image.scene), comparison);
       else if (!isCompared)
-        fmt::print(stderr, "note: {} is compared with nothing: {}\n", image.path,
-                   image.scene.empty() ? "it names no scene" : "it is called as no moment of a scene here");
+        tell("note: {} is compared with nothing: {}\n", image.path,
+             image.scene.empty() ? "it names no scene" : "it is called as no moment of a scene here");
     }
 }
 
@@ -314,7 +315,7 @@ int compareScenes(const std::vector<std::string>& scenes, const GoldenOptions& o
   for (const std::string& path : scenes) {
     const auto before = failures();
     compareScene(path, options, comparison);
-    if (failures() > before) fmt::print(stderr, "repeat with: {}\n", repeatingCommand(path, options));
+    if (failures() > before) tell("repeat with: {}\n", repeatingCommand(path, options));
   }
   if (options.scenes.empty()) compareRest(scenes, options, comparison);
   const std::string report = options.failures + "/report.html";

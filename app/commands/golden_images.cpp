@@ -7,6 +7,8 @@
 #include <functional>
 #include <set>
 
+#include "app/files/output_file.h"
+
 namespace medulla {
 
 namespace fs = std::filesystem;
@@ -22,13 +24,19 @@ std::vector<std::string> filesOf(const fs::path& folder, const std::string& exte
   return paths;
 }
 
+// As it is called, or, where ".." after that would lead elsewhere since there are links in it, where it is.
+fs::path folderOf(const std::string& file) {
+  const fs::path called = fs::path(file).parent_path();
+  return placeOf(called.string()) == fs::absolute(called).lexically_normal() ? called : placeOf(called.string());
+}
+
 StrayImage lookInto(const std::string& path) {
   StrayImage image{path, stemOf(path), "", ""};
   try {
     std::vector<PngText> texts;
     readPng(path, &texts);
     const std::string scene = textOf(texts, kSceneKey);
-    if (!scene.empty()) image.scene = (fs::path(path).parent_path() / scene).lexically_normal().string();
+    if (!scene.empty()) image.scene = (folderOf(path) / scene).lexically_normal().string();
   } catch (const std::runtime_error& error) {
     image.fault = error.what();
   }
@@ -49,8 +57,7 @@ std::vector<std::string> updatedScenes(const GoldenOptions& options) {
     if (fs::path(name).extension() == ".xml") paths.push_back(name);
   if (paths.size() != options.update.size()) return {};
   std::set<fs::path> taken;  // said twice, it is asked for once
-  std::erase_if(paths,
-                [&](const std::string& path) { return !taken.insert(fs::absolute(path).lexically_normal()).second; });
+  std::erase_if(paths, [&](const std::string& path) { return !taken.insert(placeOf(path)).second; });
   return paths;
 }
 
@@ -108,7 +115,7 @@ std::vector<std::string> goldenScenes(const GoldenOptions& options) {
 }
 
 bool namesScene(const std::string& name, const std::string& scene) {
-  return name == stemOf(scene) || fs::path(name).lexically_normal() == fs::path(scene).lexically_normal();
+  return name == stemOf(scene) || sameFile(name, scene);
 }
 
 bool namesMomentOf(const std::string& name, const std::string& scene) {
@@ -139,7 +146,7 @@ std::vector<StrayImage> strayImages(const std::string& folder, const std::vector
 
 bool sameFile(const std::string& a, const std::string& b) {
   if (a.empty() || b.empty()) return false;
-  return fs::absolute(a).lexically_normal() == fs::absolute(b).lexically_normal();
+  return placeOf(a) == placeOf(b);
 }
 
 }  // namespace medulla

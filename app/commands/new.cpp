@@ -9,6 +9,7 @@
 #include "app/files/model_file.h"
 #include "app/files/output_file.h"
 #include "app/files/text.h"
+#include "app/standard_streams.h"
 #include "app/starter_scene.h"
 #include "haptics/tool_input.h"
 
@@ -41,25 +42,34 @@ int runNew(const NewOptions& options) {
   const fs::path folder = options.folder;
   const auto file = [&](const char* ending) { return (folder / (name + ending)).string(); };
   const std::string scenePath = file(".xml"), trajectoryPath = file(".csv"), modelPath = file(".model.xml");
-  for (const std::string& path : {scenePath, trajectoryPath, modelPath})
+  const auto requireFree = [](const std::string& path) {
     if (fs::exists(path)) throw std::runtime_error(path + ": exists already; nothing was written");
+  };
   requireWithinReach(options.build.meshes[0], metresPerUnit(options.build.unit));
   const OutputFolder made(options.folder);
+  const FolderLock lock(options.folder, options.folder, "another run is making a scene there");
+  for (const std::string& path : {scenePath, trajectoryPath, modelPath}) requireFree(path);
   BuildOptions build = options.build;
   build.output = modelPath;
+  std::vector<std::string> written;
   try {
     runBuild(build);
-    const SoftBodyModel model = readModel(modelPath);
-    const StarterScene starter = starterScene(name, model);
-    writeTextFile(trajectoryPath, starter.trajectory);
-    writeTextFile(scenePath, starter.scene);
+    written.push_back(modelPath);
+    const StarterScene starter = starterScene(name, readModel(modelPath));
+    const std::pair<std::string, std::string> files[] = {{trajectoryPath, starter.trajectory},
+                                                         {scenePath, starter.scene}};
+    for (const auto& [path, text] : files) {
+      requireFree(path);
+      writeTextFile(path, text);
+      written.push_back(path);
+    }
   } catch (...) {
     std::error_code missing;
-    for (const std::string& path : {trajectoryPath, modelPath}) fs::remove(path, missing);
+    for (const std::string& path : written) fs::remove(path, missing);
     throw;
   }
   fmt::print("scene {}\n", scenePath);
-  fmt::print(stderr, "next: medulla render {}\n", shellWord(scenePath));
+  tell("next: medulla render {}\n", shellWord(scenePath));
   return 0;
 }
 

@@ -10,6 +10,7 @@
 #include "app/files/log_table.h"
 #include "app/files/output_file.h"
 #include "app/files/plot_file.h"
+#include "app/standard_streams.h"
 
 namespace medulla {
 
@@ -18,8 +19,7 @@ static void noteOtherRun(const LogTable& log, const LogTable& frameTimes) {
   const double end = log.value.back()[0], other = frameTimes.value.back()[0];
   const double frame = other / static_cast<double>(frameTimes.value.size());
   if (std::abs(end - other) > 2 * frame)  // the log of a run against the clock is a frame behind
-    fmt::print(stderr, "note: {} ends at {:.6g} s, {} at {:.6g} s: are they of one run?\n", log.path, end,
-               frameTimes.path, other);
+    tell("note: {} ends at {:.6g} s, {} at {:.6g} s: are they of one run?\n", log.path, end, frameTimes.path, other);
 }
 
 int runPlot(const PlotOptions& options) {

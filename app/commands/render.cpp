@@ -10,6 +10,7 @@
 #include "app/files/input_error.h"
 #include "app/files/output_file.h"
 #include "app/interrupt.h"
+#include "app/standard_streams.h"
 #include "render/video_writer.h"
 
 namespace medulla {
@@ -75,12 +76,10 @@ void printTimings(const Timings& run, const Artist& artist, int pictures) {
     sum.cpu += s.cpu;
   }
   rows.push_back(sum);
-  fmt::print(stderr, "{:<14}{:>12}{:>12}{:>18}{:>18}\n", "stage", "wall [s]", "cpu [s]", "wall [ms/picture]",
-             "cpu [ms/picture]");
+  tell("{:<14}{:>12}{:>12}{:>18}{:>18}\n", "stage", "wall [s]", "cpu [s]", "wall [ms/picture]", "cpu [ms/picture]");
   const double each = 1e3 / std::max(pictures, 1);
   for (const StageTimes::Stage& s : rows)
-    fmt::print(stderr, "{:<14}{:>12.3f}{:>12.3f}{:>18.2f}{:>18.2f}\n", s.name, s.wall, s.cpu, each * s.wall,
-               each * s.cpu);
+    tell("{:<14}{:>12.3f}{:>12.3f}{:>18.2f}{:>18.2f}\n", s.name, s.wall, s.cpu, each * s.wall, each * s.cpu);
 }
 
 void printFiles(const RenderOptions& options, const Artist& artist, double wall) {

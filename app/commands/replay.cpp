@@ -3,6 +3,7 @@
 #include "app/commands/commands.h"
 #include "app/live_servo.h"
 #include "app/progress.h"
+#include "app/standard_streams.h"
 
 namespace medulla {
 
@@ -41,10 +42,10 @@ int runReplay(const RunOptions& options) {
     const std::vector<Result> more = liveResults(report);
     results.insert(results.end(), more.begin(), more.end());
     if (report.lateTicks > 0 || report.standingTicks > 0)
-      fmt::print(stderr,
-                 "medulla: {} of {} ticks woke more than a tick late, up to {:.3g} ms; in {} the surface stood still "
-                 "because the dynamics was late\n",
-                 report.lateTicks, report.ticks, 1e3 * report.latest, report.standingTicks);
+      tell(
+          "medulla: {} of {} ticks woke more than a tick late, up to {:.3g} ms; in {} the surface stood still "
+          "because the dynamics was late\n",
+          report.lateTicks, report.ticks, 1e3 * report.latest, report.standingTicks);
   }
   printResults(results);
   return 0;

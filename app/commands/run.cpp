@@ -11,6 +11,7 @@
 #include "app/commands/run_recorders.h"
 #include "app/files/text.h"
 #include "app/interrupt.h"
+#include "app/standard_streams.h"
 #include "physics/dynamics/rigid_support.h"
 #include "physics/model/surface_queries.h"
 
@@ -85,12 +86,10 @@ static void printUnplayed(const LoadedScene& loaded, bool isExcerpt) {
     const double length = end - start;
     const double outside = length - std::max(0.0, std::min(end, scene.duration) - std::max(start, 0.0));
     if (tool.recordingPath.empty() && start > kLeast && length > 0)
-      fmt::print(stderr, "note: tool '{}' stands still until {:.6g} s, where {} begins\n", tool.name, start,
-                 tool.trajectoryPath);
+      tell("note: tool '{}' stands still until {:.6g} s, where {} begins\n", tool.name, start, tool.trajectoryPath);
     if (!isShortened(scene, isExcerpt) && outside >= kLeast && outside > kShare * length)
-      fmt::print(stderr,
-                 "note: {:.4g} of {:.4g} s of the motion of tool '{}' are not played: the scene is 0 to {:.6g} s\n",
-                 outside, length, tool.name, scene.duration);
+      tell("note: {:.4g} of {:.4g} s of the motion of tool '{}' are not played: the scene is 0 to {:.6g} s\n", outside,
+           length, tool.name, scene.duration);
   }
 }
 
@@ -101,8 +100,8 @@ static void printAlmostClosed(const LoadedScene& loaded) {
     double most = 0;
     for (const ToolSample& sample : loaded.trajectories[k].samples) most = std::max(most, sample.grip);
     if (most <= kGripCloses && most > kGripCloses - kRounding)
-      fmt::print(stderr, "note: the jaws of tool '{}' come to where they close and no further: it grips nothing\n",
-                 loaded.scene.tools[k].name);
+      tell("note: the jaws of tool '{}' come to where they close and no further: it grips nothing\n",
+           loaded.scene.tools[k].name);
   }
 }
 
@@ -125,9 +124,8 @@ static void printBuriedTools(const LoadedScene& loaded, const World& world) {
       const SceneBody& body = loaded.scene.bodies[b];
       const double depth = reachInto({frame.bodies[b].nodes, body.model->triangles}, start.position, radius);
       if (depth > kLeast * radius)
-        fmt::print(stderr,
-                   "warning: tool '{}' reaches {:.2g} mm into body '{}' at the start and is pushed out at once\n",
-                   loaded.scene.tools[k].name, 1e3 * depth, body.name);
+        tell("warning: tool '{}' reaches {:.2g} mm into body '{}' at the start and is pushed out at once\n",
+             loaded.scene.tools[k].name, 1e3 * depth, body.name);
     }
   }
 }
@@ -138,11 +136,11 @@ static void printIdleLoads(const Scene& scene, bool isExcerpt) {
     if (holdsByNodes(body) && !body.deadLoads.empty() &&
         std::all_of(body.deadLoads.begin(), body.deadLoads.end(),
                     [&](const DeadLoad& l) { return held.count(l.node) > 0; }))
-      fmt::print(stderr, "note: every load on body '{}' acts where it is held\n", body.name);
+      tell("note: every load on body '{}' acts where it is held\n", body.name);
     for (const SceneLoad& load : body.loads)
       if (load.whole.from >= scene.duration && !isShortened(scene, isExcerpt))
-        fmt::print(stderr, "note: a load on body '{}' begins at {:.6g} s, and the scene ends at {:.6g} s\n", body.name,
-                   load.whole.from, scene.duration);
+        tell("note: a load on body '{}' begins at {:.6g} s, and the scene ends at {:.6g} s\n", body.name,
+             load.whole.from, scene.duration);
   }
 }
 
@@ -150,10 +148,10 @@ static void printIdleLoads(const Scene& scene, bool isExcerpt) {
 static void printUnusedNetworks(const Scene& scene) {
   for (const SceneBody& body : scene.bodies)
     if (!body.choosesLinks && body.model->identified && !body.model->identified->usesFormulas)
-      fmt::print(stderr,
-                 "note: body '{}' has beams, though its model has identified links: links=\"identified\" takes these, "
-                 "links=\"beam\" ends this note\n",
-                 body.name);
+      tell(
+          "note: body '{}' has beams, though its model has identified links: links=\"identified\" takes these, "
+          "links=\"beam\" ends this note\n",
+          body.name);
 }
 
 void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world) {
@@ -165,26 +163,25 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
     const SceneBody& body = scene.bodies[o.body0];
     const bool isHeld = !body.fixed.empty() || !body.fixedNodes.empty();
     if (o.body1 < 0)
-      fmt::print(stderr, "warning: body '{}' overlaps static shapes by {:.2g} mm at the start{}\n", name, 1e3 * o.depth,
-                 isHeld
-                     ? " where its surface is not held on them: its spheres stand on them, and tools feel it too hard"
-                     : "");
+      tell("warning: body '{}' overlaps static shapes by {:.2g} mm at the start{}\n", name, 1e3 * o.depth,
+           isHeld ? " where its surface is not held on them: its spheres stand on them, and tools feel it too hard"
+                  : "");
     else
-      fmt::print(stderr, "warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n", name,
-                 scene.bodies[o.body1].name, 1e3 * o.depth);
+      tell("warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n", name, scene.bodies[o.body1].name,
+           1e3 * o.depth);
   }
   printBuriedTools(loaded, world);
   for (const SceneBody& body : scene.bodies)
     if (std::set<int>(body.fixedNodes.begin(), body.fixedNodes.end()).size() == body.model->restNodes.size())
-      fmt::print(stderr, "note: every node of body '{}' is held\n", body.name);
+      tell("note: every node of body '{}' is held\n", body.name);
   printUnusedNetworks(scene);
   printIdleLoads(scene, options.isExcerpt);
   if (scene.dynamics.integrator != Integrator::implicit) return;
   if (scene.dynamics.sleepAfter > 0)
-    fmt::print(stderr, "warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
+    tell("warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
   if (std::any_of(scene.bodies.begin(), scene.bodies.end(),
                   [](const SceneBody& body) { return body.surface == SurfaceMode::contact; }))
-    fmt::print(stderr, "note: surface=\"contact\" is \"full\": nodes are chosen under the explicit integrator only\n");
+    tell("note: surface=\"contact\" is \"full\": nodes are chosen under the explicit integrator only\n");
 }
 
 // A moment of it is nothing: a tool that is caught between two bodies.
@@ -193,10 +190,10 @@ static void printSqueezed(const LoadedScene& loaded, const RunTotals& totals) {
   for (std::size_t k = 0; k < totals.squeezedTicks.size(); ++k) {
     const double squeezed = double(totals.squeezedTicks[k]) / loaded.scene.servoRate;
     if (squeezed < kLeast) continue;
-    fmt::print(stderr,
-               "note: for {:.2g} s surfaces left tool '{}' less than half of its radius: walls that close on it, or "
-               "tissue pressed deeper than its model can follow, which then lets the tool in\n",
-               squeezed, loaded.scene.tools[k].name);
+    tell(
+        "note: for {:.2g} s surfaces left tool '{}' less than half of its radius: walls that close on it, or "
+        "tissue pressed deeper than its model can follow, which then lets the tool in\n",
+        squeezed, loaded.scene.tools[k].name);
   }
 }
 
@@ -207,26 +204,25 @@ static void printNotes(const LoadedScene& loaded, const RunTotals& totals, const
     const std::string& name = loaded.scene.tools[k].name;
     const int closings = totals.closings[k];
     if (!totals.touched[k])
-      fmt::print(stderr, "note: tool '{}' touched nothing in its whole motion\n", name);
+      tell("note: tool '{}' touched nothing in its whole motion\n", name);
     else if (closings > 0 && !totals.held[k])
-      fmt::print(stderr, "note: tool '{}' closed {} and held nothing\n", name,
-                 closings == 1 ? "once" : fmt::format("{} times", closings));
+      tell("note: tool '{}' closed {} and held nothing\n", name,
+           closings == 1 ? "once" : fmt::format("{} times", closings));
     else if (totals.beganClosed[k] && !totals.held[k])
-      fmt::print(stderr, "note: tool '{}' was closed from the start and held nothing\n", name);
+      tell("note: tool '{}' was closed from the start and held nothing\n", name);
   }
   printSqueezed(loaded, totals);
   if (totals.volumeRatioMin <= 0)
-    fmt::print(stderr,
-               "note: a body was turned inside out (volume_ratio_min {:.3g}): its model is too coarse, its tissue too "
-               "soft for what acts on it, or a step too long\n",
-               totals.volumeRatioMin);
+    tell(
+        "note: a body was turned inside out (volume_ratio_min {:.3g}): its model is too coarse, its tissue too "
+        "soft for what acts on it, or a step too long\n",
+        totals.volumeRatioMin);
   if (creep.substeps == 0) return;
   std::vector<std::string> names;
   for (std::size_t b = 0; b < creep.bodies.size(); ++b)
     if (creep.bodies[b]) names.push_back(fmt::format("'{}'", loaded.scene.bodies[b].name));
-  fmt::print(stderr,
-             "note: {} crept on without speed where implicit steps failed, in {}: deformed beyond what they follow\n",
-             joined(names, ", "), creep.substeps == 1 ? "1 substep" : fmt::format("{} substeps", creep.substeps));
+  tell("note: {} crept on without speed where implicit steps failed, in {}: deformed beyond what they follow\n",
+       joined(names, ", "), creep.substeps == 1 ? "1 substep" : fmt::format("{} substeps", creep.substeps));
 }
 
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,

@@ -89,6 +89,8 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
                              const std::function<void()>& afterFrame, const std::function<void()>& finish = {},
                              const std::function<void()>& advance = {});
 
+// Every file that a run of the scene reads; some may be missing.
+std::vector<std::string> inputFiles(const Scene& scene);
 // Every file that the run writes, but for pictures.
 std::vector<std::string> outputFiles(const RunOptions& options);
 

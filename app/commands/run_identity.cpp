@@ -11,8 +11,7 @@
 // What a run reads and writes, and what tells it from others.
 namespace medulla {
 
-// Every file that a run reads; some may be missing.
-static std::vector<std::string> inputFiles(const Scene& scene) {
+std::vector<std::string> inputFiles(const Scene& scene) {
   std::vector<std::string> inputs{scene.path};
   for (const SceneBody& body : scene.bodies) {
     inputs.push_back(body.modelPath);

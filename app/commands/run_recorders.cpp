@@ -11,6 +11,7 @@
 #include "app/files/surface_file.h"
 #include "app/files/trajectory_file.h"
 #include "app/force_comparison.h"
+#include "app/standard_streams.h"
 
 namespace medulla {
 
@@ -35,8 +36,8 @@ class SurfaceRecorder {
       const SurfaceRequest& request = requests_[k];
       writeSurface(request.path, simulation.world().bodies(), moments_[k].frame);
       if (request.time.value_or(0) > simulation.time() + 1e-9)
-        fmt::print(stderr, "note: {} is the shape at rest, at {:.6g} s: the run ended before {:.6g} s\n", request.path,
-                   simulation.time(), *request.time);
+        tell("note: {} is the shape at rest, at {:.6g} s: the run ended before {:.6g} s\n", request.path,
+             simulation.time(), *request.time);
     }
   }
 

@@ -16,6 +16,7 @@
 #include "app/files/trial_journal.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
+#include "app/standard_streams.h"
 #include "app/torture.h"
 
 namespace medulla {
@@ -163,8 +164,8 @@ StabilityTables runTrials(const StabilityOptions& options, const BodyDescription
     TrialRunner(plan, journal).run(options.threads);
   } catch (const Interrupted&) {
     if (journal.size() > 0)
-      fmt::print(stderr, "stability: {} of {} trials are kept in {}; the same command goes on from there\n",
-                 journal.size(), plan.size(), journal.path());
+      tell("stability: {} of {} trials are kept in {}; the same command goes on from there\n", journal.size(),
+           plan.size(), journal.path());
     throw;
   }
   for (const PlannedTrial& p : plan) (p.point.trial.empty() ? out.map : out.trials).push_back(p.point);
@@ -183,8 +184,7 @@ void noteReplaced(const std::string& table, const std::vector<TortureMethod>& me
       gone.push_back(known.name);
   }
   if (!gone.empty())
-    fmt::print(stderr, "note: {} holds trials of {}, which those of this call will replace\n", table,
-               joined(gone, ", "));
+    tell("note: {} holds trials of {}, which those of this call will replace\n", table, joined(gone, ", "));
 }
 
 void writeTables(const fs::path& folder, const std::string& title, const StabilityTables& tables) {

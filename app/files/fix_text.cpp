@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
+#include <string_view>
 
 #include "app/files/number_text.h"
 #include "app/files/vertex_file.h"
@@ -83,14 +84,19 @@ std::string regionText(const Region& region) {
   return fmt::format("{}={}", form->word, list);
 }
 
+std::string vertexFileOf(const std::string& text) {
+  constexpr std::string_view kind = "vertices=";
+  return text.starts_with(kind) ? text.substr(kind.size()) : "";
+}
+
 HeldRegion parseHeldRegion(const std::string& text, const SoftBodyModel& model) {
   const std::size_t equals = text.find('=');
   const std::string kind = text.substr(0, equals), value = equals == std::string::npos ? "" : text.substr(equals + 1);
   HeldRegion held;
   held.text = text;
-  if (kind == "vertices" && !value.empty()) {
-    held.text = "vertices=" + std::filesystem::path(value).filename().string();
-    held.nodes = readVertices(value, model);
+  if (const std::string file = vertexFileOf(text); !file.empty()) {
+    held.text = "vertices=" + std::filesystem::path(file).filename().string();
+    held.nodes = readVertices(file, model);
     return held;
   }
   const Region region = regionOf(text, kind, value);

@@ -14,6 +14,9 @@ namespace medulla {
 // Throws std::runtime_error on anything else.
 HeldRegion parseHeldRegion(const std::string& text, const SoftBodyModel& model);
 
+// FILE of "vertices=FILE", else nothing.
+std::string vertexFileOf(const std::string& text);
+
 // The text of a part of space; it reads back as the same bits.
 std::string regionText(const Region& region);
 

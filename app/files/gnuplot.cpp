@@ -13,6 +13,8 @@
 
 #include "app/files/output_file.h"
 #include "app/files/text.h"
+#include "app/interrupt.h"
+#include "app/standard_streams.h"
 
 extern char** environ;
 
@@ -69,6 +71,7 @@ std::optional<std::string> runGnuplot(const std::string& script) {
   pid_t ended = -1;
   do ended = waitpid(child, &status, 0);
   while (ended < 0 && errno == EINTR);
+  checkInterrupt();  // which ends both where it comes from the keyboard
   if (ended != child) throw std::runtime_error(std::string("gnuplot's end cannot be seen: ") + std::strerror(errno));
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return picture.text();
   std::string complaint = complaints.text();
@@ -83,8 +86,8 @@ void drawByGnuplot(const std::string& stem, const std::string& script) {
   if (const std::optional<std::string> svg = runGnuplot(script)) {
     writeTextFile(picture, *svg);
   } else {
-    fmt::print(stderr, "no {}: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {} > {}\n",
-               std::filesystem::path(picture).filename().string(), shellWord(source), shellWord(picture));
+    tell("no {}: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {} > {}\n",
+         std::filesystem::path(picture).filename().string(), shellWord(source), shellWord(picture));
   }
 }
 

@@ -68,21 +68,23 @@ void writeTextFile(const std::string& path, const std::string& text) {
   file.commit();
 }
 
+// Absolute first: of a path that starts with nothing that exists, weakly_canonical() leaves "a.csv" and "./a.csv" two.
+std::filesystem::path placeOf(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::path absolute = std::filesystem::absolute(path, error);
+  std::filesystem::path place = std::filesystem::weakly_canonical(absolute, error);
+  if (error) place = path;
+  return place.has_filename() ? place : place.parent_path();
+}
+
 void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
-  // Absolute first: of a path that starts with nothing that exists, weakly_canonical() leaves "a.csv" and "./a.csv"
-  // two.
-  const auto place = [](const std::string& path) {
-    std::error_code error;
-    const std::filesystem::path absolute = std::filesystem::absolute(path, error);
-    const std::filesystem::path canonical = std::filesystem::weakly_canonical(absolute, error);
-    return error ? std::filesystem::path(path) : canonical;
-  };
   for (std::size_t k = 0; k < outputs.size(); ++k) {
     if (outputs[k].empty()) continue;
     for (const std::string& input : inputs)
-      if (place(input) == place(outputs[k])) throw std::runtime_error(outputs[k] + ": would be written over an input");
+      if (placeOf(input) == placeOf(outputs[k]))
+        throw std::runtime_error(outputs[k] + ": would be written over an input");
     for (std::size_t e = 0; e < k; ++e)
-      if (place(outputs[e]) == place(outputs[k])) throw std::runtime_error(outputs[k] + ": named for two outputs");
+      if (placeOf(outputs[e]) == placeOf(outputs[k])) throw std::runtime_error(outputs[k] + ": named for two outputs");
   }
 }
 

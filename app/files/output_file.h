@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -8,8 +9,12 @@
 
 namespace medulla {
 
-// Throws std::runtime_error when a command would write one file twice, or over a file that it reads. Links and "./"
-// are seen through; empty names are skipped.
+// Of a file or folder, which need not exist: absolute, links and "./" seen through, without a slash at its end. Two
+// paths lead to one place where these are equal.
+std::filesystem::path placeOf(const std::string& path);
+
+// Throws std::runtime_error when a command would write one file twice, or over a file that it reads, by their
+// places; empty names are skipped.
 void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
 
 // A text file that appears under its name only when whole (render/partial_file.h); ^C becomes an exception

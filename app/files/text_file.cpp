@@ -7,7 +7,11 @@
 
 #include <cerrno>
 #include <cstring>
+#include <map>
+#include <mutex>
+#include <optional>
 #include <string_view>
+#include <utility>
 
 #include "app/files/input_error.h"
 #include "app/interrupt.h"
@@ -31,14 +35,31 @@ class Descriptor {
   int value_;
 };
 
-// Whether the file is a pipe. Anything but that and a regular file is refused: a device may have no end.
-bool isPipe(const Descriptor& file, const std::string& path) {
+using FileNumber = std::pair<dev_t, ino_t>;
+
+// What came out of pipes: a run reads its files again for the hash that tells it from others.
+std::mutex pipesGuard;
+std::map<FileNumber, std::string> pipesRead;
+
+std::optional<std::string> remembered(const FileNumber& pipe) {
+  const std::lock_guard lock(pipesGuard);
+  const auto found = pipesRead.find(pipe);
+  return found == pipesRead.end() ? std::nullopt : std::optional(found->second);
+}
+
+void remember(const FileNumber& pipe, const std::string& text) {
+  const std::lock_guard lock(pipesGuard);
+  pipesRead[pipe] = text;
+}
+
+// The file's number where it is a pipe. Anything but that and a regular file is refused: a device may have no end.
+std::optional<FileNumber> pipeNumber(const Descriptor& file, const std::string& path) {
   struct stat status {};
   if (::fstat(file.value(), &status) != 0) throw inputError(path, 0, std::strerror(errno));
   if (S_ISDIR(status.st_mode)) throw inputError(path, 0, "is a folder, expected a file");
   if (!S_ISREG(status.st_mode) && !S_ISFIFO(status.st_mode))
     throw inputError(path, 0, "is a device, expected a file or a pipe");
-  return S_ISFIFO(status.st_mode);
+  return S_ISFIFO(status.st_mode) ? std::optional<FileNumber>({status.st_dev, status.st_ino}) : std::nullopt;
 }
 
 void waitForInput(const Descriptor& pipe) {
@@ -47,12 +68,8 @@ void waitForInput(const Descriptor& pipe) {
   while (::poll(&waiting, 1, kPatience) <= 0) checkInterrupt();
 }
 
-}  // namespace
-
-std::string readTextFile(const std::string& path) {
-  const Descriptor file(path);
-  if (file.value() < 0) throw inputError(path, 0, std::string("cannot be opened: ") + std::strerror(errno));
-  const bool pipe = isPipe(file, path);
+// To its end.
+std::string readAll(const Descriptor& file, bool pipe, const std::string& path) {
   constexpr std::size_t kPipeMost = 1U << 30;
   std::string text;
   char block[1 << 16];
@@ -66,8 +83,21 @@ std::string readTextFile(const std::string& path) {
     if (pipe && text.size() > kPipeMost) throw inputError(path, 0, "is a pipe of more than 1 GiB");
     checkInterrupt();
   }
+  return text;
+}
+
+}  // namespace
+
+std::string readTextFile(const std::string& path) {
+  const Descriptor file(path);
+  if (file.value() < 0) throw inputError(path, 0, std::string("cannot be opened: ") + std::strerror(errno));
+  const std::optional<FileNumber> pipe = pipeNumber(file, path);
+  if (pipe)
+    if (std::optional<std::string> text = remembered(*pipe)) return *text;
+  std::string text = readAll(file, pipe.has_value(), path);
   constexpr std::string_view mark = "\xef\xbb\xbf";  // before UTF-8, as spreadsheets write it
   if (text.starts_with(mark)) text.erase(0, mark.size());
+  if (pipe) remember(*pipe, text);
   return text;
 }
 

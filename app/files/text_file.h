@@ -4,8 +4,9 @@
 
 namespace medulla {
 
-// The whole of a file, or of a pipe up to 1 GiB. Throws std::runtime_error "FILE: ..." where it is missing, a folder, a
-// device, or cannot be read, and Interrupted after a signal, also while nobody writes into the pipe.
+// The whole of a file, or of a pipe up to 1 GiB, which gives the same each time, though it can be read but once. Throws
+// std::runtime_error "FILE: ..." where it is missing, a folder, a device, or cannot be read, and Interrupted after a
+// signal, also while nobody writes into the pipe.
 std::string readTextFile(const std::string& path);
 
 }  // namespace medulla
