@@ -54,7 +54,7 @@ class Builder {
     mesh_.albedo.push_back(albedo);
     mesh_.detail.push_back(1);
     mesh_.openness.push_back(openness);
-    for (auto* none : {&mesh_.thinness, &mesh_.area, &mesh_.hollow, &mesh_.blanch}) none->push_back(0);
+    for (auto* none : {&mesh_.seam, &mesh_.thinness, &mesh_.area, &mesh_.hollow, &mesh_.blanch}) none->push_back(0);
     return i;
   }
   // Corners counter-clockwise from outside.

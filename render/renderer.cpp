@@ -152,7 +152,7 @@ struct Renderer::Data {
   }
   ~Data() { context->makeCurrent(); }
 
-  bool tessellates() const { return fineHeight > kLinesOfMeshes; }
+  bool tessellates() const { return fineHeight >= kLinesOfMeshes; }
   const SceneMesh& drawn() const { return tessellates() ? finer : mesh; }
   const ShadowMap* shadowIfOn() const { return settings.shadows ? &shadow : nullptr; }
 
@@ -171,6 +171,7 @@ void Renderer::Data::bake() {
     computeNormals(rest, part);
     bakeTextureCoordinates(rest, part);
     computeTangents(rest, part);
+    findSeams(rest, part);
     bakeAlbedo(rest, part);
     tissue.addLook(*part.look);
   }

@@ -19,6 +19,7 @@ void SceneMesh::resizeVertices(std::size_t count) {
   tangent.resize(count);
   uv.resize(count);
   detail.resize(count, 1.f);
+  seam.resize(count, 0.f);
   albedo.resize(count);
   openness.resize(count, 1.f);
   thinness.resize(count, 0.f);
@@ -65,9 +66,13 @@ static void computeEvenTangents(SceneMesh& mesh, const MeshPart& part) {
   }
 }
 
-void computeTangents(SceneMesh& mesh, const MeshPart& part) {
+static bool hasRelief(const MeshPart& part) {
   constexpr float kNoRelief = 0.05f;
-  if (part.look->bump <= kNoRelief) return computeEvenTangents(mesh, part);
+  return part.look->bump > kNoRelief;
+}
+
+void computeTangents(SceneMesh& mesh, const MeshPart& part) {
+  if (!hasRelief(part)) return computeEvenTangents(mesh, part);
   std::fill_n(mesh.tangent.begin() + part.firstVertex, part.vertexCount, glm::vec3(0));
   for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
     const std::uint32_t a = mesh.index[k], b = mesh.index[k + 1], c = mesh.index[k + 2];
@@ -81,6 +86,26 @@ void computeTangents(SceneMesh& mesh, const MeshPart& part) {
     const glm::vec3 aside = std::abs(n.x) < 0.9f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
     mesh.tangent[i] = normalizedOr(t, glm::normalize(aside - n * glm::dot(n, aside)));
   }
+}
+
+// Cosine of the angle between two vertices' tangents as seen along their mean normal: how far a ridge between them is
+// bent does not count.
+static float agreement(const SceneMesh& mesh, std::uint32_t a, std::uint32_t b) {
+  const glm::vec3 n = normalizedOr(mesh.normal[a] + mesh.normal[b], mesh.normal[a]);
+  const glm::vec3 ta = mesh.tangent[a] - n * glm::dot(n, mesh.tangent[a]);
+  const glm::vec3 tb = mesh.tangent[b] - n * glm::dot(n, mesh.tangent[b]);
+  return glm::dot(ta, tb) / std::max(glm::length(ta) * glm::length(tb), 1e-6f);
+}
+
+void findSeams(SceneMesh& mesh, const MeshPart& part) {
+  constexpr float kAgreeing = 0.5f;  // 60 degrees
+  std::fill_n(mesh.seam.begin() + part.firstVertex, part.vertexCount, 0.f);
+  if (!hasRelief(part)) return;  // even tangents disagree in two points alone
+  for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3)
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::uint32_t a = mesh.index[k + corner], b = mesh.index[k + (corner + 1) % 3];
+      if (agreement(mesh, a, b) < kAgreeing) mesh.seam[a] = mesh.seam[b] = 1;
+    }
 }
 
 }  // namespace medulla

@@ -24,6 +24,7 @@ struct SceneMesh {
   std::vector<glm::vec3> tangent;  // unit, along the texture's u; v runs along cross(normal, tangent)
   std::vector<glm::vec2> uv;       // of the detail texture, 1 per tile; baked at rest, so that it sticks to the tissue
   std::vector<float> detail;       // 0..1: share of that texture's colour, none where its coordinates distort it
+  std::vector<float> seam;         // 1 where tangents of neighbours do not agree, as where the texture folds; at rest
   std::vector<glm::vec3> albedo;   // linear RGB, baked at rest
   std::vector<float> openness;     // 0..1: share of the cavity's light that arrives (ambient occlusion), baked at rest
   std::vector<float> thinness;     // 0..1: share of light that comes through from behind, baked at rest
@@ -42,8 +43,8 @@ void visitVertexArrays(const Visit& visit) {
   for (const auto array : {&SceneMesh::position, &SceneMesh::normal, &SceneMesh::tangent, &SceneMesh::albedo})
     visit(array);
   visit(&SceneMesh::uv);
-  for (const auto array : {&SceneMesh::detail, &SceneMesh::openness, &SceneMesh::thinness, &SceneMesh::area,
-                           &SceneMesh::hollow, &SceneMesh::blanch})
+  for (const auto array : {&SceneMesh::detail, &SceneMesh::seam, &SceneMesh::openness, &SceneMesh::thinness,
+                           &SceneMesh::area, &SceneMesh::hollow, &SceneMesh::blanch})
     visit(array);
 }
 
@@ -53,5 +54,6 @@ void computeNormals(SceneMesh& mesh, const MeshPart& part);
 float spacingOf(const SceneMesh& mesh, std::size_t i);
 // Tangents from the gradient of u over each triangle, of looks without relief along x; needs normals.
 void computeTangents(SceneMesh& mesh, const MeshPart& part);
+void findSeams(SceneMesh& mesh, const MeshPart& part);  // of these
 
 }  // namespace medulla

@@ -64,7 +64,7 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 directGloss;
 layout(location = 2) in vec4 ambientRadius;
 layout(location = 3) in vec4 halfwayBias;
-layout(location = 4) in vec3 uvDetail;
+layout(location = 4) in vec4 uvDetailSeam;
 uniform mat4 clipFromWorld, shadowFromWorld;
 uniform vec4 surface, lobes;
 uniform vec3 tint;
@@ -81,8 +81,8 @@ void main() {
   gl_Position = clipFromWorld * vec4(position, 1);
   vDirect = directGloss;
   vAmbient = ambientRadius;
-  vHalfway = vec4(halfwayBias.xyz, surface.w);
-  vUv = vec4(uvDetail.xy, surface.xy * uvDetail.z);
+  vHalfway = vec4(halfwayBias.xyz, .99 * uvDetailSeam.w);
+  vUv = vec4(uvDetailSeam.xy, surface.xy * uvDetailSeam.z);
   fTint = vec4(tint, surface.z);
   fLobes = lobes;
 #ifdef DULL
@@ -114,6 +114,7 @@ uniform sampler2D detail;
 #if SHADE == 1
 in vec4 vShadow;
 uniform sampler2D shadowMap;
+uniform vec4 surface;
 uniform int squares;
 
 // Share of the four texels around q.xy, in texels, that are not nearer than q.z. Blended here: OpenGL takes depths into
@@ -168,7 +169,9 @@ void main() {
   vec2 slope = (t.zw - .5) * fTint.w;
   float along = dot(slope, vHalfway.xy);
   float h = max(vHalfway.z - along, 0.);
-  float x = h * h / ((1. + dot(slope, slope)) * dot(vHalfway.xyz, vHalfway.xyz));
+  // Between tangents that oppose each other nothing is left of the unit vector but z: divided by that, it would mirror
+  // the lamp whatever the angle.
+  float x = h * h / ((1. + dot(slope, slope)) * max(dot(vHalfway.xyz, vHalfway.xyz), vHalfway.w));
   float d1 = x * fLobes.x + 1., d2 = x * fLobes.z + 1.;
   float gloss = vDirect.w * (fLobes.y / (d1 * d1) + min(fLobes.w / (d2 * d2), FILM_PEAK));
 #endif
@@ -176,7 +179,7 @@ void main() {
 #if SHADE == 1
   float s = softShadow(vShadow.xyz / vShadow.w, vAmbient.w);
   // Light bleeds into the shadow's edge through the tissue, and red light farthest.
-  diffuse *= vec3(mix(s, mix(s, s * (2. - s), .6) * (1. - BLEED) + BLEED, vHalfway.w), s, s);
+  diffuse *= vec3(mix(s, mix(s, s * (2. - s), .6) * (1. - BLEED) + BLEED, surface.w), s, s);
 #ifndef DULL
   gloss *= s;
 #endif

@@ -1,6 +1,7 @@
 #include "render/shadow_map.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 
 namespace medulla {
@@ -10,18 +11,40 @@ constexpr float kBehind = -1e9f, kFarAway = 1e6f;
 // Of the near plane, which only says how depths are spread: a shaft beside the lens casts its shadow from before it.
 constexpr float kNearest = 0.1f;
 
+glm::vec3 texelOf(const glm::vec4& clip, const ShadowMap& s) {
+  const float half = 0.5f * float(s.map.side), inverse = 1 / std::max(clip.w, 1e-6f);
+  const glm::vec3 texel((clip.x * inverse + 1) * half, (clip.y * inverse + 1) * half, clip.z * inverse * 0.5f + 0.5f);
+  // Bounded, so that texels convert to integers whatever the picture holds.
+  return glm::clamp(texel, glm::vec3(-kFarAway), glm::vec3(kFarAway));
+}
+
 void projectVertices(const SceneMesh& mesh, const LightView& light, ShadowMap& s) {
-  std::vector<glm::vec3>& texel = s.texel;
-  texel.resize(mesh.position.size());
-  const float half = 0.5f * float(s.map.side);
-  for (std::size_t i = 0; i < texel.size(); ++i) {
+  s.texel.resize(mesh.position.size());
+  for (std::size_t i = 0; i < s.texel.size(); ++i) {
     const glm::vec4 clip = light.clipFromWorld * glm::vec4(mesh.position[i], 1);
-    const float inverse = 1 / std::max(clip.w, 1e-6f);
-    texel[i] = {(clip.x * inverse + 1) * half, (clip.y * inverse + 1) * half, clip.z * inverse * 0.5f + 0.5f};
-    // Bounded, so that texels convert to integers whatever the picture holds.
-    texel[i] = glm::clamp(texel[i], glm::vec3(-kFarAway), glm::vec3(kFarAway));
-    if (clip.w < kNearest * light.nearDistance) texel[i] = glm::vec3(kBehind, kBehind, 0);
+    s.texel[i] = clip.w < kNearest * light.nearDistance ? glm::vec3(kBehind, kBehind, 0) : texelOf(clip, s);
   }
+}
+
+// A triangle that is partly too near to the lamp, cut there. Dropped whole, the long triangles of a shaft would tear
+// holes into its shadow.
+void rasterizeCut(const std::array<glm::vec3, 3>& corners, const LightView& light, ShadowMap& s) {
+  const float nearest = kNearest * light.nearDistance;
+  glm::vec4 clip[3];
+  for (int k = 0; k < 3; ++k) clip[k] = light.clipFromWorld * glm::vec4(corners[k], 1);
+  glm::vec3 rest[4];
+  int count = 0;
+  for (int k = 0; k < 3; ++k) {
+    const glm::vec4 &from = clip[k], &to = clip[(k + 1) % 3];
+    if (from.w >= nearest) rest[count++] = texelOf(from, s);
+    if ((from.w >= nearest) != (to.w >= nearest))
+      rest[count++] = texelOf(from + (to - from) * ((nearest - from.w) / (to.w - from.w)), s);
+  }
+  for (int k = 2; k < count; ++k) s.map.rasterize(rest[0], rest[k - 1], rest[k]);
+}
+
+bool isBehind(const glm::vec3& texel) {
+  return texel.x < 0.5f * kBehind;
 }
 
 void buildBlocks(ShadowMap& s) {
@@ -65,7 +88,11 @@ void renderShadowMap(const SceneMesh& mesh, const LightView& light, ShadowMap& s
     if (!part.look->castsShadow) continue;
     for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
       const glm::vec3 a = s.texel[mesh.index[k]], b = s.texel[mesh.index[k + 1]], c = s.texel[mesh.index[k + 2]];
-      if (std::min({a.x, b.x, c.x}) > 0.5f * kBehind) s.map.rasterize(a, b, c);
+      const int behind = isBehind(a) + isBehind(b) + isBehind(c);
+      if (behind == 0) s.map.rasterize(a, b, c);
+      if (behind == 1 || behind == 2)
+        rasterizeCut({mesh.position[mesh.index[k]], mesh.position[mesh.index[k + 1]], mesh.position[mesh.index[k + 2]]},
+                     light, s);
     }
   }
   buildBlocks(s);

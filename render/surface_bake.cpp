@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "render/depth_map.h"
 #include "render/noise.h"
@@ -35,12 +36,12 @@ glm::vec2 unroll(vec3 p, vec3 n, float radius) {
   return glm::vec2(p) + radius * excess * glm::vec2(n);
 }
 
-// Which way a flat part faces; +z of any other, which the unrolling goes around.
-vec3 facingOf(const SceneMesh& mesh, const MeshPart& part) {
+// Which way a flat part faces; nothing of any other.
+std::optional<vec3> facingOf(const SceneMesh& mesh, const MeshPart& part) {
   vec3 sum(0);
   for (std::uint32_t i = 0; i < part.vertexCount; ++i) sum += mesh.normal[part.firstVertex + i];
   const float length = glm::length(sum);
-  return length > 0.999f * float(part.vertexCount) ? sum / length : vec3(0, 0, 1);
+  return length > 0.999f * float(part.vertexCount) ? std::optional(sum / length) : std::nullopt;
 }
 
 // By the smallest rotation that takes `facing` to +z.
@@ -217,9 +218,10 @@ void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
   std::vector<vec3> normal = mesh.normal;
   if (part.look->unrollRadius <= 0)
     smoothOverEdges(mesh, part.firstIndex, part.firstIndex + part.indexCount, kUnrollPasses, normal);
-  const vec3 facing = facingOf(mesh, part);
+  // Unrolled around z; what is flat lies across that, whatever the look's tilt.
+  const std::optional<vec3> facing = facingOf(mesh, part);
   const auto tilted = [&](vec3 v) {
-    v = turnedToZ(v, facing);
+    if (facing) return turnedToZ(v, *facing);
     return vec3(v.x, c * v.y - s * v.z, s * v.y + c * v.z);
   };
   for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)

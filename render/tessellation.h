@@ -7,7 +7,7 @@ namespace medulla {
 
 // Meshes are made for films of 720 and 1080 lines. In larger pictures their outlines would be polygons, and light,
 // which is interpolated over triangles without perspective, would run in zigzags. Mending that takes as long as all the
-// light of a film does: up to so many lines drawn, those of 720 in the best quality, meshes are taken as they are.
+// light of a film does: below so many lines drawn, those of 720 in the best quality, meshes are taken as they are.
 constexpr int kLinesOfMeshes = 1440;
 
 // `out` is `mesh` with edges halved where the picture, so many pixels high, shows them. An edge is judged by its own

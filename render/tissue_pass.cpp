@@ -124,7 +124,7 @@ TissuePass::TissuePass(int shadowSide, bool supersampled) {
   attribute(1, 4, offsetof(LitVertex, direct));   // and gloss
   attribute(2, 4, offsetof(LitVertex, ambient));  // and shadowRadius
   attribute(3, 4, offsetof(LitVertex, halfway));  // and shadowBias
-  attribute(4, 3, offsetof(LitVertex, uv));       // and detail
+  attribute(4, 4, offsetof(LitVertex, uv));       // and detail, seam
 
   glGenVertexArrays(1, &maskArray_);
   glGenBuffers(1, &maskBuffer_);

@@ -257,6 +257,7 @@ Shading lightVertex(const SceneMesh& mesh, const Look& look, std::size_t i, vec3
     lightTissue(v, look, s, o);
   o.ambient += v.veilColour * (v.veil * v.veilLight * look.ambient);
   if (s.haze) o.detail *= 1 - v.veil;
+  o.seam = mesh.seam[i];
 
   const vec3 halfway = glm::normalize(v.toLight + v.toEye);
   const float lh = glm::dot(v.toLight, halfway);

@@ -21,6 +21,7 @@ struct LitVertex {
   float shadowBias;    // depth
   glm::vec2 uv;
   float detail;  // 0..1: share of the texture's colour; none where the blood is pressed out or the texture distorted
+  float seam;    // of SceneMesh
 };
 
 // Highlight of a look: two lobes c / (1 + (a - 1) cos^2)^2 (GGX, Walter et al. 2007), the tissue's and the wet film's.

@@ -9,6 +9,7 @@
 namespace medulla {
 namespace {
 
+constexpr float kOverscan = 6;  // see Viewpoint::overscan: a floor seen from near has triangles larger than a picture
 constexpr float kFarPlane = 2500;  // m, beyond what scenes may hold; the depth buffer is floating point
 
 glm::vec3 anyPerpendicular(glm::vec3 v) {
@@ -82,7 +83,7 @@ Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round, float mo
   if (distance > 0) v.nearPlane = std::min(v.nearPlane, 0.1f * distance);
   glm::mat4 clip = glm::perspective(glm::radians(camera.fovDegrees), aspect, v.nearPlane, kFarPlane);
   clip[1][1] = -clip[1][1];
-  v.overscan = round ? 1.f : std::min(2.f, mostOverscan);
+  v.overscan = round ? 1.f : std::min(kOverscan, mostOverscan);
   clip[0][0] /= v.overscan;
   clip[1][1] /= v.overscan;
   v.clipFromWorld = clip * glm::lookAt(v.position, v.position - v.back, v.up);

@@ -91,5 +91,22 @@ TEST(ShadowMap, WhatIsNearerThanTheNearPlaneCastsItsShadow) {
   }
 }
 
+// A board under the lamp that reaches from before it to behind it: two triangles, both cut.
+TEST(ShadowMap, TrianglesThatReachBehindTheLampCastTheShadowOfTheRest) {
+  LightView light;
+  light.nearDistance = 0.1f;
+  light.clipFromWorld = glm::perspective(1.0f, 1.f, light.nearDistance, light.farDistance);
+  SceneMesh mesh;
+  addSquare(mesh, {0, 0, 0}, 0.1f, 1);
+  mesh.position = {{-0.05f, -0.05f, 1}, {0.05f, -0.05f, 1}, {0.05f, -0.05f, -0.8f}, {-0.05f, -0.05f, -0.8f}};
+  mesh.index = {0, 1, 2, 0, 2, 3};
+  ShadowMap shadow;
+  renderShadowMap(mesh, light, shadow);
+  EXPECT_LT(shadow.map.at(kShadowSide / 2, 5), 0.5f);                    // near
+  EXPECT_LT(shadow.map.at(kShadowSide / 2, kShadowSide * 2 / 5), 0.9f);  // far
+  EXPECT_EQ(shadow.map.at(kShadowSide / 2, kShadowSide * 3 / 5), 1);     // above it
+  EXPECT_EQ(shadow.map.at(kShadowSide / 10, kShadowSide * 9 / 20), 1);   // beside it
+}
+
 }  // namespace
 }  // namespace medulla
