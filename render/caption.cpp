@@ -19,14 +19,27 @@ float widestOf(const std::vector<std::string>& lines, float height) {
   return widest;
 }
 
+// How many letters of a word fit, at least one.
+std::size_t lettersThatFit(const std::string& word, float height, float width) {
+  std::size_t count = word.size();
+  while (count > 1 && textWidth(word.substr(0, count), height) > width) --count;
+  return count;
+}
+
+// Between words; within one that is wider than a line.
 std::vector<std::string> wrapped(const std::string& text, float height, float width) {
   std::vector<std::string> lines;
   std::istringstream words(text);
-  for (std::string word; words >> word;)
-    if (lines.empty() || textWidth(lines.back() + " " + word, height) > width)
-      lines.push_back(word);
-    else
+  for (std::string word; words >> word;) {
+    if (!lines.empty() && textWidth(lines.back() + " " + word, height) <= width) {
       lines.back() += " " + word;
+      continue;
+    }
+    while (!word.empty()) {
+      lines.push_back(word.substr(0, lettersThatFit(word, height, width)));
+      word.erase(0, lines.back().size());
+    }
+  }
   return lines;
 }
 

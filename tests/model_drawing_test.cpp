@@ -213,6 +213,9 @@ TEST(Caption, FitsIntoPicturesOfAnySize) {
     EXPECT_LT(right, width - 3);
     EXPECT_LT(bottom, 0.15 * height);
   }
+  Image narrow = blackImage(100, 240);  // than a word
+  drawCaption("cholecystectomy_rehearsal 3.40 s", narrow.width, narrow);
+  EXPECT_NE(narrow.pixels, blackImage(100, 240).pixels);
   Image tiny = blackImage(16, 16);
   drawCaption("not to be read", tiny.width, tiny);
   EXPECT_EQ(tiny.pixels, blackImage(16, 16).pixels);
