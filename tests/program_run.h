@@ -52,6 +52,7 @@ inline ProgramResult runProgram(const std::vector<std::string>& arguments, const
   const std::string folder = mkdtemp(base);
   const pid_t child = fork();
   if (child == 0) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, SIG_DFL);  // nohup would have them ignored
     const std::string output = options.output.empty() ? folder + "/out" : options.output;
     if (!freopen(output.c_str(), "w", stdout) || !freopen((folder + "/err").c_str(), "w", stderr) ||
         chdir(options.folder.c_str()) != 0)

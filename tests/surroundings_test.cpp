@@ -14,6 +14,7 @@ class Surroundings : public OwnScene {
  protected:
   // The exit code of a line for bash, in the test's folder; $M is the program.
   int shell(const std::string& line) const {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, SIG_DFL);  // a shell cannot undo SIG_IGN
     folder.write("line.sh", "M='" MEDULLA_PROGRAM "'\ncd \"$(dirname \"$0\")\"\n" + line + "\n");
     const int status = std::system(("bash '" + (folder / "line.sh") + "' > /dev/null 2>&1").c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
