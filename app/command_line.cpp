@@ -84,7 +84,8 @@ void refuseOtherKinds(const std::string& option, const std::string& path, const 
   if (own.empty() || own == ending) return;
   if (std::find(std::begin(kinds), std::end(kinds), own) != std::end(kinds))
     usageError(option, path, "a file that ends in " + ending);
-  if (std::filesystem::exists(path))
+  std::error_code unknown;
+  if (std::filesystem::exists(path, unknown))
     usageError(option, path, "a file that ends in " + ending + ", or one that does not exist yet");
 }
 

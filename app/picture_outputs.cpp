@@ -66,13 +66,16 @@ PngFolder::PngFolder(const std::string& path, const Slice& slice)
   }
 }
 
+bool PngFolder::isPicture(const fs::path& path) const {
+  const int number = numberOf(path);
+  return slice_.first <= number && number < slice_.last;
+}
+
 // Noticed before the first picture is drawn, and not when half of them have moved in.
 void PngFolder::requireReplaceable() const {
   if (access(folder_.c_str(), W_OK | X_OK) != 0) throw unwritable(folder_.string());
   for (const auto& entry : fs::directory_iterator(folder_)) {
-    const int number = numberOf(entry.path());
-    const bool ours = slice_.first <= number && number < slice_.last;
-    if (ours && fs::is_directory(entry.symlink_status()))
+    if (isPicture(entry.path()) && fs::is_directory(entry.symlink_status()))
       throw std::runtime_error(
           fmt::format("{}: is a folder, expected the name of a file to write", entry.path().string()));
   }
@@ -80,8 +83,7 @@ void PngFolder::requireReplaceable() const {
 
 // Of those that collect; also what a writer that was killed has left. Whatever else somebody put there stays.
 bool PngFolder::isOurs(const fs::path& path) const {
-  const int number = numberOf(path);
-  return (slice_.first <= number && number < slice_.last) || path.filename() == kRunFile || path.extension() == ".part";
+  return isPicture(path) || path.filename() == kRunFile || path.extension() == ".part";
 }
 
 void PngFolder::takeOver() const {
@@ -93,8 +95,8 @@ void PngFolder::takeOver() const {
         "{}: holds pictures of another run, by its scene, options or OpenGL: remove it, or render without --resume",
         collecting_.string()));
   for (const auto& entry : fs::directory_iterator(collecting_)) {
-    const bool picture = entry.path().extension() == ".png" && isWholePng(entry.path());
-    if (isOurs(entry.path()) && !(slice_.resume && same && picture)) fs::remove_all(entry.path());
+    const bool kept = slice_.resume && same && isPicture(entry.path()) && isWholePng(entry.path());
+    if (isOurs(entry.path()) && !kept) fs::remove_all(entry.path());
   }
   writeTextFile(name.string(), run);
 }
@@ -118,7 +120,7 @@ void PngFolder::write(int number, const Image& image) const {
 int PngFolder::finish() {
   std::vector<fs::path> pictures;
   for (const auto& entry : fs::directory_iterator(collecting_))
-    if (numberOf(entry.path()) >= 0 && isOurs(entry.path())) pictures.push_back(entry.path());
+    if (isPicture(entry.path())) pictures.push_back(entry.path());
   for (const fs::path& picture : pictures) fs::rename(picture, folder_ / picture.filename());
   keep_ = false;
   return slice_.whole ? removeLater() : 0;

@@ -37,6 +37,7 @@ class PngFolder {
 
  private:
   void requireReplaceable() const;
+  bool isPicture(const std::filesystem::path& path) const;  // of the slice, by its name
   bool isOurs(const std::filesystem::path& path) const;
   void takeOver() const;
   int removeLater() const;

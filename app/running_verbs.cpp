@@ -153,7 +153,7 @@ void requireDistinctRuns(const std::vector<RenderOptions>& all) {
     append(outputFiles(options.run), outputs);
     append(inputFiles(readScene(options.run.scene, options.run.overrides)), inputs);
     for (const auto& [tool, path] : options.run.trajectories) inputs.push_back(path);
-    if (!options.cacheToRead.empty()) inputs.push_back(options.cacheToRead);
+    inputs.push_back(options.cacheToRead);
   }
   requireDistinctFiles(outputs, inputs);
 }

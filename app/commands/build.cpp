@@ -93,18 +93,15 @@ void warnOfShape(const BuildJob& job) {
         "results may be off by a third, mostly too soft\n",
         job.meshPath, 1e3 * coarse->edge, 1e3 * coarse->thickness, 500 * coarse->thickness);
   if (!job.model.identified && job.report.hollowLinks > kManyLinks * job.report.links)
-    fmt::print(
-        stderr,
-        "{}: note: {} of {} links lie in a hollow or beside the body: beams may be far too soft; use --identify\n",
-        job.meshPath, job.report.hollowLinks, job.report.links);
+    tell("{}: note: {} of {} links lie in a hollow or beside the body: beams may be far too soft; use --identify\n",
+         job.meshPath, job.report.hollowLinks, job.report.links);
 }
 
 // Loop subdivision draws a coarse mesh much rounder than it is.
 void warnOfDrawnSurface(const BuildJob& job) {
   constexpr double kSeen = 2;  // %
   if (job.report.drawnInsideMax <= kSeen) return;
-  fmt::print(
-      stderr,
+  tell(
       "{}: note: the drawn surface lies up to {:.2g} % of the diagonal inside the mesh, so that tools seem to "
       "press on air; use a finer mesh{}\n",
       job.meshPath, job.report.drawnInsideMax,

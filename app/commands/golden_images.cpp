@@ -27,7 +27,8 @@ std::vector<std::string> filesOf(const fs::path& folder, const std::string& exte
 // As it is called, or, where ".." after that would lead elsewhere since there are links in it, where it is.
 fs::path folderOf(const std::string& file) {
   const fs::path called = fs::path(file).parent_path();
-  return placeOf(called.string()) == fs::absolute(called).lexically_normal() ? called : placeOf(called.string());
+  const fs::path place = placeOf(called.string());
+  return place == fs::absolute(called).lexically_normal() ? called : place;
 }
 
 StrayImage lookInto(const std::string& path) {

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <set>
 
 #include "app/files/input_error.h"
 
@@ -78,13 +79,14 @@ std::filesystem::path placeOf(const std::string& path) {
 }
 
 void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
-  for (std::size_t k = 0; k < outputs.size(); ++k) {
-    if (outputs[k].empty()) continue;
-    for (const std::string& input : inputs)
-      if (placeOf(input) == placeOf(outputs[k]))
-        throw std::runtime_error(outputs[k] + ": would be written over an input");
-    for (std::size_t e = 0; e < k; ++e)
-      if (placeOf(outputs[e]) == placeOf(outputs[k])) throw std::runtime_error(outputs[k] + ": named for two outputs");
+  std::set<std::filesystem::path> read, written;
+  for (const std::string& input : inputs)
+    if (!input.empty()) read.insert(placeOf(input));
+  for (const std::string& output : outputs) {
+    if (output.empty()) continue;
+    const std::filesystem::path place = placeOf(output);
+    if (read.count(place) > 0) throw std::runtime_error(output + ": would be written over an input");
+    if (!written.insert(place).second) throw std::runtime_error(output + ": named for two outputs");
   }
 }
 
