@@ -12,6 +12,8 @@ MEDULLA_INLINE Lanes3 pullOfEdges(const Springs& springs, const NodeGroup* group
   const char* bytes = reinterpret_cast<const char*>(displaced);
   const auto at = [bytes](std::uint32_t offset) { return load(*reinterpret_cast<const Quad*>(bytes + offset)); };
   Lanes a = splat(0), b = a, c = a, d = a;
+  // Of 16 instructions per group of springs three are the loop's own.
+#pragma GCC unroll 2
   for (int e = springs.first[g]; e < springs.first[g + 1]; ++e) {
     const SpringGroup& s = springs.groups[e];
     const Lanes stiffness = _mm256_cvtps_pd(_mm_load_ps(s.stiffness));
