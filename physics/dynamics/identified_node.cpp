@@ -1,4 +1,5 @@
 #include <Eigen/Geometry>
+#include <vector>
 
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/skin_map.h"
@@ -12,15 +13,17 @@ using Eigen::Vector3d;
 
 namespace {
 
-// A host's frames as they are, without a world to write to.
+// A host's frames as they are, without a world to write to; up to the thread's next call.
 struct SeenHost {
   HomeFrame home;
-  std::vector<SkinTermState> states;
+  const SkinTermState* states;
 };
 
 SeenHost see(const Identified& s, const SkinHost& host) {
-  SeenHost out{homeFrame(s, host), std::vector<SkinTermState>(host.endTerms - host.firstTerms)};
-  seeFrames(s, host, out.home, out.states.data());
+  thread_local std::vector<SkinTermState> room;  // kept: tools ask in every substep
+  room.resize(host.endTerms - host.firstTerms);
+  const SeenHost out{homeFrame(s, host), room.data()};
+  seeFrames(s, host, out.home, room.data());
   return out;
 }
 
@@ -38,7 +41,7 @@ Vector3d positionOnFrames(const WorldData& d, int node) {
   const Identified& s = d.identified;
   const SkinGroup& g = s.skin[s.ofNodeGroup[node / 4]];
   const SeenHost seen = see(s, s.hosts[g.host]);
-  const SkinPlace place = placeSkin<false>(s, g, seen.states.data());
+  const SkinPlace place = placeSkin<false>(s, g, seen.states);
   return vectorOf(seen.home.position + rotate(seen.home.rotation, place.offset), node % 4);
 }
 
@@ -49,7 +52,7 @@ HostPoint hostPointOnFrames(const WorldData& d, int node) {
   const SkinHost& host = s.hosts[g.host];
   const SeenHost seen = see(s, host);
   const int lane = node % 4;
-  const SkinPlace place = placeSkin<false>(s, g, seen.states.data());
+  const SkinPlace place = placeSkin<false>(s, g, seen.states);
   const Matrix3d r = quaternionOf(s.frames[host.home].orientation).toRotationMatrix();
   const Vector3d turn = vectorOf(place.turn, lane), lever = vectorOf(g.lever, lane);
   // Of the second order by the turn of the node's own frame: (s.P) / 2 + s P^T / 2 - P s^T.
