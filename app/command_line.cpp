@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <string_view>
+#include <system_error>
 
 #include "app/commands/commands.h"
 #include "app/commands/rest_watch.h"
@@ -253,6 +254,10 @@ int runCommandLine(int argc, char** argv) {
     return 4;
   } catch (const std::bad_alloc&) {
     tell("medulla: out of memory: {} {}\n", argc > 1 ? argv[1] : "", argc > 2 ? argv[2] : "");
+    return 1;
+  } catch (const std::system_error& error) {
+    endWhereReaderLeft(error.code().value());  // results of more than a buffer are written before they are flushed
+    tell("medulla: {}\n", error.what());
     return 1;
   } catch (const std::exception& error) {
     tell("medulla: {}\n", error.what());

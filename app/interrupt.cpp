@@ -31,12 +31,8 @@ void watchInterrupts() {
   for (const int signal : {SIGXFSZ, SIGPIPE}) std::signal(signal, SIG_IGN);
 }
 
-bool interruptRequested() {
-  return requested;
-}
-
 void checkInterrupt() {
-  if (interruptRequested()) throw Interrupted();
+  if (requested) throw Interrupted();
 }
 
 }  // namespace medulla

@@ -13,7 +13,6 @@ struct Interrupted : std::exception {
 // unfinished files behind. What the program was started to ignore (nohup, jobs in the background) stays ignored.
 // SIGQUIT still ends the process. Nor does a limit on the size of files or a reader that left: writing fails there.
 void watchInterrupts();
-bool interruptRequested();
 void checkInterrupt();  // throws Interrupted once a signal came
 
 }  // namespace medulla

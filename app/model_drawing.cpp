@@ -200,7 +200,9 @@ void drawBodyModel(const SceneBody& body, const BodyFrame& frame, const Shown& s
   }
 }
 
-std::vector<Segment> coil(glm::vec3 a, glm::vec3 b, float radius, float wire, glm::vec4 colour) {
+// A coil from a to b, as segments end to end: the first begins at a, the last ends at b, none is farther from the
+// straight line than `radius`. None where a and b are one.
+static std::vector<Segment> coil(glm::vec3 a, glm::vec3 b, float radius, float wire, glm::vec4 colour) {
   constexpr int kTurns = 7, kPiecesPerTurn = 16, kPieces = kTurns * kPiecesPerTurn;
   constexpr float kLead = 0.12f;  // share of the length in which the coil widens at either end
   std::vector<Segment> out;

@@ -14,8 +14,4 @@ void drawBodyModel(const SceneBody& body, const BodyFrame& frame, const Shown& s
 // Adds the proxy, the device, and the virtual spring between them as a coil.
 void drawProxy(const ToolSettings& tool, const ToolState& state, Drawing& out);
 
-// A coil from a to b, as segments end to end: the first begins at a, the last ends at b, none is farther from the
-// straight line than `radius`. None where a and b are one.
-std::vector<Segment> coil(glm::vec3 a, glm::vec3 b, float radius, float wire, glm::vec4 colour);
-
 }  // namespace medulla

@@ -104,8 +104,8 @@ void PngFolder::takeOver() const {
 PngFolder::~PngFolder() {
   if (keep_) return;
   std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(collecting_, ignored))
-    if (isOurs(entry.path())) fs::remove_all(entry.path(), ignored);
+  for (fs::directory_iterator entry(collecting_, ignored), end; entry != end; entry.increment(ignored))
+    if (isOurs(entry->path())) fs::remove_all(entry->path(), ignored);
   fs::remove(collecting_, ignored);  // if it is empty
 }
 

@@ -80,6 +80,8 @@ struct OverriddenAttribute {
   std::string attribute, path;
 };
 
+inline constexpr int kMostSubsteps = 100000;  // per dynamics frame, that a scene may ask for
+
 struct Scene {
   std::string path, name;
   double servoRate = 1200, dynamicsRate = 50;  // Hz, up to 20000 and 20 to 1200; the first a multiple of the second

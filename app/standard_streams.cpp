@@ -18,11 +18,14 @@ void openStandardStreams() {
 void flushResults() {
   errno = 0;
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
-  if (errno == EPIPE) {
-    std::signal(SIGPIPE, SIG_DFL);
-    std::raise(SIGPIPE);
-  }
+  endWhereReaderLeft(errno);
   throw std::runtime_error("standard output cannot be written");
+}
+
+void endWhereReaderLeft(int error) {
+  if (error != EPIPE) return;
+  std::signal(SIGPIPE, SIG_DFL);
+  std::raise(SIGPIPE);
 }
 
 }  // namespace medulla

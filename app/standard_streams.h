@@ -21,8 +21,11 @@ void tell(fmt::format_string<T...> format, T&&... values) {
   std::fwrite(text.data(), 1, text.size(), stderr);
 }
 
-// Throws std::runtime_error where standard output cannot be written, and ends the process by SIGPIPE where its reader
-// has left, as who reads the first lines alone expects of any program.
+// Throws std::runtime_error where standard output cannot be written.
 void flushResults();
+
+// What a failed write left in errno: where a reader has left it ends the process by SIGPIPE, as who reads the first
+// lines alone expects of any program.
+void endWhereReaderLeft(int error);
 
 }  // namespace medulla

@@ -10,6 +10,7 @@
 
 #include "app/interrupt.h"
 #include "physics/dynamics/rest_modes.h"
+#include "physics/dynamics/rigid_support.h"
 #include "physics/dynamics/stages.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/surface_samples.h"
@@ -300,7 +301,7 @@ BodyDescription alone(BodyDescription body) {
 // The body that a trial is about.
 BodyDescription bodyOf(const Trial& trial, const BodyDescription& whole) {
   BodyDescription body = alone(whole);
-  if (body.fixed.empty() && (body.links != LinkModel::identified || body.fixedNodes.empty()))
+  if (body.fixed.empty() && !holdsByNodes(body))
     throw std::runtime_error(fmt::format("body '{}' is not held anywhere: expected a body with <fix>", body.name));
   if (trial.change) trial.change(body);
   return body;
@@ -310,10 +311,19 @@ double handTimeOf(const Trial& trial) {
   return trial.path ? 1 : 0;
 }
 
+// rad/s: of spheres and links, or, where none of these can deform, of the surface.
+double slowestMode(const BodyDescription& body) {
+  BodyMechanics mechanics = bodyMechanics(body);
+  if (const double lowest = lowestFrequency(body, mechanics); lowest > 0) return lowest;
+  dampBody(body, mechanics, Integrator::implicit);
+  if (mechanics.lowestFrequency > 0) return mechanics.lowestFrequency;
+  throw std::runtime_error(fmt::format("all of body '{}' is held: nothing to torture", body.name));
+}
+
 // s: until a hundredth of a hundredfold of the body's size is left of its slowest mode, and the hand's second.
 double timeOf(const Trial& trial, const BodyDescription& body, double step) {
   constexpr double kDecay = 12, kLeastSteps = 100;
-  const double lowest = lowestFrequency(body, bodyMechanics(body));
+  const double lowest = slowestMode(body);
   return handTimeOf(trial) + std::max(kDecay / (std::max(0.05, body.tissue.damping) * lowest), kLeastSteps * step);
 }
 

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace medulla {
 
-float latticeHash(std::int32_t x, std::int32_t y, std::int32_t z) {
+// 0..1
+static float latticeHash(std::int32_t x, std::int32_t y, std::int32_t z) {
   std::uint32_t h = std::uint32_t(x) * 374761393u + std::uint32_t(y) * 668265263u + std::uint32_t(z) * 2147483647u;
   h = (h ^ (h >> 13)) * 1274126177u;
   h ^= h >> 16;

@@ -1,14 +1,12 @@
 #pragma once
 
-#include <cstdint>
 #include <glm/glm.hpp>
 
 // Deterministic noise for colours and textures: integer hashes, no tables, no state.
 namespace medulla {
 
-float latticeHash(std::int32_t x, std::int32_t y, std::int32_t z);  // 0..1
-float valueNoise(glm::vec3 p);                                      // 0..1, one lattice cell per unit, C1
-float fractalNoise(glm::vec3 p);                                    // 0..1, four octaves of valueNoise
+float valueNoise(glm::vec3 p);    // 0..1, one lattice cell per unit, C1
+float fractalNoise(glm::vec3 p);  // 0..1, four octaves of valueNoise
 
 // Tileable; x and y within a cell of [0, period], period > 2; `seed` picks the pattern.
 float tiledNoise(float x, float y, int period, int seed);  // 0..1

@@ -48,6 +48,15 @@ struct Shading {
   float openness, thinness;
 };
 
+// A surface facing the light at distance d gets, per unit of albedo,
+//   kExposure * intensity * 1.14 r^2 / (d^2 + 0.14 r^2),  r = referenceDistance:
+// inverse square, softened because the light has a size and a camera's automatic exposure holds back near glare.
+constexpr float kExposure = 1.3f, kSoftening = 0.14f;
+float lightFalloff(const Light& light, float distance) {
+  const float r2 = light.referenceDistance * light.referenceDistance;
+  return light.intensity * (1 + kSoftening) * r2 / (distance * distance + kSoftening * r2);
+}
+
 Shading shadingOf(const SceneMesh& mesh, const Look& look, std::size_t i, vec3 picture, const Surroundings& s) {
   Shading v;
   v.normal = mesh.normal[i];
@@ -206,11 +215,6 @@ Shade shadeVertex(const ShadowMap& shadow, vec3 texel, float spacing, const Shad
 }
 
 }  // namespace
-
-float lightFalloff(const Light& light, float distance) {
-  const float r2 = light.referenceDistance * light.referenceDistance;
-  return light.intensity * (1 + kSoftening) * r2 / (distance * distance + kSoftening * r2);
-}
 
 GlossLobes glossLobes(const Look& look) {
   constexpr float kPi = std::numbers::pi_v<float>;

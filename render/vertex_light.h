@@ -37,12 +37,6 @@ struct VertexLight {
   std::vector<std::uint8_t> glinting;  // 0 where no highlight can be seen even with the relief's slopes
 };
 
-// A surface facing the light at distance d gets, per unit of albedo,
-//   kExposure * intensity * 1.14 r^2 / (d^2 + 0.14 r^2),  r = referenceDistance:
-// inverse square, softened because the light has a size and a camera's automatic exposure holds back near glare.
-constexpr float kExposure = 1.3f, kSoftening = 0.14f;
-float lightFalloff(const Light& light, float distance);
-
 // haze: of picture.light.haze, or nullptr.
 void lightVertices(const SceneMesh& mesh, const VisibleTriangles& seen, const Viewpoint& viewpoint,
                    const Picture& picture, const LightView& lightView, const HazeField* haze, const ShadowMap* shadow,

@@ -175,6 +175,21 @@ TEST_F(BadInput, WhatChartsAndStabilityCannotWriteIsSaidBeforeAnyRun) {
   expectRefused(run({"stability", "own/organ.xml", "-o", "out"}), "out/trials.csv: is a folder");
 }
 
+TEST_F(BadInput, StabilityOfWhatIsHeldWholeIsRefused) {
+  std::string text = read("own/organ.xml");
+  text.replace(text.find("spheres=\"1\""), 11, "sphere=\"0 0 0 9\"");
+  folder.write("own/organ.xml", text);
+  expectRefused(run({"stability", "own/organ.xml", "-o", "out"}), "all of body 'organ' is held");
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+TEST_F(BadInput, AChartOfStiffTissueSaysWhichStepsAreTooMany) {
+  expectRefused(run({"chart", "own/organ.xml", "-o", "out", "--methods", "full", "--steps", "auto", "--set",
+                     "tissue.t.young=1e12"}),
+                "full asks for ");
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
 TEST_F(BadInput, AChartOfWhatDoesNotMoveIsRefused) {
   folder.write("own/organ.csv", "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,0.5,0.5,0.5,1,0,0,0,0\n");
   expectRefused(

@@ -1,6 +1,10 @@
 #include "app/files/mesh_file.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
 
 #include "app/files/obj_reader.h"
 #include "app/files/off_reader.h"
@@ -54,6 +58,40 @@ TEST(ObjReader, EveryFormOfFace) {
 TEST(ObjReader, PolygonsBecomeFans) {
   const TriangleMesh mesh = parseObj("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv -1 0.5 0\nf 1 2 3 4 5\n", "a.obj");
   EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
+}
+
+// Of stars, and of an L, whichever corner comes first: triangles that all face as the polygon does and make up its
+// area.
+TEST(ObjReader, ConcavePolygonsAreCutWithoutAFold) {
+  constexpr int kCorners = 12;
+  for (int first = 0; first < kCorners; ++first) {
+    std::string face = "f", vertices;
+    std::vector<Vector3d> corners;
+    for (int k = 0; k < kCorners; ++k) {
+      const double angle = 2 * std::numbers::pi * k / kCorners, radius = k % 2 == 0 ? 1 + 0.1 * k : 0.3;
+      corners.emplace_back(radius * std::cos(angle), radius * std::sin(angle), 0.02 * (k % 3));
+      vertices += fmt::format("v {} {} {}\n", corners[k].x(), corners[k].y(), corners[k].z());
+      face += fmt::format(" {}", (k + first) % kCorners + 1);
+    }
+    double area = 0, sum = 0;
+    for (int k = 0; k < kCorners; ++k) area += corners[k].cross(corners[(k + 1) % kCorners]).z();
+    const TriangleMesh mesh = parseObj(face + "\n" + vertices, "a.obj");
+    ASSERT_EQ(mesh.triangles.size(), kCorners - 2u);
+    for (const auto& [a, b, c] : mesh.triangles) {
+      const double part = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).z();
+      EXPECT_GT(part, 0);
+      sum += part;
+    }
+    EXPECT_NEAR(sum, area, 1e-12);
+  }
+  const std::string ell = "v 0 0 0\nv 3 0 0\nv 3 1 0\nv 1 1 0\nv 1 3 0\nv 0 3 0\n";
+  EXPECT_EQ(parseObj(ell + "f 3 4 5 6 1 2", "a.obj").triangles,
+            (std::vector<std::array<int, 3>>{{1, 2, 3}, {3, 4, 5}, {3, 5, 0}, {3, 0, 1}}));
+}
+
+TEST(ObjReader, APolygonThatCutsItselfStaysAFan) {
+  const TriangleMesh mesh = parseObj("v 0 0 0\nv 2 2 0\nv 2 0 0\nv 0 1 0\nf 1 2 3 4", "a.obj");
+  EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}, {0, 2, 3}}));
 }
 
 TEST(ObjReader, NotANumberAndInfinityAreRefusedWithTheirLine) {

@@ -47,6 +47,8 @@ TEST_F(Surroundings, AReaderOfResultsWhoLeavesEndsTheRunAfterItsWork) {
   EXPECT_EQ(shell("$M replay own/organ.xml --log a.csv | true; exit ${PIPESTATUS[0]}"), 128 + SIGPIPE);
   EXPECT_EQ(folder.contents().size(), 3u);
   EXPECT_TRUE(fs::exists(folder / "a.csv"));
+  // Of more results than a buffer holds some are written before the end.
+  EXPECT_EQ(shell("$M info '" MEDULLA_SOURCE_DIR "/scenes/heap.xml' | true; exit ${PIPESTATUS[0]}"), 128 + SIGPIPE);
 }
 
 TEST_F(Surroundings, SignalsThatAreIgnoredStayIgnored) {

@@ -120,6 +120,8 @@ std::optional<LoadedScene> loadMethod(const ChartRun& run, const ChartOptions& o
   try {
     return loadRun(run.options);
   } catch (const std::runtime_error& error) {
+    if (!mayBeLeftOut && !options.models.empty())
+      throw std::runtime_error(fmt::format("with --models {}: {}", options.models[run.model], error.what()));
     if (!mayBeLeftOut) throw;
     tell("note: no curve of {}: {}\n", run.curve, error.what());
     return {};
@@ -136,6 +138,11 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
   int most = 0;  // substeps
   ChartRun reference;
   const auto add = [&](ChartRun run, int count) {
+    if (count > kMostSubsteps)
+      throw std::runtime_error(
+          fmt::format("{} asks for {} substeps per dynamics frame: expected at most {}; raise clock.dynamics, or lower "
+                      "Young's modulus",
+                      run.curve, count, kMostSubsteps));
     run.options.overrides.push_back({"dynamics.substeps", fmt::format("{}", count)});
     run.step = 1 / (base.scene.dynamicsRate * count);
     most = std::max(most, count);
@@ -155,6 +162,9 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
       requireSameMeshes(base, loaded);
       run.spheres = spheresOf(loaded);
       if (models.size() > 1) run.curve += fmt::format("_{}_spheres", run.spheres);
+      const auto isAlike = [&](const ChartRun& r) { return r.curve == run.curve && r.model != k; };
+      if (std::any_of(runs.begin(), runs.end(), isAlike))
+        run.curve += "_" + fs::path(modelPathOf(options.models[k])).stem().string();
       if (name == options.methods[0] && run.spheres > reference.spheres) reference = run;
       std::set<int> substeps;
       for (const double step : options.steps)

@@ -13,7 +13,7 @@ const std::vector<std::string>& lengthUnits();  // m, cm, mm, micron, inch
 double metresPerUnit(const std::string& unit);
 
 // Reads a triangle mesh. OBJ, OFF and PLY by a reader of our own (vertex order kept, double precision, indices checked,
-// polygons fanned); every other format through assimp. Vertices are scaled to metres.
+// polygons cut into triangles); every other format through assimp. Vertices are scaled to metres.
 // Throws std::runtime_error "FILE:LINE: ..." on missing, unreadable or malformed files, NaN, infinity, bad indices.
 TriangleMesh readMesh(const std::string& path, double metresPerFileUnit = 1);
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "app/files/input_error.h"
+#include "app/files/polygons.h"
 #include "app/files/text.h"
 #include "app/files/text_lines.h"
 
@@ -40,6 +41,7 @@ TriangleMesh parseObj(std::string_view text, const std::string& name) {
   int largest = -1, largestLine = 0;
   TextLines lines(text, name);
   std::vector<int> polygon;
+  Polygons polygons;
   while (lines.next()) {
     const auto& words = lines.words();
     if (words[0] == "v") mesh.vertices.push_back(vertex(lines));
@@ -52,7 +54,7 @@ TriangleMesh parseObj(std::string_view text, const std::string& name) {
       largest = polygon.back();
       largestLine = lines.line();
     }
-    for (std::size_t i = 2; i < polygon.size(); ++i) mesh.triangles.push_back({polygon[0], polygon[i - 1], polygon[i]});
+    polygons.add(polygon, mesh);
   }
   if (mesh.triangles.empty()) throw inputError(name, 0, "no triangles in this OBJ file");
   if (largest >= static_cast<int>(mesh.vertices.size())) {
@@ -60,6 +62,7 @@ TriangleMesh parseObj(std::string_view text, const std::string& name) {
                      "face refers to vertex " + std::to_string(largest + 1LL) + ", but the file has only " +
                          std::to_string(mesh.vertices.size()));
   }
+  polygons.cutConcave(mesh);
   return mesh;
 }
 

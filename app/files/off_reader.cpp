@@ -3,6 +3,7 @@
 #include <cctype>
 
 #include "app/files/input_error.h"
+#include "app/files/polygons.h"
 #include "app/files/text.h"
 #include "app/files/text_lines.h"
 
@@ -83,14 +84,16 @@ TriangleMesh parseOff(std::string_view text, const std::string& name) {
     mesh.vertices.emplace_back(lines.number(words[0]), lines.number(words[1]), lines.number(words[2]));
   }
   std::vector<int> polygon;
+  Polygons polygons;
   for (long long i = 0; i < counts.faces; ++i) {
     if (!lines.next())
       lines.fail("the file ends after " + std::to_string(i) + " of " + std::to_string(counts.faces) + " faces");
     readFace(lines, counts.vertices, polygon);
-    for (std::size_t k = 2; k < polygon.size(); ++k) mesh.triangles.push_back({polygon[0], polygon[k - 1], polygon[k]});
+    polygons.add(polygon, mesh);
   }
   if (lines.next()) lines.fail("expected the end of the file after the faces that the header counts");
   if (mesh.triangles.empty()) throw inputError(name, 0, "no triangles in this OFF file");
+  polygons.cutConcave(mesh);
   return mesh;
 }
 

@@ -13,6 +13,7 @@
 
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
+#include "app/files/polygons.h"
 #include "app/files/text.h"
 #include "app/files/text_lines.h"
 
@@ -299,7 +300,7 @@ void readRow(Values& values, const Element& element, long long vertices, PlyRow&
   }
 }
 
-void readElements(Values& values, const Element& element, long long vertices, TriangleMesh& mesh) {
+void readElements(Values& values, const Element& element, long long vertices, TriangleMesh& mesh, Polygons& polygons) {
   PlyRow row;
   const bool isVertex = element.name == "vertex", isFace = has(&element, Use::corners);
   for (long long k = 0; k < element.count; ++k) {
@@ -311,8 +312,7 @@ void readElements(Values& values, const Element& element, long long vertices, Tr
     if (!isFace) continue;
     if (row.corners.size() < 3)
       values.fail(fmt::format("face {} has {} corners, expected at least 3", k, row.corners.size()));
-    for (std::size_t c = 2; c < row.corners.size(); ++c)
-      mesh.triangles.push_back({row.corners[0], row.corners[c - 1], row.corners[c]});
+    polygons.add(row.corners, mesh);
   }
 }
 
@@ -330,10 +330,12 @@ TriangleMesh parsePly(std::string_view bytes, const std::string& name) {
     throw inputError(name, 0, "no triangles: expected a header with an element face that has a list vertex_indices");
   requireEnough(header, name);
   TriangleMesh mesh;
+  Polygons polygons;
   Values values(header, name);
-  for (const Element& element : header.elements) readElements(values, element, vertex->count, mesh);
+  for (const Element& element : header.elements) readElements(values, element, vertex->count, mesh, polygons);
   values.requireEnd();
   if (mesh.triangles.empty()) throw inputError(name, 0, "no triangles in this PLY file");
+  polygons.cutConcave(mesh);
   return mesh;
 }
 

@@ -71,7 +71,7 @@ void readDynamics(const XmlElement& dynamics, WorldSettings& out) {
   out.gravity = readVector(dynamics, "gravity", out.gravity);
   out.ambientDrag = readNumber(dynamics, "ambient_drag", out.ambientDrag, kNotNegative);
   out.sleepAfter = readNumber(dynamics, "sleep_after", out.sleepAfter, kNotNegative);
-  out.substeps = readInteger(dynamics, "substeps", out.substeps, {0, 100000});
+  out.substeps = readInteger(dynamics, "substeps", out.substeps, {0, kMostSubsteps});
   out.contact = readEnum(dynamics, "contact", out.contact);
 }
 
@@ -172,6 +172,7 @@ std::vector<SceneLoad> readLoads(const XmlElement& body, const std::string& scen
 }
 
 void readDrivenSpheres(const XmlElement& body, SceneBody& out) {
+  constexpr double kMostOfSwing = 1e6;  // Hz, rad: of larger ones rounding leaves no angle
   for (const XmlElement* drive : childrenOf(body, "drive")) {
     DrivenSphere d;
     d.sphere = readInteger(*drive, "sphere", d.sphere, kNotNegative);
@@ -182,8 +183,8 @@ void readDrivenSpheres(const XmlElement& body, SceneBody& out) {
     d.axis = readVector(*drive, "axis", d.axis);
     if (d.axis.isZero()) refuse(*drive, "axis", "expected a direction");
     d.amplitude = readNumber(*drive, "amplitude", d.amplitude, {.low = 0, .most = kAnyLength.most});
-    d.frequency = readNumber(*drive, "frequency", d.frequency, kPositive);
-    d.phase = readNumber(*drive, "phase", d.phase);
+    d.frequency = readNumber(*drive, "frequency", d.frequency, {.low = 0, .lowExcluded = true, .most = kMostOfSwing});
+    d.phase = readNumber(*drive, "phase", d.phase, {.most = kMostOfSwing});
     d.velocity = readVector(*drive, "velocity", d.velocity);
     d.freedom = readEnum(*drive, "dof", d.freedom);
     out.driven.push_back(d);

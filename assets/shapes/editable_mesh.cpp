@@ -76,7 +76,7 @@ int valence(const EditableMesh& mesh, int vertex) {
   return static_cast<int>(mesh.trianglesOf[vertex].size());
 }
 
-Vector3d areaVector(const EditableMesh& mesh, int triangle) {
+Vector3d doubleAreaVector(const EditableMesh& mesh, int triangle) {
   const auto& t = mesh.triangles[triangle];
   const Vector3d& a = mesh.positions[t[0]];
   return (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a);

@@ -32,7 +32,7 @@ EdgeSides sidesOf(const EditableMesh& mesh, int a, int b);
 int valence(const EditableMesh& mesh, int vertex);
 
 // Twice the area times the unit normal.
-Eigen::Vector3d areaVector(const EditableMesh& mesh, int triangle);
+Eigen::Vector3d doubleAreaVector(const EditableMesh& mesh, int triangle);
 double quality(const EditableMesh& mesh, int triangle);
 
 // Puts a new vertex on the edge and returns it.

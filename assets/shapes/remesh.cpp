@@ -69,7 +69,7 @@ static double edgeLengthForCount(const Remeshing& r) {
     const auto& v = r.mesh.triangles[t];
     if (v[0] < 0) continue;
     const double relative = (r.relativeLength[v[0]] + r.relativeLength[v[1]] + r.relativeLength[v[2]]) / 3;
-    area += 0.5 * areaVector(r.mesh, static_cast<int>(t)).norm() / (relative * relative);
+    area += 0.5 * doubleAreaVector(r.mesh, static_cast<int>(t)).norm() / (relative * relative);
   }
   return std::sqrt(area / (std::sqrt(3.0) / 4 * r.settings.triangles));
 }
@@ -97,7 +97,7 @@ static bool collapseIsGood(const Remeshing& r, const EdgeSides& sides, int a, in
         const int v = mesh.triangles[t][k];
         x[k] = v == a || v == b ? position : mesh.positions[v];
       }
-      const Vector3d before = areaVector(mesh, t), after = (x[1] - x[0]).cross(x[2] - x[0]);
+      const Vector3d before = doubleAreaVector(mesh, t), after = (x[1] - x[0]).cross(x[2] - x[0]);
       if (before.dot(after) <= 0.5 * before.norm() * after.norm()) return false;
       if (triangleQuality(x[0], x[1], x[2]) < std::min(0.3, 0.9 * quality(mesh, t))) return false;
       const double limit = maxRatio * wantedLength(r, a, b);
@@ -113,7 +113,7 @@ static double sweptVolume(const EditableMesh& mesh, int a, int b, const Vector3d
   double volume = 0;
   for (const int v : {a, b})
     for (const int t : mesh.trianglesOf[v])
-      volume += std::abs(areaVector(mesh, t).dot(position - mesh.positions[v])) / 6;
+      volume += std::abs(doubleAreaVector(mesh, t).dot(position - mesh.positions[v])) / 6;
   return volume;
 }
 
@@ -159,8 +159,8 @@ static bool flipIsGood(const Remeshing& r, const EdgeSides& sides, int a, int b)
   const EditableMesh& mesh = r.mesh;
   const int c = sides.opposite[0], d = sides.opposite[1];
   const auto& x = mesh.positions;
-  const Vector3d normal0 = areaVector(mesh, sides.triangle[0]).normalized();
-  const Vector3d normal1 = areaVector(mesh, sides.triangle[1]).normalized();
+  const Vector3d normal0 = doubleAreaVector(mesh, sides.triangle[0]).normalized();
+  const Vector3d normal1 = doubleAreaVector(mesh, sides.triangle[1]).normalized();
   const Vector3d mean = (normal0 + normal1).normalized();
   const Vector3d after0 = (x[d] - x[c]).cross(x[b] - x[c]), after1 = (x[c] - x[d]).cross(x[a] - x[d]);
   if (normal0.dot(normal1) < 0.5 || after0.dot(mean) < 0.7 * after0.norm() || after1.dot(mean) < 0.7 * after1.norm())
@@ -194,12 +194,12 @@ static void tryMove(EditableMesh& mesh, int vertex, const Vector3d& position) {
   const Vector3d old = mesh.positions[vertex];
   const double worstBefore = worstQualityAround(mesh, vertex);
   std::vector<Vector3d> before;
-  for (const int t : mesh.trianglesOf[vertex]) before.push_back(areaVector(mesh, t));
+  for (const int t : mesh.trianglesOf[vertex]) before.push_back(doubleAreaVector(mesh, t));
   mesh.positions[vertex] = position;
   const double worstAfter = worstQualityAround(mesh, vertex);
   bool good = worstAfter >= std::min(0.5, worstBefore);
   for (std::size_t k = 0; k < before.size(); ++k) {
-    const Vector3d after = areaVector(mesh, mesh.trianglesOf[vertex][k]);
+    const Vector3d after = doubleAreaVector(mesh, mesh.trianglesOf[vertex][k]);
     good = good && after.dot(before[k]) > 0.6 * after.norm() * before[k].norm();
   }
   if (!good) mesh.positions[vertex] = old;
@@ -207,7 +207,7 @@ static void tryMove(EditableMesh& mesh, int vertex, const Vector3d& position) {
 
 static Vector3d meanNormal(const EditableMesh& mesh, int vertex) {
   Vector3d sum = Vector3d::Zero();
-  for (const int t : mesh.trianglesOf[vertex]) sum += areaVector(mesh, t);
+  for (const int t : mesh.trianglesOf[vertex]) sum += doubleAreaVector(mesh, t);
   return sum.normalized();
 }
 
@@ -232,7 +232,7 @@ static void smooth(Remeshing& r, double weight) {
     for (const int t : mesh.trianglesOf[v]) {
       const auto& q = mesh.triangles[t];
       const double relative = (r.relativeLength[q[0]] + r.relativeLength[q[1]] + r.relativeLength[q[2]]) / 3;
-      const double mass = areaVector(mesh, t).norm() / (relative * relative * relative);
+      const double mass = doubleAreaVector(mesh, t).norm() / (relative * relative * relative);
       sum += mass * (mesh.positions[q[0]] + mesh.positions[q[1]] + mesh.positions[q[2]]) / 3;
       total += mass;
     }

@@ -88,7 +88,8 @@ inline void smallCosineSine(Lanes angle, Lanes& cosine, Lanes& sine) {
   cosine = polynomial(q2, 1.0, -0.5, 1.0 / 24, -1.0 / 720, 1.0 / 40320, -1.0 / 3628800);
 }
 
-// Cosine and sine of any angle: reduced to half a turn either side, the power series on a quarter of it, doubled twice.
+// Cosine and sine of an angle below 1e9: reduced to half a turn either side, the power series on a quarter of it,
+// doubled twice.
 [[gnu::noinline]] inline void cosineSine(Lanes angle, Lanes& cosine, Lanes& sine) {
   const Lanes one = splat(1), two = splat(2);
   const Lanes q = splat(0.25) * fnma(nearest(angle * splat(1 / kTurn)), splat(kTurn), angle);

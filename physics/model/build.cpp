@@ -78,7 +78,14 @@ void dropEmptyCells(const VoxelBody& voxels, const MassProperties& exact, Sphere
 // The paper's raw result: skeleton nodes are spheres of inscribed radius, skeleton edges are links.
 SpheresAndLinks spheresOfSkeleton(const BodyShape& shape, const Skeleton& skeleton) {
   SpheresAndLinks s;
-  for (const Vector3d& node : skeleton.nodes) s.balls.push_back({node, inscribedRadius(shape.tree, node)});
+  for (const Vector3d& node : skeleton.nodes) {
+    s.balls.push_back({node, inscribedRadius(shape.tree, node)});
+    if (!(s.balls.back().radius > 0))
+      throw std::runtime_error(
+          fmt::format("the collapsed skeleton has a node outside of the surface, at ({:.3g}, {:.3g}, "
+                      "{:.3g}) m: no sphere fits there; use --method cover",
+                      node.x(), node.y(), node.z()));
+  }
   for (const std::array<int, 2>& link : skeleton.links) s.links.push_back({link[0], link[1]});
   const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, voxelsFor(static_cast<int>(s.balls.size())));
   s.cells = divideByPower(voxels, s.balls, shape.exact);

@@ -14,8 +14,8 @@ struct MassProperties {
   Eigen::Matrix3d secondMoment = Eigen::Matrix3d::Zero();  // m5, integral of r r^T about the centroid
 };
 
-// Exact for the solid inside a closed mesh: the divergence theorem sums signed tetrahedra from the origin (Mirtich
-// 1996).
+// Exact for the solid inside a closed mesh: the divergence theorem sums signed tetrahedra from its first vertex
+// (Mirtich 1996).
 MassProperties massProperties(const TriangleMesh& mesh);
 
 // Parts taken together as one rigid body.

@@ -229,8 +229,9 @@ RowSparse interpolation(const HexGrid& grid, const TriangleMesh& mesh, const std
 }
 
 int voxelsFor(double volume, double cellSize) {
-  // Beyond, even the plan would take long; what fits has a tenth of these.
-  constexpr double cellsMax = 1e5;
+  // Beyond, voxels and the plan alone would take minutes and gigabytes; even of a row of single cells no more than
+  // these have factors of 3 GB.
+  constexpr double cellsMax = 2.5e4;
   if (volume / (cellSize * cellSize * cellSize) > cellsMax) {
     throw OverBudget(fmt::format("finite elements of {:.3g} mm would be {:.2g}, expected at most {:.2g}",
                                  1e3 * cellSize, volume / (cellSize * cellSize * cellSize), cellsMax));
