@@ -1,5 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
+#include "physics/dynamics/fixation.h"
 #include "physics/dynamics/rest_model.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/model/symmetric_eigen.h"
@@ -22,8 +26,8 @@ BodyDescription tubeWithASlenderCell(double share) {
   return synthetic::body(model, 6e3, {{0, FixedFreedom::all}});
 }
 
-// Of M^-1 K, from the whole matrix.
-double largestByDenseMatrices(const BodyDescription& body, const BodyMechanics& m) {
+// Of M^-1 K, from the whole matrix, surface and all.
+VectorXd eigenvaluesByDenseMatrices(const BodyDescription& body, const BodyMechanics& m) {
   const RestModel rest(body, m);
   MatrixXd k(rest.size(), rest.size());
   MatrixXd mass = MatrixXd::Zero(rest.size(), rest.size());
@@ -42,7 +46,7 @@ double largestByDenseMatrices(const BodyDescription& body, const BodyMechanics& 
       if (m.nodeMoves[i]) free.push_back(6 * spheres + 3 * i + c);
   }
   const MatrixXd some = k(free, free), weights = mass(free, free);
-  return eigenvaluesOf(some, weights).maxCoeff();
+  return eigenvaluesOf(some, weights);
 }
 
 double largest(const BodyDescription& body, const BodyMechanics& mechanics) {
@@ -60,7 +64,7 @@ TEST(RestModel, TheLargestEigenvalueIsThatOfTheWholeMatrices) {
   for (const double share : {1.0, 0.02}) {
     const BodyDescription body = tubeWithASlenderCell(share);
     const BodyMechanics mechanics = bodyMechanics(body);
-    const double expected = largestByDenseMatrices(body, mechanics);
+    const double expected = eigenvaluesByDenseMatrices(body, mechanics).maxCoeff();
     EXPECT_NEAR(largest(body, mechanics), expected, 1e-3 * expected);
   }
 }
@@ -70,6 +74,25 @@ TEST(RestModel, OfABodyThatIsFixedWhollyItIsZero) {
   body.surface = SurfaceMode::skin;
   for (int i = 1; i < kSpheres; ++i) body.fixed.push_back({i, FixedFreedom::all});
   EXPECT_EQ(largest(body, bodyMechanics(body)), 0);
+}
+
+// Where a region holds less than half of a sphere's surface, or of any.
+TEST(RestModel, FrequenciesKnowNodesThatAreHeldOnSpheresThatAreNot) {
+  for (const bool rootIsHeld : {true, false}) {
+    BodyDescription body = synthetic::body(synthetic::shortTube(), 6e3);
+    if (rootIsHeld) body.fixed = {{0, FixedFreedom::all}};
+    for (std::size_t i = 0; i < body.model->restNodes.size(); ++i) {
+      const Eigen::Vector3d& x = body.model->restNodes[i];
+      if (x.x() > 0.05 && x.y() < -0.008) body.fixedNodes.push_back(static_cast<int>(i));
+    }
+    ASSERT_GT(body.fixedNodes.size(), 3u);
+    ASSERT_TRUE(spheresHeldBy(*body.model, body.fixedNodes).empty());
+    const BodyMechanics mechanics = bodyMechanics(body);
+    const double expected = std::sqrt(eigenvaluesByDenseMatrices(body, mechanics).minCoeff());
+    EXPECT_NEAR(lowestFrequency(body, mechanics), expected, 0.05 * expected) << rootIsHeld;
+    const double shown = 2 * std::numbers::pi * naturalFrequencies(body, mechanics, 1).at(0);
+    EXPECT_NEAR(shown, expected, 0.05 * expected) << rootIsHeld;
+  }
 }
 
 TEST(RotaryInertia, OfACellThatTurnsFastIsRaisedUntilTurningCostsNoStep) {

@@ -27,7 +27,7 @@ RestRates stiffnessWithin(const FrameSteps& steps, const BodyDescription& body, 
       damped * RestRates(links.transpose() * links) +
       inert * RestRates(sphereMasses(mechanics) + RestRates(nodes.transpose() * (nodeMasses(mechanics) * nodes)));
   if (holdsByNodes(body)) {
-    const RestRates held = heldAttachmentRates(body, mechanics);
+    const RestRates held = heldNodeRates(body, mechanics);
     out += RestRates(held.transpose() * held);
   }
   return out;

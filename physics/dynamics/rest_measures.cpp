@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "physics/dynamics/identified_mechanics.h"
@@ -180,16 +181,52 @@ RestRates nodeMasses(const BodyMechanics& mechanics) {
   return out.matrix(3 * nodes, 3 * nodes);
 }
 
-RestRates heldAttachmentRates(const BodyDescription& body, const BodyMechanics& mechanics) {
+RestRates heldNodeRates(const BodyDescription& body, const BodyMechanics& mechanics) {
   Entries out;
   std::size_t rows = 0;
-  for (const int n : body.fixedNodes) {
-    const double root = std::sqrt(mechanics.attachmentStiffness[n]);
-    for (const HostRate& rate : anchorRates(body, mechanics, n)) {
-      out.addBlock(rows, 6 * rate.sphere, root * rate.linear);
-      out.addBlock(rows, 6 * rate.sphere + 3, root * rate.angular);
+  std::vector<std::vector<HostRate>> anchors(mechanics.attachments.size());  // of held nodes
+  for (const int n : body.fixedNodes) anchors[n] = anchorRates(body, mechanics, n);
+  const auto isHeld = [&](int n) { return !anchors[n].empty(); };
+  const auto addAnchor = [&](int n, double factor) {
+    for (const HostRate& rate : anchors[n]) {
+      out.addBlock(rows, 6 * rate.sphere, factor * rate.linear);
+      out.addBlock(rows, 6 * rate.sphere + 3, factor * rate.angular);
     }
+  };
+  const auto add = [&](double stiffness, int n, int other = -1) {
+    addAnchor(n, std::sqrt(stiffness));
+    if (other >= 0) addAnchor(other, -std::sqrt(stiffness));
     rows += 3;
+  };
+  for (std::size_t n = 0; n < anchors.size(); ++n)
+    if (isHeld(static_cast<int>(n))) add(mechanics.attachmentStiffness[n], static_cast<int>(n));
+  struct Beside {
+    std::vector<std::pair<int, double>> held;  // and the edge's stiffness
+    double rest = 0;                           // N/m, of its own and of edges to others
+  };
+  std::vector<Beside> beside(anchors.size());
+  for (std::size_t n = 0; n < anchors.size(); ++n) beside[n].rest = mechanics.attachmentStiffness[n];
+  for (std::size_t e = 0; e < body.model->edges.size(); ++e) {
+    const auto& [a, b] = body.model->edges[e];
+    const double k = mechanics.edgeStiffness[e];
+    if (isHeld(a) && isHeld(b)) {
+      add(k, a, b);
+      continue;
+    }
+    for (const auto& [from, to] : {std::pair(a, b), std::pair(b, a)})
+      if (isHeld(to))
+        beside[from].held.emplace_back(to, k);
+      else
+        beside[from].rest += k;
+  }
+  for (const Beside& node : beside) {
+    double all = node.rest;
+    for (const auto& [n, k] : node.held) all += k;
+    for (std::size_t i = 0; i < node.held.size(); ++i) {
+      const auto& [n, k] = node.held[i];
+      add(node.rest * k / all, n);
+      for (std::size_t j = 0; j < i; ++j) add(node.held[j].second * k / all, n, node.held[j].first);
+    }
   }
   return out.matrix(rows, 6 * body.model->spheres.size());
 }

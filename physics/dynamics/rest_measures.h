@@ -29,8 +29,10 @@ RestRates anchorRates(const BodyDescription& body, const BodyMechanics& mechanic
 RestRates sphereMasses(const BodyMechanics& mechanics);
 RestRates nodeMasses(const BodyMechanics& mechanics);
 
-// R likewise, of held nodes' attachments: three rows each.
-RestRates heldAttachmentRates(const BodyDescription& body, const BodyMechanics& mechanics);
+// R likewise, of held nodes: their attachments hold what carries them, and so do the nodes beside them through the
+// edges. Such a node gives way, but what lies beyond it does not: taken out of the springs that meet in it (the
+// transform of a star into a mesh) it leaves springs from held nodes, k rest / all, and between them, k k' / all.
+RestRates heldNodeRates(const BodyDescription& body, const BodyMechanics& mechanics);
 
 // 3 nodes square, N/m: of the nodes' springs to their anchors and of their edges, over displacements from the anchors.
 RestRates layerStiffness(const SoftBodyModel& model, const BodyMechanics& mechanics);

@@ -110,6 +110,13 @@ bool holdsByLinks(const BodyDescription& body, const BodyMechanics& mechanics) {
          std::any_of(body.model->identified->links.begin(), body.model->identified->links.end(), held);
 }
 
+// Of nodes that are held while the spheres that carry them are not. Identified links hold their patches themselves: no
+// rows then.
+RestRates heldRates(const BodyDescription& body, const BodyMechanics& mechanics) {
+  if (holdsByNodes(body) && !holdsByLinks(body, mechanics)) return heldNodeRates(body, mechanics);
+  return RestRates(0, 6 * static_cast<Eigen::Index>(body.model->spheres.size()));
+}
+
 }  // namespace
 
 double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics) {
@@ -120,7 +127,8 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
   std::vector<int> freedom(6 * spheres, -1);
   for (int f = 0; f < count; ++f) freedom[free[f]] = f;
   const RestRates links = linkRates(m, mechanics);
-  if (count == 0 || links.rows() == 0) return 0;
+  const RestRates held = heldRates(body, mechanics);
+  if (count == 0 || links.rows() + held.rows() == 0) return 0;
 
   const CellMasses cells = cellMasses(body);
   std::vector<Eigen::Triplet<double>> mass;
@@ -133,18 +141,15 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
       for (int l = 0; l < 3; ++l) put(6 * i + 3 + k, 6 * i + 3 + l, cells.inertia[i](k, l));
     }
   }
-  const RestRates toFree = freeOnly(freedom, count), rates = links * toFree;
-  Eigen::SparseMatrix<double> k = rates.transpose() * rates;
+  const RestRates toFree = freeOnly(freedom, count), ofLinks = links * toFree, ofNodes = held * toFree;
+  Eigen::SparseMatrix<double> k = ofLinks.transpose() * ofLinks;
+  if (ofNodes.rows() > 0) k += Eigen::SparseMatrix<double>(ofNodes.transpose() * ofNodes);
   Eigen::SparseMatrix<double> mm(count, count);
   mm.setFromTriplets(mass.begin(), mass.end());
 
   // Inverse iteration, rigid motions projected out; a shift far below any mode keeps the factorisation regular.
-  MatrixXd rigid = holdsByLinks(body, mechanics) ? MatrixXd(count, 0) : freeRigidMotions(m, {}, freedom, count);
-  if (rigid.cols() > 0 && holdsByNodes(body)) {  // what the spheres leave free, held nodes hold by their attachments
-    const RestRates attachments = heldAttachmentRates(body, mechanics) * toFree;
-    k += Eigen::SparseMatrix<double>(attachments.transpose() * attachments);
-    rigid = freeRigidMotions(m, heldNodes(body), freedom, count);
-  }
+  MatrixXd rigid =
+      holdsByLinks(body, mechanics) ? MatrixXd(count, 0) : freeRigidMotions(m, heldNodes(body), freedom, count);
   for (int i = 0; i < rigid.cols(); ++i) {
     for (int j = 0; j < i; ++j) rigid.col(i) -= rigid.col(j).dot(mm * rigid.col(i)) * rigid.col(j);
     rigid.col(i) /= std::sqrt(rigid.col(i).dot(mm * rigid.col(i)));
@@ -168,8 +173,10 @@ std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMe
   const RestModel rest(body, mechanics);
   const std::vector<int> free = freeFreedoms(mechanics);
   if (free.empty()) return {};
-  const MatrixXd stiffness = rest.linkStiffness()(free, free), mass = rest.carriedMass(mechanics)(free, free);
-  const VectorXd modes = eigenvaluesOf(stiffness, mass);
+  const RestRates held = heldRates(body, mechanics);
+  const MatrixXd all = rest.linkStiffness() + MatrixXd(held.transpose() * held);
+  const MatrixXd mass = rest.carriedMass(mechanics)(free, free);
+  const VectorXd modes = eigenvaluesOf(all(free, free), mass);
   std::vector<double> out;
   for (const double squared : modes)
     if (squared > kRigid * modes.maxCoeff() && static_cast<int>(out.size()) < count)
@@ -253,7 +260,7 @@ std::optional<MatrixXd> skeletonResponse(const BodyDescription& body, const Body
                                          const MatrixXd& forces) {
   const RestModel model(body, mechanics);
   const std::vector<int> free = freeFreedoms(mechanics);
-  const RestRates attachments = heldAttachmentRates(body, mechanics);
+  const RestRates attachments = heldNodeRates(body, mechanics);
   const MatrixXd all = model.linkStiffness() + MatrixXd(attachments.transpose() * attachments);
   const MatrixXd stiffness = all(free, free), loads = model.onSpheres(forces);
   const VectorXd unit = stiffness.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
