@@ -128,11 +128,17 @@ TEST(DrivenSphere, StaysWhereItIsWhileBodiesSettle) {
   drive.amplitude = 0.01;
   drive.velocity = {0.1, 0, 0};
   b.driven = {drive};
-  World world({.settleFrames = 10}, {b});
+  World world({.gravity = Vector3d::Zero(), .settleFrames = 10}, {b});
+  const World unsettled({.gravity = Vector3d::Zero()}, {b});
   const Vector3d rest = vectorOf(world.data().spheres.position[1]);
   while (world.time() < 0) world.advance({});
   EXPECT_EQ(world.time(), 0);
   EXPECT_LT((vectorOf(world.data().spheres.position[1]) - rest).norm(), 1e-13);
+  // Nor does anything else move where nothing moves it: the whole body starts at the drive's velocity then, as it does
+  // without settling.
+  EXPECT_LT(world.energies().elastic, 1e-20);
+  EXPECT_GT(unsettled.energies().kinetic, 1e-6);
+  EXPECT_NEAR(world.energies().kinetic, unsettled.energies().kinetic, 1e-12);
   world.advance({});
   EXPECT_GT((vectorOf(world.data().spheres.position[1]) - rest).norm(), 1e-4);
 }

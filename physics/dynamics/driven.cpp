@@ -24,6 +24,19 @@ Lanes pathAt(const SphereDrive& drive, double time) {
 
 }  // namespace
 
+// Before, bodies settle: moving along they would leave the driven spheres, which wait.
+void startDrivenBodies(WorldData& d) {
+  if (d.frame != 0) return;
+  for (const SphereDrive& drive : d.drives) {
+    const BodyRange& r = d.ranges[drive.body];
+    d.spheres.velocity[drive.sphere] = drive.velocity;
+    for (const int i : spheresOf(r))
+      if (d.spheres.groups[i / 4].inverseMass[i % 4] > 0) d.spheres.velocity[i] = drive.velocity;
+    for (const int i : r.node)
+      if (d.nodes.inverseMass[i] > 0) setVector(d.nodes.velocity, i, vectorOf(drive.velocity));
+  }
+}
+
 // The path's secant rather than its derivative: the sphere stays on the path whatever the substep.
 void driveSpheres(WorldData& d, double time, double duration) {
   for (const SphereDrive& drive : d.drives)

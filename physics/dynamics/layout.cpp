@@ -240,21 +240,17 @@ void addSprings(WorldData& d, const std::vector<BodyMechanics>& mechanics) {
   }
 }
 
-void addDrives(WorldData& d, const BodyDescription& body, const BodyRange& r) {
-  for (const DrivenSphere& driven : body.driven) {
+void addDrives(WorldData& d, int body) {
+  for (const DrivenSphere& driven : d.bodies[body].driven) {
     SphereDrive drive;
-    drive.sphere = r.firstSphere + driven.sphere;
+    drive.body = body;
+    drive.sphere = d.ranges[body].firstSphere + driven.sphere;
     drive.rest = d.spheres.position[drive.sphere];
     drive.velocity = quadOf(driven.velocity);
     drive.swing = quadOf(driven.amplitude * driven.axis.normalized());
     drive.frequency = driven.frequency;
     drive.phase = driven.phase;
     d.drives.push_back(drive);
-    d.spheres.velocity[drive.sphere] = drive.velocity;
-    for (const int i : spheresOf(r))
-      if (d.spheres.groups[i / 4].inverseMass[i % 4] > 0) d.spheres.velocity[i] = drive.velocity;
-    for (const int i : r.node)
-      if (d.nodes.inverseMass[i] > 0) setVector(d.nodes.velocity, i, vectorOf(drive.velocity));
   }
 }
 
@@ -318,6 +314,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
   auto out = std::make_unique<WorldData>();
   WorldData& d = *out;
   d.settings = settings;
+  d.frame = -settings.settleFrames;
   d.gravity = quadOf(settings.gravity);
   d.bodies = std::move(bodies);
   Batches batches;
@@ -345,7 +342,8 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
   addNodes(d, mechanics);
   layOutIdentified(d, mechanics);
   addSprings(d, mechanics);
-  for (std::size_t b = 0; b < d.bodies.size(); ++b) addDrives(d, d.bodies[b], d.ranges[b]);
+  for (std::size_t b = 0; b < d.bodies.size(); ++b) addDrives(d, static_cast<int>(b));
+  startDrivenBodies(d);
   listSlots(d);
   d.mostEnergy.resize(d.bodies.size(), 0);
   d.creep.bodies.resize(d.bodies.size(), false);

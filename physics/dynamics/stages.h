@@ -29,6 +29,8 @@ void stepVelocities(WorldData&, const Batch&);  // spheres and nodes
 void applyDeadLoads(WorldData&, double time);
 // How much of such a load acts at `time` (s), 0 to 1: none while bodies settle.
 double shareAt(const WorldData&, const NodeForce& load, double time);
+// driven.cpp: bodies with driven spheres get their velocity at time 0.
+void startDrivenBodies(WorldData&);
 // driven.cpp: driven spheres get the velocity that takes them within `duration` (s) to their path at `time` (s).
 void driveSpheres(WorldData&, double time, double duration);
 // loads.cpp, at a frame's start: WorldData::loadForces, from those of the frame before.

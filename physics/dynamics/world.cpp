@@ -200,7 +200,6 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
   const std::vector<BodyMechanics> mechanics = mechanicsOf(bodies, settings.integrator, stable);
   data_ = layOut(settings, std::move(bodies), mechanics);
   data_->stableSubstep = stable;
-  data_->frame = -settings.settleFrames;
   // Below this a second of simulation takes over an hour: a wrong unit rather than a stiff tissue.
   constexpr double kLeastSubstep = 1e-8;
   if (settings.integrator == Integrator::explicitEuler && settings.substeps == 0 &&
@@ -212,8 +211,12 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
   data_->substeps = settings.substeps > 0 ? settings.substeps : chosenSubsteps(settings, data_->bodies, stable);
   data_->substep = settings.frameDuration / data_->substeps;
   data_->keptByDrag = 1 / (1 + data_->substep * settings.ambientDrag);
-  for (std::size_t b = 0; b < mechanics.size(); ++b)
-    data_->nodeGive.push_back(medulla::nodeGive(data_->bodies[b], mechanics[b], {data_->substeps, data_->substep}));
+  for (std::size_t b = 0; b < mechanics.size(); ++b) {
+    const auto like = static_cast<std::size_t>(mechanics[b].firstLike);
+    data_->nodeGive.push_back(
+        like < b ? std::vector<NodeGive>(data_->nodeGive[like])
+                 : medulla::nodeGive(data_->bodies[b], mechanics[b], {data_->substeps, data_->substep}));
+  }
   layOutDeadLoads(*data_);
   layOutContact(*data_, statics);
 }
@@ -252,6 +255,7 @@ std::vector<Eigen::Vector3d> World::advance(const Loads& loads) {
   const bool implicit = d.settings.integrator == Integrator::implicit;
   (implicit ? stepFrameImplicitly : stepFrameExplicitly)(d, loads, toolImpulse);
   ++d.frame;
+  startDrivenBodies(d);
   chooseSurfaceParts(d, loads);
   fallAsleep(d, loads);
   // The frames that readers hang nodes on are those of the state at the end.

@@ -134,8 +134,8 @@ class World {
   // tool). Throws std::runtime_error naming body, time and cause when the state stops being finite.
   std::vector<Eigen::Vector3d> advance(const Loads& loads);
 
-  void readFrame(DynamicsFrame& out) const;  // resized once and reused
-  Energies energies() const;
+  void readFrame(DynamicsFrame& out) const;               // resized once and reused
+  Energies energies() const;                              // evaluates the attachments anew: not beside any other call
   double volumeRatio(int body) const;                     // enclosed by the nodes, over rest
   double lowestFrequency(int body) const;                 // rad/s, of what deforms at rest; 0: nothing does
   const std::vector<NodeGive>& nodeGive(int body) const;  // per node, within one dynamics frame

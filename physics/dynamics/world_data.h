@@ -320,7 +320,7 @@ struct Awake {
 
 // A driven sphere; DrivenSphere with everything in world units.
 struct SphereDrive {
-  int sphere = 0;
+  int body = 0, sphere = 0;
   Quad rest, velocity, swing;  // m, m/s, m: axis times amplitude
   double frequency = 0, phase = 0;
 };
