@@ -32,15 +32,20 @@ struct Bucket {
   std::vector<int> nodes;  // of the triangles, each once
   bool fitted = true;      // the scene bounds the surface's frames, not older ones
 };
+
+struct BoundGroup {  // of four buckets
+  Lanes3 centre = zeroVectors();
+  Lanes radius = splat(0);
+};
 }  // namespace
 
 struct Buckets::Data {
   RTCDevice device = nullptr;
   BlendedSurface surface;
   std::vector<Bucket> buckets;
-  // Per bucket the sphere around both frames, its radius (m) inflated as the bucket's bounds are; padded to four. Every
-  // query asks them all: side by side they fit a first-level cache.
-  std::vector<Quad> bounds;
+  // The sphere around both frames, its radius (m) inflated as the buckets' bounds are. Every query asks them all: side
+  // by side they fit a first-level cache.
+  std::vector<BoundGroup> bounds;
   std::vector<int> near;  // result of the last near(): reserved for all triangles
 
   Data() = default;
@@ -175,7 +180,7 @@ static Lanes squaredDistances(const std::vector<Vector3d>& all, const int* nodes
 }
 
 // About the middle of the box around both frames.
-static Quad boundingSphere(const Bucket& bucket) {
+static void setBounds(const Bucket& bucket, std::vector<BoundGroup>& bounds) {
   const BlendedSurface& surface = *bucket.surface;
   Lanes lower = splat(std::numeric_limits<double>::infinity()), upper = splat(0) - lower;
   for (const int n : bucket.nodes) {
@@ -190,10 +195,10 @@ static Quad boundingSphere(const Bucket& bucket) {
     squared = larger(squared, larger(squaredDistances(surface.from, &bucket.nodes[i], left, centre),
                                      squaredDistances(surface.to, &bucket.nodes[i], left, centre)));
   }
-  Quad sphere;
-  store(sphere, centre);
-  sphere.v[3] = std::sqrt(std::max({squared[0], squared[1], squared[2], squared[3]})) + bucket.inflation;
-  return sphere;
+  BoundGroup& group = bounds[bucket.index / 4];
+  const int lane = bucket.index % 4;
+  setLane(group.centre, lane, {centre[0], centre[1], centre[2]});
+  group.radius[lane] = std::sqrt(std::max({squared[0], squared[1], squared[2], squared[3]})) + bucket.inflation;
 }
 
 bool isEmbreeIsa(const std::string& isa) {
@@ -224,7 +229,7 @@ Buckets::Buckets(const std::vector<TouchableBody>& bodies, double largestRadius,
     surface.give.resize(surface.bodyOfNode.size());
   }
   data_->near.reserve(surface.triangles.size());
-  data_->bounds.resize((data_->buckets.size() + 3) / 4 * 4);
+  data_->bounds.resize((data_->buckets.size() + 3) / 4);
   surface.from.resize(surface.bodyOfNode.size());
   surface.to.resize(surface.bodyOfNode.size());
   copyNodes(rest, surface.from);
@@ -240,7 +245,7 @@ Buckets::Buckets(const std::vector<TouchableBody>& bodies, double largestRadius,
     bucket.largestRadius = largestRadius;
     bucket.inflation = largestRadius * kBoundsFactor + kBoundsMargin;
     openBucket(data_->device, bucket);
-    data_->bounds[k] = boundingSphere(bucket);
+    setBounds(bucket, data_->bounds);
   }
   if (rtcGetDeviceError(data_->device) != RTC_ERROR_NONE)
     throw std::runtime_error("Embree failed to build the triangle buckets");
@@ -269,20 +274,20 @@ void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to,
   surface.steps[1] = stepsBefore[0];
   for (std::size_t n = 0; n < surface.from.size(); ++n) surface.steps[0][n] = surface.to[n] - surface.from[n];
   for (Bucket& bucket : data_->buckets) {
-    data_->bounds[bucket.index] = boundingSphere(bucket);
+    setBounds(bucket, data_->bounds);
     bucket.fitted = false;
   }
 }
 
 // Calls `visit` with every bucket whose bounding sphere comes within `distance` of `centre`, in their order.
 template <typename List, typename Visit>
-static void visitNear(List& buckets, const std::vector<Quad>& bounds, const Vector3d& centre, double distance,
+static void visitNear(List& buckets, const std::vector<BoundGroup>& bounds, const Vector3d& centre, double distance,
                       const Visit& visit) {
   const Lanes3 from{splat(centre.x()), splat(centre.y()), splat(centre.z())};
   for (std::size_t first = 0; first < buckets.size(); first += 4) {
-    Lanes radius;
-    const Lanes3 away = gatherFour(bounds, first, radius) - from;
-    const Lanes reach = radius + splat(distance);
+    const BoundGroup& group = bounds[first / 4];
+    const Lanes3 away = group.centre - from;
+    const Lanes reach = group.radius + splat(distance);
     const int far = _mm256_movemask_pd(isLess(reach * reach, dot(away, away)));
     for (std::size_t k = 0; far != 15 && k < 4 && first + k < buckets.size(); ++k)
       if (!(far >> k & 1)) visit(buckets[first + k]);
@@ -336,9 +341,9 @@ bool Buckets::sweep(const Vector3d& centre, const Vector3d& motion, double radiu
   rtcInitIntersectContext(&context.embree);
   if (firstBucket >= 0) sweepBucket(data_->buckets[firstBucket], context);
   const auto sweepInReach = [&](const Bucket& bucket) {
-    const Quad& sphere = data_->bounds[bucket.index];
-    const Vector3d middle = vectorOf(sphere);
-    const double t = context.best.t, reach = sphere.v[3];
+    const BoundGroup& group = data_->bounds[bucket.index / 4];
+    const Vector3d middle = vectorOf(group.centre, bucket.index % 4);
+    const double t = context.best.t, reach = group.radius[bucket.index % 4];
     if (bucket.index != firstBucket && distanceToSegment2(middle, centre, t * motion, t * t * motion2) <= reach * reach)
       sweepBucket(bucket, context);
   };

@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <regex>
+
+#include "app/scene.h"
 #include "tests/temporary_folder.h"
 
-// What the README shows runs as it stands there.
+// What the READMEs show runs, and counts, as it stands there.
 namespace medulla {
 
 TEST(Readme, ItsSceneRunsAmongTheScenes) {
@@ -21,6 +24,20 @@ TEST(Readme, ItsSceneRunsAmongTheScenes) {
   const ProgramResult r = runProgram({"replay", folder / "scenes/mine.xml", "--set", "clock.duration=0.2"});
   EXPECT_EQ(r.exitCode, 0);
   EXPECT_EQ(complaints(r), std::vector<std::string>{});
+}
+
+TEST(Readme, ScenesTakeAsManySubstepsAsItSays) {
+  const std::string folder = std::string(MEDULLA_SOURCE_DIR) + "/scenes/", text = readFile(folder + "README.md");
+  const std::regex row(R"(\n\| `(\w+\.xml)` \|.*\| (\d+) \|)"), count("substeps_per_frame (\\d+)");
+  int rows = 0;
+  for (std::sregex_iterator match(text.begin(), text.end(), row), end; match != end; ++match, ++rows) {
+    const std::string scene = folder + (*match)[1].str();
+    const std::string told = runProgram({"info", scene}).out;
+    std::smatch perFrame;
+    ASSERT_TRUE(std::regex_search(told, perFrame, count)) << scene;
+    EXPECT_EQ(std::stoi((*match)[2]), std::stoi(perFrame[1]) * readScene(scene).dynamicsRate) << scene;
+  }
+  EXPECT_EQ(rows, 6);
 }
 
 }  // namespace medulla

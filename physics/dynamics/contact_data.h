@@ -125,6 +125,7 @@ struct ContactData {
   std::vector<Quad> arm;   // m, per sphere: from its frame to the ball's centre; w = 0
   std::vector<Contact> contacts;
   std::vector<ContactSphere> spheres;
+  std::vector<char> groupIsAsked;          // per four of them: set in this substep
   std::vector<signed char> changedInPass;  // per sphere: the solver's last pass that changed it by more than a little
 
   // State: the impulses that the last substep ended with, ascending in key; the next one starts from them.

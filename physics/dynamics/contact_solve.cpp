@@ -36,10 +36,15 @@ constexpr int kPasses = 8;
 constexpr double kSettled = 1e-2;  // of its own impulse
 constexpr double kStill = 1e-5;    // m/s
 
-// Spheres as contacts see them, at the momenta of this substep.
+// Spheres as contacts see them, at the momenta of this substep: of groups of four that any contact asks for.
 void prepareSpheres(WorldData& d) {
   const Spheres& s = d.spheres;
+  std::vector<char>& asked = d.contact.groupIsAsked;
+  asked.assign(s.groups.size(), 0);
+  for (const Contact& c : d.contact.contacts)
+    for (int e = 0; e < c.ends; ++e) asked[c.sphere[e] / 4] = 1;
   for (std::size_t g = 0; g < s.groups.size(); ++g) {
+    if (!asked[g]) continue;
     const SphereGroup& group = s.groups[g];
     const std::size_t i = 4 * g;
     ContactSphere* out = &d.contact.spheres[i];

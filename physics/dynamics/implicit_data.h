@@ -140,7 +140,7 @@ struct ImplicitData {
   std::vector<Eigen::Vector3d> toolImpulses;  // N s, per load, of the whole step
   std::vector<Quad> carried, given;           // per node: the operator's velocities of anchors, impulses
   std::vector<Vector6> blocks;
-  long solves = 0, iterations = 0;  // linear systems, and conjugate gradients in all
+  long solves = 0, iterations = 0;  // linear systems, and conjugate gradients in all; for benchmarks
 };
 
 }  // namespace medulla
