@@ -245,5 +245,11 @@ TEST_F(BadInput, WhatSaysNothingOfASkeletonIsWrongUsageWithIt) {
   EXPECT_NE(r.err.find("of the volume\n"), std::string::npos) << r.err;
 }
 
+TEST_F(BadInput, ASkeletonThatLeavesItsMeshIsRefused) {
+  folder.write("tet.obj", "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  expectRefused(run({"build", "tet.obj", "-o", "m.xml", "--method", "skeleton"}), "no sphere fits there");
+  EXPECT_FALSE(std::filesystem::exists(folder / "m.xml"));
+}
+
 }  // namespace
 }  // namespace medulla

@@ -228,6 +228,17 @@ TEST_F(ChartCommand, GnuplotDrawsIt) {
   EXPECT_TRUE(svg.ends_with("</svg>\n\n") || svg.ends_with("</svg>\n")) << svg.substr(svg.size() - 20);
 }
 
+TEST_F(ChartCommand, ModelsOfAsManySpheresAreCurvesOfTheirOwn) {
+  const std::string model = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.model.xml";
+  std::filesystem::copy(model, folder / "second.xml");
+  ASSERT_EQ(
+      chart({"--steps", "20", "--methods", "skin", "--models", model, "--models", folder / "second.xml"}).exitCode, 0);
+  const auto rows = rowsOf(folder / "out/chart.csv");
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[1][0], "skin_7_spheres");
+  EXPECT_EQ(rows[2][0], "skin_7_spheres_second");
+}
+
 TEST_F(ChartCommand, MethodsAreWhatTheyAreNamedAfterInAnyScene) {
   const ProgramResult r =
       chart({"--steps", "1", "--methods", "full,implicit,implicit_2", "--set", "dynamics.integrator=implicit", "--set",

@@ -222,6 +222,7 @@ RestRates heldNodeRates(const BodyDescription& body, const BodyMechanics& mechan
   for (const Beside& node : beside) {
     double all = node.rest;
     for (const auto& [n, k] : node.held) all += k;
+    if (!(all > 0)) continue;
     for (std::size_t i = 0; i < node.held.size(); ++i) {
       const auto& [n, k] = node.held[i];
       add(node.rest * k / all, n);

@@ -260,8 +260,8 @@ std::optional<MatrixXd> skeletonResponse(const BodyDescription& body, const Body
                                          const MatrixXd& forces) {
   const RestModel model(body, mechanics);
   const std::vector<int> free = freeFreedoms(mechanics);
-  const RestRates attachments = heldNodeRates(body, mechanics);
-  const MatrixXd all = model.linkStiffness() + MatrixXd(attachments.transpose() * attachments);
+  const RestRates held = heldNodeRates(body, mechanics);
+  const MatrixXd all = model.linkStiffness() + MatrixXd(held.transpose() * held);
   const MatrixXd stiffness = all(free, free), loads = model.onSpheres(forces);
   const VectorXd unit = stiffness.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
   const Eigen::LDLT<MatrixXd> factor(unit.asDiagonal() * stiffness * unit.asDiagonal());
