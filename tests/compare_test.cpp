@@ -91,6 +91,7 @@ TEST_F(Compare, WhatIsNoLogIsRefused) {
   };
   refused(compare(kLog, edited("-2", "nan")), 1, "b.csv:3: column tool.force.x is 'nan', expected a finite number");
   refused(compare(edited("-2,", ""), kLog), 1, "a.csv:3: 2 columns in this row, expected 3 as in the header");
+  refused(compare(kLog, edited("0.04", "0.01")), 1, "b.csv:3: t goes back from 0.02 to 0.01");
   refused(compare(kLog, ""), 1, "b.csv: no header");
   refused(compare(kLog, "vertex,fx\n1,2\n"), 1, "b.csv:1: this is no log");
   refused(compare(kLog, "t;x\n1;2\n"), 1, "b.csv:1: columns are separated by semicolons, expected commas");

@@ -34,6 +34,9 @@ LogTable readLog(const std::string& path, bool mayBeCut) {
     rows.requireCells(table.columns.size(), expected);
     std::vector<double>& value = table.value.emplace_back();
     for (std::size_t k = 0; k < table.columns.size(); ++k) value.push_back(rows.number(k, table.columns[k]));
+    if (const std::size_t n = table.value.size(); n > 1 && value[0] < table.value[n - 2][0])
+      rows.fail(fmt::format("t goes back from {} to {}: expected rows in the order of time", table.value[n - 2][0],
+                            value[0]));
     table.text.emplace_back(rows.cells().begin(), rows.cells().end());
     table.lines.push_back(rows.line());
   }
