@@ -1,9 +1,10 @@
 #include "app/files/polygons.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cstddef>
+
+#include "physics/model/mesh_topology.h"
 
 namespace medulla {
 
@@ -11,15 +12,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-Vector3d areaOf(const TriangleMesh& mesh, int a, int b, int c) {
-  const Vector3d& from = mesh.vertices[a];
-  return (mesh.vertices[b] - from).cross(mesh.vertices[c] - from);
-}
-
 // Newell's: of the polygon that the fan began as, however it is bent.
 Vector3d normalOf(const TriangleMesh& mesh, const std::vector<int>& polygon) {
   Vector3d sum = Vector3d::Zero();
-  for (std::size_t k = 2; k < polygon.size(); ++k) sum += areaOf(mesh, polygon[0], polygon[k - 1], polygon[k]);
+  for (std::size_t k = 2; k < polygon.size(); ++k) sum += areaVector(mesh, {polygon[0], polygon[k - 1], polygon[k]});
   return sum;
 }
 
@@ -27,12 +23,12 @@ Vector3d normalOf(const TriangleMesh& mesh, const std::vector<int>& polygon) {
 bool isEar(const TriangleMesh& mesh, const std::vector<int>& polygon, std::size_t k, const Vector3d& normal) {
   const std::size_t n = polygon.size();
   const int a = polygon[(k + n - 1) % n], b = polygon[k], c = polygon[(k + 1) % n];
-  if (!(areaOf(mesh, a, b, c).dot(normal) > 0)) return false;
+  if (!(areaVector(mesh, {a, b, c}).dot(normal) > 0)) return false;
   return std::none_of(polygon.begin(), polygon.end(), [&](int p) {
     for (const int own : {a, b, c})
       if (mesh.vertices[p] == mesh.vertices[own]) return false;
-    return areaOf(mesh, a, b, p).dot(normal) >= 0 && areaOf(mesh, b, c, p).dot(normal) >= 0 &&
-           areaOf(mesh, c, a, p).dot(normal) >= 0;
+    return areaVector(mesh, {a, b, p}).dot(normal) >= 0 && areaVector(mesh, {b, c, p}).dot(normal) >= 0 &&
+           areaVector(mesh, {c, a, p}).dot(normal) >= 0;
   });
 }
 
@@ -68,8 +64,8 @@ void Polygons::cutConcave(TriangleMesh& mesh) const {
     std::vector<int> polygon{(*first)[0], (*first)[1]};
     for (auto t = first; t != end; ++t) polygon.push_back((*t)[2]);
     const Vector3d normal = normalOf(mesh, polygon);
-    const bool folds = std::any_of(
-        first, end, [&](const std::array<int, 3>& t) { return areaOf(mesh, t[0], t[1], t[2]).dot(normal) < 0; });
+    const bool folds =
+        std::any_of(first, end, [&](const std::array<int, 3>& t) { return areaVector(mesh, t).dot(normal) < 0; });
     if (!folds) continue;
     const std::vector<std::array<int, 3>> ears = cutIntoEars(mesh, polygon, normal);
     std::copy(ears.begin(), ears.end(), first);
