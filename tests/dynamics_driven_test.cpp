@@ -143,26 +143,30 @@ TEST(DrivenSphere, StaysWhereItIsWhileBodiesSettle) {
   EXPECT_GT((vectorOf(world.data().spheres.position[1]) - rest).norm(), 1e-4);
 }
 
-// Weight acts while bodies settle, loads wait for the time to begin.
+// Weight acts while bodies settle, loads wait for the time to begin. However little a body is damped, it comes to rest
+// as soon as critical damping of its lowest mode lets it, and is damped as before from then on.
 TEST(Settle, LeavesBodiesAtRestUnderTheirWeightAlone) {
-  BodyDescription b = tube(SurfaceMode::full);
-  b.fixed = {{0, FixedFreedom::all}};
-  b.tissue.damping = 1;
-  const World before({}, {b});
-  BodyDescription loaded = b;
-  loaded.deadLoads.push_back({0, {0, 5, 0}, 0, 0.1});
-  loaded.deadLoads.push_back({1, {0, 5, 0}, 0, 0});  // whole at time 0, which the last settling substep ends at
-  constexpr int kFrames = 200;
-  World world({.settleFrames = kFrames}, {b}), alike({.settleFrames = kFrames}, {loaded});
-  for (World* w : {&world, &alike})
-    for (int frame = 0; frame < kFrames; ++frame) w->advance({});
-  EXPECT_EQ(world.time(), 0);
-  EXPECT_EQ(world.stateHash(), alike.stateHash());
-  EXPECT_LT(world.energies().kinetic, 1e-12);
-  const int last = static_cast<int>(b.model->spheres.size()) - 1;
-  EXPECT_LT(world.data().spheres.position[last].v[1], before.data().spheres.position[last].v[1] - 1e-4);
-  for (int frame = 0; frame < 20; ++frame) alike.advance({});
-  EXPECT_NE(world.data().spheres.position[last].v[1], alike.data().spheres.position[last].v[1]);
+  for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit}) {
+    BodyDescription b = tube(SurfaceMode::full);
+    b.fixed = {{0, FixedFreedom::all}};
+    b.tissue.damping = 0.01;
+    const World before({.integrator = integrator}, {b});
+    BodyDescription loaded = b;
+    loaded.deadLoads.push_back({0, {0, 5, 0}, 0, 0.1});
+    loaded.deadLoads.push_back({1, {0, 5, 0}, 0, 0});  // whole at time 0, which the last settling substep ends at
+    constexpr int kFrames = 200;
+    const WorldSettings settings{.integrator = integrator, .settleFrames = kFrames};
+    World world(settings, {b}), alike(settings, {loaded});
+    for (World* w : {&world, &alike})
+      for (int frame = 0; frame < kFrames; ++frame) w->advance({});
+    EXPECT_EQ(world.time(), 0);
+    EXPECT_EQ(world.stateHash(), alike.stateHash());
+    EXPECT_LT(world.energies().kinetic, 1e-12);
+    const int last = static_cast<int>(b.model->spheres.size()) - 1;
+    EXPECT_LT(world.data().spheres.position[last].v[1], before.data().spheres.position[last].v[1] - 1e-4);
+    for (int frame = 0; frame < 20; ++frame) alike.advance({});
+    EXPECT_GT(alike.energies().kinetic, 1e-6);
+  }
 }
 
 TEST(DrivenSphere, ASteadyDriveIsFreeMotionOfTheWholeBody) {

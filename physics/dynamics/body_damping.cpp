@@ -129,8 +129,9 @@ void dampAgainst(const RigidLanes& rigid, double lost, const BodyRange& r, World
 void dampBodies(WorldData& d, const Batch& batch) {
   for (const int b : batch.bodies) {
     const BodyRange& r = d.ranges[b];
-    if (r.massDamping == 0) continue;
-    const double lost = 1 - 1 / (1 + d.substep * r.massDamping);
+    const double damping = d.frame < 0 ? r.settlingDamping : r.massDamping;
+    if (damping == 0) continue;
+    const double lost = 1 - 1 / (1 + d.substep * damping);
     const bool turns = r.support.freedom != RigidFreedom::none;
     const RigidLanes rigid = isFree(r) ? freeMotion(d, r) : supportedMotion(d, r);
     turns ? dampAgainst<true>(rigid, lost, r, d) : dampAgainst<false>(rigid, lost, r, d);

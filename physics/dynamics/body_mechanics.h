@@ -39,8 +39,8 @@ struct BodyMechanics {
   std::vector<bool> nodeMoves;                 // per node: not fixed
   int firstLike = 0;  // the first body with this description but for pose and loads; set by World
   // Set by dampBody. s, damping over stiffness, Rayleigh's beta of links and surface; 1/s, damping over mass, his
-  // alpha.
-  double linkRelaxation = 0, surfaceRelaxation = 0, massDamping = 0;
+  // alpha, and the one while bodies settle.
+  double linkRelaxation = 0, surfaceRelaxation = 0, massDamping = 0, settlingDamping = 0;
   double lowestFrequency = 0;  // rad/s, of what deforms
 };
 

@@ -329,6 +329,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.node.resize(m.restNodes.size());
     r.restVolume = enclosedVolume({m.restNodes, m.triangles});
     r.massDamping = mechanics[b].massDamping;
+    r.settlingDamping = mechanics[b].settlingDamping;
     r.lowestFrequency = mechanics[b].lowestFrequency;
     r.support = rigidSupport(d.bodies[b]);
     d.ranges.push_back(r);

@@ -117,9 +117,12 @@ RestRates heldRates(const BodyDescription& body, const BodyMechanics& mechanics)
   return RestRates(0, 6 * static_cast<Eigen::Index>(body.model->spheres.size()));
 }
 
-}  // namespace
+struct LowestMode {
+  double frequency = 0;  // rad/s
+  double heldShare = 0;  // of its energy, what the attachments of held nodes have
+};
 
-double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics) {
+LowestMode lowestMode(const BodyDescription& body, const BodyMechanics& mechanics) {
   const SoftBodyModel& m = *body.model;
   const int spheres = static_cast<int>(m.spheres.size());
   const std::vector<int> free = freeFreedoms(mechanics);
@@ -128,7 +131,7 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
   for (int f = 0; f < count; ++f) freedom[free[f]] = f;
   const RestRates links = linkRates(m, mechanics);
   const RestRates held = heldRates(body, mechanics);
-  if (count == 0 || links.rows() + held.rows() == 0) return 0;
+  if (count == 0 || links.rows() + held.rows() == 0) return {};
 
   const CellMasses cells = cellMasses(body);
   std::vector<Eigen::Triplet<double>> mass;
@@ -154,7 +157,7 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
     for (int j = 0; j < i; ++j) rigid.col(i) -= rigid.col(j).dot(mm * rigid.col(i)) * rigid.col(j);
     rigid.col(i) /= std::sqrt(rigid.col(i).dot(mm * rigid.col(i)));
   }
-  if (rigid.cols() >= count) return 0;
+  if (rigid.cols() >= count) return {};
   VectorXd ratio = k.diagonal().cwiseQuotient(mm.diagonal());
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(k + 1e-12 * ratio.maxCoeff() * mm);
   VectorXd x(count);
@@ -165,7 +168,14 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
     x /= std::sqrt(x.dot(mm * x));
     if (i + 1 < kIterations) x = factor.solve(mm * x);
   }
-  return std::sqrt(std::max(0.0, x.dot(k * x)));
+  const double squared = x.dot(k * x);
+  return squared > 0 ? LowestMode{std::sqrt(squared), (ofNodes * x).squaredNorm() / squared} : LowestMode{};
+}
+
+}  // namespace
+
+double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics) {
+  return lowestMode(body, mechanics).frequency;
 }
 
 std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMechanics& mechanics, int count) {
@@ -224,7 +234,8 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
   const RestModel rest(body, mechanics);
   const double all = rest.largestEigenvalue(mechanics, 1, 1), links = rest.largestEigenvalue(mechanics, 1, 0),
                surface = rest.largestEigenvalue(mechanics, 0, 1);
-  double lowest = lowestFrequency(body, mechanics);
+  const LowestMode mode = lowestMode(body, mechanics);
+  double lowest = mode.frequency;
   if (!(lowest > 0)) lowest = std::sqrt(std::max(links, surface));
   mechanics.lowestFrequency = lowest;
   const double asked = lowest > 0 ? 2 * body.tissue.damping / lowest : 0;
@@ -240,7 +251,12 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
   for (const double mass : mechanics.sphereMass) onSpheres += mass;
   double whole = onSpheres;
   for (const double mass : mechanics.nodeMass) whole += mass;
-  mechanics.massDamping = (asked - mechanics.linkRelaxation) * lowest * lowest * whole / onSpheres;
+  const double relaxes =
+      mechanics.linkRelaxation + mode.heldShare * (mechanics.surfaceRelaxation - mechanics.linkRelaxation);
+  const auto damping = [&](double relaxation) { return (relaxation - relaxes) * lowest * lowest * whole / onSpheres; };
+  mechanics.massDamping = damping(asked);
+  // Nobody watches bodies settle: critical damping of the lowest mode brings them to rest soonest.
+  mechanics.settlingDamping = lowest > 0 ? damping(std::max(asked, 2 / lowest)) : 0;
   // Both matrices are sums of the links' and the surface's, and the modes that are stiffest are not those damped most:
   // the step is searched for where the largest eigenvalue of h^2 K + 2 h C itself reaches 4.
   const double linkBeta = mechanics.linkRelaxation, surfaceBeta = mechanics.surfaceRelaxation;

@@ -89,8 +89,10 @@ void stepFrameExplicitly(WorldData& d, const Loads& loads, std::vector<Eigen::Ve
 }
 
 void stepFrameImplicitly(WorldData& d, const Loads& loads, std::vector<Eigen::Vector3d>& toolImpulse) {
-  for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k)
+  for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k) {
+    if (d.frame < 0) runStage(d, dampBodies);  // later, the links' own damping is all that they need
     stepImplicitly(d, loads, timeOfSubstep(d, k), toolImpulse);
+  }
 }
 
 // Beyond 1e4 (m, m/s) counts as infinite: a step that diverges passes there within one frame, and nothing downstream

@@ -95,7 +95,7 @@ struct WorldSettings {
   int substeps = 0;
   ContactMode contact = ContactMode::none;
   // Dynamics frames before time 0, in which bodies come to rest under weight and contact: dead loads wait, driven
-  // spheres stay where they are.
+  // spheres stay where they are, and the lowest mode of each body is damped critically.
   int settleFrames = 0;
   // s, >= 0: a body that has kept still for this long, within 1 % of its spheres' mean radius, sleeps, with all that it
   // touches; it wakes when a tool or a body awake touches it. 0: none ever sleeps, so that what creeps goes on to

@@ -216,6 +216,7 @@ struct BodyRange {
   std::vector<int> node;       // index in Nodes of every model node
   double restVolume = 0;       // m3, enclosed by the rest nodes
   double massDamping = 0;      // 1/s, Rayleigh's alpha
+  double settlingDamping = 0;  // 1/s, the same before time 0
   double lowestFrequency = 0;  // rad/s, BodyMechanics
   int firstNodeGroup = 0;      // of its nodes, which lie together
   RigidSupport support;        // damped is motion against the rigid motions that it leaves
