@@ -32,11 +32,8 @@ std::vector<int> wholeTriangles(const TriangleMesh& mesh, const HeldRegion& regi
   return out;
 }
 
-namespace {
-
 using Edge = std::pair<int, int>;
 
-// Directed edges of the triangles that no other of them has the other way round.
 std::vector<Edge> rimOf(const std::vector<std::array<int, 3>>& triangles) {
   std::set<Edge> edges;
   for (const std::array<int, 3>& t : triangles)
@@ -46,6 +43,8 @@ std::vector<Edge> rimOf(const std::vector<std::array<int, 3>>& triangles) {
     if (!edges.contains({e.second, e.first})) rim.push_back(e);
   return rim;
 }
+
+namespace {
 
 // The parts of a rim that hang together.
 std::vector<std::vector<Edge>> loopsOf(std::vector<Edge> rim) {

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "physics/model/triangle_mesh.h"
@@ -18,6 +20,9 @@ struct HeldRegion {
 
 // Triangles with all corners in the region, ascending. Throws std::runtime_error where there is none.
 std::vector<int> wholeTriangles(const TriangleMesh& mesh, const HeldRegion& region);
+
+// Directed edges of triangles that no other of them has the other way round, ascending.
+std::vector<std::pair<int, int>> rimOf(const std::vector<std::array<int, 3>>& triangles);
 
 // The material behind triangles that are held: as far as a fan over each of their rims, about the rim's middle.
 struct HeldSpace {

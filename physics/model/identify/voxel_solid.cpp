@@ -48,26 +48,12 @@ void overTriangle(const TriangleMesh& mesh, const std::array<int, 3>& corners, d
   }
 }
 
-// Edges of one held triangle only.
-std::vector<std::array<Vector3d, 2>> rimOf(const TriangleMesh& mesh, const std::vector<int>& heldTriangles) {
-  std::map<std::array<int, 2>, int> triangles;
-  for (const int t : heldTriangles) {
-    for (int k = 0; k < 3; ++k) {
-      const auto [a, b] = std::minmax(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
-      ++triangles[{a, b}];
-    }
-  }
-  std::vector<std::array<Vector3d, 2>> rim;
-  for (const auto& [edge, count] : triangles)
-    if (count == 1) rim.push_back({mesh.vertices[edge[0]], mesh.vertices[edge[1]]});
-  return rim;
-}
-
-bool isNear(const Vector3d& point, const std::vector<std::array<Vector3d, 2>>& edges, double distance) {
-  return std::any_of(edges.begin(), edges.end(), [&](const std::array<Vector3d, 2>& edge) {
-    const Vector3d along = edge[1] - edge[0];
-    const double at = std::clamp((point - edge[0]).dot(along) / along.squaredNorm(), 0., 1.);
-    return (point - edge[0] - at * along).squaredNorm() < distance * distance;
+bool isNear(const Vector3d& point, const TriangleMesh& mesh, const std::vector<std::pair<int, int>>& edges,
+            double distance) {
+  return std::any_of(edges.begin(), edges.end(), [&](const std::pair<int, int>& edge) {
+    const Vector3d start = mesh.vertices[edge.first], along = mesh.vertices[edge.second] - start;
+    const double at = std::clamp((point - start).dot(along) / along.squaredNorm(), 0., 1.);
+    return (point - start - at * along).squaredNorm() < distance * distance;
   });
 }
 
@@ -83,11 +69,13 @@ struct HeldSprings {
 // Springs on what bounds the cells: held triangles where material lies behind them, fans where they cut the body.
 HeldSprings heldSprings(const TriangleMesh& mesh, const SolidSettings& settings, const HexGrid& grid) {
   HeldSprings held;
-  const std::vector<std::array<Vector3d, 2>> rim = rimOf(mesh, settings.heldTriangles);
+  std::vector<std::array<int, 3>> triangles;
+  for (const int t : settings.heldTriangles) triangles.push_back(mesh.triangles[t]);
+  const std::vector<std::pair<int, int>> rim = rimOf(triangles);
   const auto hold = [&](const Vector3d& point, double area) {
     const double stiffness = kHeldPenalty / grid.size * area;
     holdPoint(grid, point, stiffness, held.all);
-    if (isNear(point, rim, grid.size)) holdPoint(grid, point, stiffness, held.rim);
+    if (isNear(point, mesh, rim, grid.size)) holdPoint(grid, point, stiffness, held.rim);
   };
   const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
   for (const int t : settings.heldTriangles) {
