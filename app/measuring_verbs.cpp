@@ -103,8 +103,9 @@ Verb addChart(CLI::App& app) {
 Verb addStability(CLI::App& app) {
   const auto arguments = std::make_shared<StabilityArguments>();
   StabilityArguments& a = *arguments;
-  CLI::App* c =
-      app.add_subcommand("stability", "torture a scene's first body by every method and step, and draw what survives");
+  CLI::App* c = app.add_subcommand(
+      "stability",
+      "torture a scene's first body, which a <fix> holds, by every method and step, and draw what survives");
   addSceneOptions(*c, a.run);
   c->add_option("-o,--output", a.options.folder,
                 "folder for map.csv, trials.csv, stability.gnuplot and stability.svg; made where missing")

@@ -218,7 +218,7 @@ Verb addRender(CLI::App& app) {
   addRunOptions(*c, a.run);
   c->add_option("-o,--output", a.outputs,
                 "FILE.mp4, .webm, .gif or .webp, or a folder for PNG files; {scene} in it is the scene file's name "
-                "without its ending; repeatable (default: {scene}.mp4)")
+                "without its ending; repeatable (default: {scene}.mp4, of a still {scene}.png)")
       ->type_name("FILE|DIR")
       ->allow_extra_args(false);
   addPictureOptions(c, a);
@@ -244,10 +244,10 @@ Verb addReplay(CLI::App& app) {
   c->add_flag("--realtime", a->realtime,
               "run against the clock: the servo in a thread of its own at its rate, the dynamics in another; tells CPU "
               "times of ticks, and which came late");
-  c->add_flag(
-      "--until-rest", a->untilRest,
-      "end when no body has moved for a swing of its slowest mode and no load is still growing; exit code 4 and no "
-      "files where that is not before the scene's duration");
+  c->add_flag("--until-rest", a->untilRest,
+              "end when no body has moved for a swing of its slowest mode, no load is still growing and no tool moves "
+              "any more; "
+              "exit code 4 and no files where that is not before the scene's duration");
   return {c, [a] {
             RunOptions options = runOptions(a->run);
             options.untilRest = a->untilRest;

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <regex>
+#include <sstream>
 
 #include "app/scene.h"
 #include "tests/temporary_folder.h"
@@ -24,6 +26,42 @@ TEST(Readme, ItsSceneRunsAmongTheScenes) {
   const ProgramResult r = runProgram({"replay", folder / "scenes/mine.xml", "--set", "clock.duration=0.2"});
   EXPECT_EQ(r.exitCode, 0);
   EXPECT_EQ(complaints(r), std::vector<std::string>{});
+}
+
+// The last part of a name, as a body's and a tool's own come before it: that of servo_cpu_p99.9 whole.
+static void expectDocumented(const std::string& name, const std::string& text) {
+  const std::size_t dot = name.find_last_of('.');
+  const bool isPart = dot != std::string::npos && std::isalpha(static_cast<unsigned char>(name[dot + 1]));
+  EXPECT_NE(text.find((isPart ? name.substr(dot + 1) : name) + "`"), std::string::npos) << name;
+}
+
+TEST(Readme, EveryResultIsInTheListOfResults) {
+  const std::string source = std::string(MEDULLA_SOURCE_DIR) + "/", text = readFile(source + "docs/results.md");
+  const TemporaryFolder folder;
+  folder.write("force.csv",
+               "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,fx[N],fy[N],fz[N]\n0,0,0,0,1,0,0,0,0,0,0,0\n"
+               "1,0,0,0.01,1,0,0,0,0,0,0,1\n");
+  const std::string log = folder / "run.csv";
+  int results = 0;
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+           {"info", source + "assets/gallbladder/gallbladder.model.xml"},
+           {"info", source + "assets/abdomen/liver.model.xml"},
+           {"info", source + "scenes/gallbladder.xml"},
+           {"info", folder / "force.csv"},
+           {"replay", source + "scenes/gallbladder.xml", "--set", "clock.duration=0.2", "--realtime", "--log", log,
+            "--trajectory", folder / "force.csv"},
+           {"compare", log, log},
+           {"build", source + "assets/gallbladder/gallbladder.obj", "--spheres", "3", "-o", folder / "m.xml"}}) {
+    const ProgramResult r = runProgram(arguments);
+    ASSERT_EQ(r.exitCode, 0) << r.err;
+    std::istringstream lines(r.out);
+    for (std::string line; std::getline(lines, line); ++results) expectDocumented(line.substr(0, line.find(' ')), text);
+  }
+  EXPECT_GT(results, 100);
+  const std::string header = readFile(log).substr(0, readFile(log).find('\n'));
+  std::istringstream columns(header);
+  for (std::string column; std::getline(columns, column, ',');)
+    if (column.size() < 3 || column[column.size() - 2] != '.') expectDocumented(column, text);
 }
 
 TEST(Readme, ScenesTakeAsManySubstepsAsItSays) {

@@ -3,11 +3,14 @@
 
 #include <map>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "app/files/recording_map.h"
 #include "app/files/scene_rules.h"
 #include "app/files/text.h"
 #include "app/files/xml_element.h"
+#include "render/renderer.h"
 
 namespace medulla {
 namespace {
@@ -48,6 +51,22 @@ void expectSameNames(const char* path, const XmlRules& rules) {
 TEST(SceneSchema, KnowsWhatTheReaderKnows) {
   expectSameNames(MEDULLA_SOURCE_DIR "/scenes/scene.xsd", sceneRules());
   expectSameNames(MEDULLA_SOURCE_DIR "/scenes/recording.xsd", recordingRules());
+}
+
+TEST(SceneSchema, KnowsEveryLook) {
+  tinyxml2::XMLDocument document;
+  ASSERT_EQ(document.LoadFile(MEDULLA_SOURCE_DIR "/scenes/scene.xsd"), tinyxml2::XML_SUCCESS);
+  std::vector<std::string> looks;
+  for (const auto* type = document.RootElement()->FirstChildElement("xs:simpleType"); type;
+       type = type->NextSiblingElement("xs:simpleType")) {
+    if (!type->Attribute("name", "look")) continue;
+    const auto* restriction = type->FirstChildElement("xs:restriction");
+    ASSERT_NE(restriction, nullptr);
+    for (const auto* e = restriction->FirstChildElement("xs:enumeration"); e;
+         e = e->NextSiblingElement("xs:enumeration"))
+      looks.emplace_back(e->Attribute("value"));
+  }
+  EXPECT_EQ(looks, lookNames());
 }
 
 TEST(NearestName, CountsInsertionsDeletionsReplacementsAndSwaps) {

@@ -128,6 +128,7 @@ void requireComplete(const XmlElement& root, const RecordingMap& map) {
   const RecordingColumns& layout = map.layouts[0];
   const XmlElement &columns = onlyChild(root, "columns"), &grip = onlyChild(root, "grip"),
                    &units = onlyChild(root, "units");
+  if (!grip.where.empty() && map.writeState) refuse(grip, "", "map=\"sofa\" has no grip, expected none");
   if (!grip.where.empty() && layout.grip.empty())
     refuse(grip, "", "there is no grip column, expected one in <columns>");
   if (layout.rate > 0 && units.find("time")) refuse(units, "time", "there is a rate, expected no unit of time");
