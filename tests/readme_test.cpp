@@ -51,6 +51,8 @@ TEST(Readme, EveryResultIsInTheListOfResults) {
            {"replay", source + "scenes/gallbladder.xml", "--set", "clock.duration=0.2", "--realtime", "--log", log,
             "--trajectory", folder / "force.csv"},
            {"compare", log, log},
+           {"render", source + "scenes/gallbladder.xml", "--still", "0", "--size", "64x64", "-o", folder / "still.png"},
+           {"new", source + "assets/gallbladder/gallbladder.obj", "--spheres", "3", "-o", folder / "new"},
            {"build", source + "assets/gallbladder/gallbladder.obj", "--spheres", "3", "-o", folder / "m.xml"}}) {
     const ProgramResult r = runProgram(arguments);
     ASSERT_EQ(r.exitCode, 0) << r.err;

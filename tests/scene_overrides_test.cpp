@@ -44,6 +44,8 @@ TEST_F(SceneOverrides, MistakesInOverridesNameTheOverride) {
   EXPECT_EQ(
       set("body.galbladder.surface", "skin"),
       "--set body.galbladder.surface: the scene has nothing of this name; did you mean body.gallbladder.surface?");
+  EXPECT_EQ(set("body.gut.look", "gut"),
+            "--set body.gut.look: the scene has nothing of this name; did you mean body.second.look?");
   EXPECT_EQ(set("dynamics.gravty", "0 0 0"),
             "--set dynamics.gravty: the scene has nothing of this name; did you mean dynamics.gravity?");
   EXPECT_EQ(set("body.gallbladder", "x"),

@@ -1,13 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "app/commands/commands.h"
 #include "app/enum_names.h"
 #include "app/files/model_file.h"
 #include "app/files/recording_file.h"
 #include "app/files/text.h"
+#include "app/files/text_file.h"
 #include "app/files/trajectory_file.h"
 #include "app/files/xml_element.h"
 #include "physics/dynamics/rest_modes.h"
@@ -163,7 +163,7 @@ std::vector<Result> trajectoryResults(const Trajectory& trajectory) {
 }  // namespace
 
 int runInfo(const std::string& path) {
-  const bool table = std::filesystem::path(path).extension() == ".csv";
+  const bool table = !beginsAsXml(readTextFile(path));
   const std::string root = table ? "" : rootElementOf(path);
   if (table) {
     printResults(trajectoryResults(readTrajectory(path)));

@@ -100,7 +100,8 @@ std::vector<int> cachedNumbers(const CacheReader& cache, const Wanted& wanted, c
     numbers.push_back(static_cast<int>(std::lround(number)));
     if (numbers.back() >= cache.pictures())
       throw inputError(options.cacheToRead, 0,
-                       fmt::format("holds pictures 0 to {}, not picture {}", cache.pictures() - 1, numbers.back()));
+                       fmt::format("holds pictures 0 to {}, not picture {}: expected --frames 0:{} or within",
+                                   cache.pictures() - 1, numbers.back(), cache.pictures()));
   }
   return numbers;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "app/files/scene_rules.h"
 #include "app/files/text.h"
@@ -48,6 +49,20 @@ void addOptionalSingles(XmlElement& element) {
     if (child.name == "body") addOptionalSingles(child);
 }
 
+// A wrong name of a body or tool is the likeliest mistake: of paths with the same kind of element and attribute, if
+// any.
+std::string nearestPath(const std::string& path, const std::vector<Target>& targets) {
+  const auto ends = [](const std::string& of) {
+    return std::pair(of.substr(0, of.find('.')), of.substr(of.find_last_of('.') + 1));
+  };
+  std::vector<std::string> known, alike;
+  for (const Target& t : targets) {
+    known.push_back(t.path);
+    if (ends(t.path) == ends(path)) alike.push_back(t.path);
+  }
+  return nearestName(path, alike.empty() ? known : alike);
+}
+
 OverriddenAttribute applyOverride(XmlElement& root, const SceneOverride& override) {
   const std::string where = "--set " + override.path;
   std::vector<Target> targets;
@@ -56,11 +71,9 @@ OverriddenAttribute applyOverride(XmlElement& root, const SceneOverride& overrid
   const auto matches = [&](const Target& t) { return t.path == override.path; };
   const auto found = std::find_if(targets.begin(), targets.end(), matches);
   if (found == targets.end()) {
-    std::vector<std::string> known;
-    known.reserve(targets.size());
-    for (const Target& t : targets) known.push_back(t.path);
-    const std::string nearest = nearestName(override.path, known), nothing = ": the scene has nothing of this name";
-    if (std::count(known.begin(), known.end(), nearest) > 1)
+    const std::string nearest = nearestPath(override.path, targets), nothing = ": the scene has nothing of this name";
+    const auto isNearest = [&nearest](const Target& t) { return t.path == nearest; };
+    if (std::count_if(targets.begin(), targets.end(), isNearest) > 1)
       throw std::runtime_error(where + nothing + ", and several elements answer to " + nearest +
                                ", which reaches none");
     throw std::runtime_error(where + nothing + "; did you mean " + nearest + "?");

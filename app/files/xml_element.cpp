@@ -13,6 +13,11 @@
 
 namespace medulla {
 
+bool beginsAsXml(const std::string& text) {
+  const std::size_t start = text.find_first_not_of(" \t\r\n");
+  return start == std::string::npos || text[start] == '<';
+}
+
 namespace {
 
 std::string place(const std::string& path, int line) {
@@ -81,8 +86,7 @@ XmlElement parseXml(const std::string& path) {
   const std::string text = readTextFile(path);
   // The XML library would take a zero byte for the end of the file.
   if (text.find('\0') != std::string::npos) throw inputError(path, 0, "holds a zero byte, expected XML text");
-  if (const std::size_t start = text.find_first_not_of(" \t\r\n"); start != std::string::npos && text[start] != '<')
-    throw inputError(path, 0, "is no XML: expected a file that begins with <");
+  if (!beginsAsXml(text)) throw inputError(path, 0, "is no XML: expected a file that begins with <");
   tinyxml2::XMLDocument document;
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
     throw inputError(path, document.ErrorLineNum(), std::string("broken XML: ") + describe(document.ErrorID()));

@@ -49,6 +49,9 @@ std::vector<const XmlElement*> childrenOf(const XmlElement& parent, const std::s
 // An absent element reads like an empty one: every attribute at its default.
 const XmlElement& onlyChild(const XmlElement& parent, const std::string& name);
 
+// False of tables and other text; not yet refused are empty files and broken XML.
+bool beginsAsXml(const std::string& text);
+
 // Name of the root element. Throws std::runtime_error "FILE:LINE: ..." on broken XML.
 std::string rootElementOf(const std::string& path);
 
