@@ -16,6 +16,9 @@ struct StepTime {
 void evaluateLinks(WorldData&, const Batch&);
 // The same without the frames that no node asks for within a substep; forces of such links are in their slots then.
 void evaluateLinkForces(WorldData&, const Batch&);
+// carried_weight.cpp: forces and torques of spheres begin with the weight of carried nodes; first of
+// evaluateAttachments.
+void startSphereForces(WorldData&, const Batch&);
 void evaluateAttachments(WorldData&, const Batch&);  // surface.cpp: where every node would be, and the pull on it
 void finishNodeForces(WorldData&, const Batch&);     // edge springs and pressure; from the anchors to their hosts
 // link_force.cpp: links and what hangs on them, to their two spheres
@@ -85,7 +88,12 @@ void layOutDeadLoads(WorldData&);
 // carried_nodes.cpp: nodes of a skin, and others that do not move by themselves, to where they hang from their hosts;
 // needs evaluateLinks at the current state. Where gravity is felt, their weight from now on acts there.
 void placeCarriedNodes(WorldData&);
-void feelGravity(WorldData&);  // before it, at a frame's end: less what bodies fall by
+void weighCarriedNodes(WorldData&);  // carried_weight.cpp, as part of it
+// carried_weight.cpp: what carried nodes weigh is less what their body falls by on the whole, or one that falls freely
+// would begin to turn: at a substep's end, its mean acceleration since rememberMomenta() or the last such end.
+void layOutCarriedWeight(WorldData&);
+void rememberMomenta(WorldData&);
+void feelGravity(WorldData&, const Batch&);
 
 // Angular velocity from orientation and angular momentum.
 void refreshAngularVelocities(WorldData&);

@@ -120,11 +120,7 @@ void returnToSphere(WorldData& d, const HostRange& range) {
 }  // namespace
 
 void evaluateAttachments(WorldData& d, const Batch& batch) {
-  const std::vector<Quad>& weight = d.surface.weight;
-  for (const int i : batch.spheres) {
-    d.spheres.force[i] = weight.empty() ? Quad{} : weight[2 * i];
-    d.spheres.torque[i] = weight.empty() ? Quad{} : weight[2 * i + 1];
-  }
+  startSphereForces(d, batch);
   for (const HostRange& range : batch.onLinks) pullOnLink(d, range);
   for (const HostRange& range : batch.onSpheres) range.onFrames ? pullOnFrames(d, range) : pullOnSphere(d, range);
 }

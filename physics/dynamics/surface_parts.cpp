@@ -164,6 +164,7 @@ void shareOutMasses(WorldData& d) {
 
 // All that follows from which parts move.
 void partsChanged(WorldData& d) {
+  d.surface.partsAreNew = true;
   shareOutMasses(d);
   listAwake(d);
 }
@@ -284,6 +285,7 @@ void layOutSurfaceParts(WorldData& d, const std::vector<BodyMechanics>& mechanic
     }
   }
   listCarriedNodes(d, mechanics);
+  layOutCarriedWeight(d);
   for (std::size_t k = 0; k < s.parts.size(); ++k)
     if (!s.parts[k].moves) carry(d, k);
   partsChanged(d);

@@ -84,6 +84,7 @@ void stepFrameExplicitly(WorldData& d, const Loads& loads, std::vector<Eigen::Ve
           applyForces(world, batch);
         });
     applyLoadsAndContacts(d, loads, timeOfSubstep(d, k), toolImpulse);
+    runStage(d, feelGravity);
   }
   runStage(d, stepPositions);
 }
@@ -92,6 +93,7 @@ void stepFrameImplicitly(WorldData& d, const Loads& loads, std::vector<Eigen::Ve
   for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k) {
     if (d.frame < 0) runStage(d, dampBodies);  // later, the links' own damping is all that they need
     stepImplicitly(d, loads, timeOfSubstep(d, k), toolImpulse);
+    runStage(d, feelGravity);
   }
 }
 
@@ -254,6 +256,7 @@ std::vector<Eigen::Vector3d> World::advance(const Loads& loads) {
   wakeLoaded(d, loads);
   moveLoadedParts(d, loads);
   frameLoadedSkins(d, loads);
+  rememberMomenta(d);
   const bool implicit = d.settings.integrator == Integrator::implicit;
   (implicit ? stepFrameImplicitly : stepFrameExplicitly)(d, loads, toolImpulse);
   ++d.frame;
@@ -262,7 +265,6 @@ std::vector<Eigen::Vector3d> World::advance(const Loads& loads) {
   fallAsleep(d, loads);
   // The frames that readers hang nodes on are those of the state at the end.
   runStage(d, evaluateLinks);
-  feelGravity(d);
   placeCarriedNodes(d);
   requireFinite(d, time());
   return toolImpulse;
@@ -381,7 +383,7 @@ std::uint64_t World::stateHash() const {
   }
   for (const SurfacePart& p : d.surface.parts)
     if (!p.always) hash.add(p.moves ? p.quietFrames : -1.0);
-  for (const Quad& q : d.surface.weight) add(q, 3);
+  for (const Quad& q : d.surface.felt) add(q, 3);
   if (d.settings.integrator == Integrator::implicit)
     for (const double most : d.mostEnergy) hash.add(most);
   for (const Rest& r : d.rest) hash.add(r.asleep ? -1.0 : r.stillFrames);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -271,15 +272,27 @@ struct AttachmentGive {        // of four nodes' attachments alone
   Lanes perForce, perGravity;  // m/N, and m per m/s2
 };
 
+// kg and kg m, of four spheres, columns in their own axes: the force and the moment that carried nodes add per m/s2 of
+// `felt` along each axis, for not hanging at the spheres' frames.
+struct CarriedWeight {
+  Lanes3 force[3], moment[3];
+};
+
 struct SurfaceParts {
   std::vector<SurfacePart> parts;
   std::vector<int> ofGroup;          // per group of dynamic nodes
   std::vector<AttachmentGive> give;  // per group of dynamic nodes
   std::vector<Quad> shift;           // m, per node: from where it would hang still by itself
-  std::vector<Quad> velocityBefore;  // m/s, per sphere: at the end of the frame before
-  std::vector<Quad> felt;  // m/s2, per body: gravity less the mean acceleration of its carried mass in this frame
-  std::vector<LinkLoads> weightOnLinks;  // of carried nodes
-  std::vector<Quad> weight;              // N and N m, two per sphere: what these add for not hanging at its frame
+  // Of what carried nodes weigh; `felt` is empty where nothing is carried or has weight. Per body: m/s2, gravity less
+  // the mean acceleration of its carried mass in the last substep; kg m/s, that mass's momentum at its end, and kg.
+  std::vector<Quad> felt, momentum;
+  std::vector<CarriedWeight> carriedWeight;  // per group of spheres
+  std::vector<double> carriedMass;           // kg, per sphere
+  std::vector<int> bodyOf;                   // per sphere
+  bool partsAreNew = true;                   // since `carriedWeight` was found
+  // While it is found, under 1 m/s2 `along` a direction per body; N and N m, two per sphere.
+  std::vector<Quad> along, weightAlong;
+  std::vector<LinkLoads> weightOnLinks;
   std::vector<BareSphere> spheres;
   std::vector<double> ownShare;   // per sphere: of its mass now, without what carried nodes add
   std::vector<double> ownMoment;  // kg m2, per sphere: the least moment of inertia of its own; 0 where it does not turn

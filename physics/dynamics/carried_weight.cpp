@@ -1,0 +1,191 @@
+#include <cmath>
+
+#include "physics/dynamics/anchor.h"
+#include "physics/dynamics/identified_stages.h"
+#include "physics/dynamics/implicit_stages.h"
+#include "physics/dynamics/stages.h"
+
+// The weight of nodes that are carried, whose mass is their spheres' but acts where they hang. What it does to each
+// sphere is linear in what is felt, and turns with the sphere: a map that every substep turns. A force and a moment
+// that stay for a frame lag behind by half of it, and a moment that lags feeds every swing: at 50 Hz a pendulum gained
+// six times its energy in 20 s, and a ball on a smooth floor began to spin.
+namespace medulla {
+
+namespace {
+
+Lanes3 alongOf(const WorldData& d, int body) {
+  return splat(d.surface.along[body]);
+}
+
+// kg times `along` (1), of the four nodes of group g.
+MEDULLA_INLINE Lanes3 weightOf(const WorldData& d, const Lanes3& along, int g) {
+  return loadFour(d.nodes.mass, 4 * g) * along;
+}
+
+void weighOnLink(WorldData& d, const HostRange& range) {
+  const LinkHost host = linkHost(d, range.host);
+  const Lanes3 along = alongOf(d, range.body);
+  AnchorLoads sum = noLoads();
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const Lanes3 weight = weightOf(d, along, g), &offset = d.nodes.offset[g];
+    addLoads(host, d.nodes.groups[g], offset, weight, cross(offset, weight), sum);
+  }
+  setLoads(host, sum, d.surface.weightOnLinks[range.host]);
+}
+
+void weighOnSphere(WorldData& d, const HostRange& range) {
+  const Lanes3 along = alongOf(d, range.body);
+  Lanes3 sum = zeroVectors(), moment = sum;
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const Lanes3 weight = weightOf(d, along, g);
+    sum = sum + weight;
+    moment = moment + cross(d.nodes.offset[g], weight);
+  }
+  addTo(d.surface.weightAlong[2 * range.host], sumOfLanes(sum));
+  addTo(d.surface.weightAlong[2 * range.host + 1], sumOfLanes(moment));
+}
+
+void weighOnFrames(WorldData& d, const HostRange& range) {
+  const Lanes3 along = alongOf(d, range.body);
+  FrameReturn back(d, range);
+  for (int g = range.firstGroup; g < range.endGroup; ++g) back.add(g, weightOf(d, along, g), zeroVectors());
+  back.finish();
+}
+
+void weighAlong(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  s.weightOnLinks.assign(d.links.loads.size(), LinkLoads{});
+  s.weightAlong.assign(2 * d.spheres.position.size(), Quad{});
+  for (FrameLoad& load : d.identified.loads) load = {};
+  for (const HostRange& range : d.awake.carriedOnLinks) weighOnLink(d, range);
+  for (const HostRange& range : d.awake.carriedOnSpheres)
+    range.onFrames ? weighOnFrames(d, range) : weighOnSphere(d, range);
+  returnLinkLoads(d, s.weightOnLinks, s.weightAlong);
+  returnFrameImpulses(d, s.weightAlong);
+}
+
+struct OwnAxes {
+  Rotation rotation;
+  Lanes3 vector;  // of each sphere's body, in the sphere's axes
+};
+OwnAxes toOwnAxes(const WorldData& d, const std::vector<Quad>& ofBodies, int g) {
+  const int* body = &d.surface.bodyOf[4 * g];
+  Lanes w;
+  const Lanes3 q = gatherFour(d.spheres.orientation, 4 * g, w);
+  const Rotation r = rotationOf(q, w);
+  return {r, rotateBack(r, gather(ofBodies[body[0]], ofBodies[body[1]], ofBodies[body[2]], ofBodies[body[3]]))};
+}
+
+MEDULLA_INLINE Lanes3 times(const Lanes3* columns, const Lanes3& v) {
+  return fma(v.z, columns[2], fma(v.y, columns[1], v.x * columns[0]));
+}
+
+// Adds to the map what makes it right `along` v, a unit vector or zero, and changes nothing across (Broyden 1965).
+void correct(const Lanes3& right, const Lanes3& v, Lanes3* columns) {
+  const Lanes3 lacks = right - times(columns, v);
+  columns[0] = fma(v.x, lacks, columns[0]);
+  columns[1] = fma(v.y, lacks, columns[1]);
+  columns[2] = fma(v.z, lacks, columns[2]);
+}
+
+// All of it but what already weighs at the spheres, where the nodes' mass is.
+void correctAlong(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  weighAlong(d);
+  for (const Batch& batch : d.awake.batches) {
+    for (const int g : batch.sphereGroups) {
+      const OwnAxes along = toOwnAxes(d, s.along, g);
+      const auto weigh = [&](int part) {
+        const Quad* q = &s.weightAlong[8 * g + part];
+        return rotateBack(along.rotation, gather(q[0], q[2], q[4], q[6]));
+      };
+      const Lanes carried = loadFour(s.carriedMass, 4 * g);
+      correct(fnma(carried, along.vector, weigh(0)), along.vector, s.carriedWeight[g].force);
+      correct(weigh(1), along.vector, s.carriedWeight[g].moment);
+    }
+  }
+}
+
+// Along `direction` of each body; sleepers keep what they have until they wake.
+template <class Direction>
+void correctAwake(WorldData& d, const Direction& direction) {
+  std::vector<Quad>& along = d.surface.along;
+  along.assign(d.bodies.size(), Quad{});
+  for (const Batch& batch : d.awake.batches)
+    for (const int b : batch.bodies) along[b] = quadOf(Eigen::Vector3d(direction(b)));
+  correctAlong(d);
+}
+
+}  // namespace
+
+void layOutCarriedWeight(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  if (s.nodes.empty() || vectorOf(d.gravity) == Eigen::Vector3d::Zero()) return;
+  s.felt.resize(d.bodies.size());
+  s.momentum.resize(d.bodies.size());
+  s.carriedMass.resize(d.spheres.position.size());
+  s.carriedWeight.resize(d.spheres.groups.size(), {{zeroVectors(), zeroVectors(), zeroVectors()},
+                                                   {zeroVectors(), zeroVectors(), zeroVectors()}});
+  s.bodyOf.resize(d.spheres.position.size());
+  for (std::size_t b = 0; b < d.ranges.size(); ++b)
+    for (const int i : spheresOf(d.ranges[b])) s.bodyOf[i] = static_cast<int>(b);
+}
+
+// Deformation alone changes the map in a sphere's axes. What is felt keeps its direction for long: right along it in
+// every frame, the map stays right across it from when parts have changed, or from when that was felt.
+void weighCarriedNodes(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  if (s.felt.empty()) return;
+  if (s.partsAreNew) {
+    for (int i = 0; i < d.spheres.count; ++i)
+      s.carriedMass[i] = d.spheres.groups[i / 4].mass[i % 4] - s.spheres[i].mass;
+    for (int axis = 0; axis < 3; ++axis) correctAwake(d, [axis](int) { return Eigen::Vector3d::Unit(axis); });
+    s.partsAreNew = false;
+  } else {
+    correctAwake(d, [&s](int b) { return vectorOf(s.felt[b]).stableNormalized(); });
+  }
+}
+
+// kg m/s, and kg.
+static Lanes carriedMomentum(const WorldData& d, int body) {
+  Lanes sum = splat(0);
+  for (const int i : spheresOf(d.ranges[body])) {
+    Lanes velocity = load(d.spheres.velocity[i]);
+    velocity[3] = 1;
+    sum = fma(splat(d.surface.carriedMass[i]), velocity, sum);
+  }
+  return sum;
+}
+
+void rememberMomenta(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  for (std::size_t b = 0; b < s.momentum.size(); ++b) store(s.momentum[b], carriedMomentum(d, static_cast<int>(b)));
+}
+
+void feelGravity(WorldData& d, const Batch& batch) {
+  SurfaceParts& s = d.surface;
+  if (s.felt.empty()) return;
+  for (const int b : batch.bodies) {
+    const Lanes now = carriedMomentum(d, b);
+    if (!(now[3] > 0)) continue;
+    const Lanes gained = withoutFourth(now - load(s.momentum[b]));
+    store(s.momentum[b], now);
+    store(s.felt[b], fnma(splat(1 / (now[3] * d.substep)), gained, load(d.gravity)));
+  }
+}
+
+void startSphereForces(WorldData& d, const Batch& batch) {
+  const SurfaceParts& s = d.surface;
+  for (const int g : batch.sphereGroups) {
+    Lanes3 force = zeroVectors(), torque = force;
+    if (!s.felt.empty()) {
+      const OwnAxes felt = toOwnAxes(d, s.felt, g);
+      force = rotate(felt.rotation, times(s.carriedWeight[g].force, felt.vector));
+      torque = rotate(felt.rotation, times(s.carriedWeight[g].moment, felt.vector));
+    }
+    storeFour(force, d.spheres.force, 4 * g);
+    storeFour(torque, d.spheres.torque, 4 * g);
+  }
+}
+
+}  // namespace medulla
