@@ -142,6 +142,20 @@ TEST_F(RunNotes, ABodyOfWhichEveryNodeIsHeld) {
   }
 }
 
+TEST_F(RunNotes, ASkinOfWhichEverySphereIsHeld) {
+  std::string text = read("own/organ.xml");
+  text.replace(text.find("spheres=\"1\""), 11, "spheres=\"0 1 2 3 4 5\"");
+  folder.write("own/organ.xml", text);
+  const auto notesOf = [&](const std::string& surface) {
+    return complaints(run({"check", "own/organ.xml", "--set", "body.organ.surface=" + surface}));
+  };
+  const std::string rigid =
+      "note: body 'organ' is rigid: all its spheres are held, and surface=\"skin\" moves with these alone";
+  const Notes skin = notesOf("skin"), full = notesOf("full");
+  EXPECT_EQ(std::count(skin.begin(), skin.end(), rigid), 1);
+  EXPECT_EQ(std::count(full.begin(), full.end(), rigid), 0);
+}
+
 TEST_F(RunNotes, LoadsThatDoNothing) {
   const std::string text = read("own/organ.xml"), fix = "<fix spheres=\"1\"/>";
   const auto notesOf = [&](const std::string& fixesAndLoads) {

@@ -144,6 +144,18 @@ static void printIdleLoads(const Scene& scene, bool isExcerpt) {
   }
 }
 
+// A skin moves with its spheres alone.
+static void printRigid(const SceneBody& body) {
+  std::set<int> held;
+  for (const FixedSphere& sphere : body.fixed)
+    if (sphere.freedom == FixedFreedom::all) held.insert(sphere.sphere);
+  if (std::set<int>(body.fixedNodes.begin(), body.fixedNodes.end()).size() == body.model->restNodes.size())
+    tell("note: every node of body '{}' is held\n", body.name);
+  else if (body.surface == SurfaceMode::skin && held.size() == body.model->spheres.size())
+    tell("note: body '{}' is rigid: all its spheres are held, and surface=\"skin\" moves with these alone\n",
+         body.name);
+}
+
 // Who had finite elements identify links hardly wants beams by default.
 static void printUnusedNetworks(const Scene& scene) {
   for (const SceneBody& body : scene.bodies)
@@ -171,9 +183,7 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
            1e3 * o.depth);
   }
   printBuriedTools(loaded, world);
-  for (const SceneBody& body : scene.bodies)
-    if (std::set<int>(body.fixedNodes.begin(), body.fixedNodes.end()).size() == body.model->restNodes.size())
-      tell("note: every node of body '{}' is held\n", body.name);
+  for (const SceneBody& body : scene.bodies) printRigid(body);
   printUnusedNetworks(scene);
   printIdleLoads(scene, options.isExcerpt);
   if (scene.dynamics.integrator != Integrator::implicit) return;
