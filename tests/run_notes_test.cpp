@@ -144,7 +144,7 @@ TEST_F(RunNotes, ABodyOfWhichEveryNodeIsHeld) {
 
 TEST_F(RunNotes, ASkinOfWhichEverySphereIsHeld) {
   std::string text = read("own/organ.xml");
-  text.replace(text.find("spheres=\"1\""), 11, "spheres=\"0 1 2 3 4 5\"");
+  text.replace(text.find("spheres=\"1\""), 11, "spheres=\"0 1 2 3 4 5 6\"");
   folder.write("own/organ.xml", text);
   const auto notesOf = [&](const std::string& surface) {
     return complaints(run({"check", "own/organ.xml", "--set", "body.organ.surface=" + surface}));
