@@ -1,4 +1,4 @@
-#include <cmath>
+#include <algorithm>
 
 #include "physics/dynamics/anchor.h"
 #include "physics/dynamics/identified_stages.h"
@@ -177,14 +177,13 @@ void feelGravity(WorldData& d, const Batch& batch) {
 void startSphereForces(WorldData& d, const Batch& batch) {
   const SurfaceParts& s = d.surface;
   for (const int g : batch.sphereGroups) {
-    Lanes3 force = zeroVectors(), torque = force;
-    if (!s.felt.empty()) {
-      const OwnAxes felt = toOwnAxes(d, s.felt, g);
-      force = rotate(felt.rotation, times(s.carriedWeight[g].force, felt.vector));
-      torque = rotate(felt.rotation, times(s.carriedWeight[g].moment, felt.vector));
+    if (s.felt.empty()) {
+      for (std::vector<Quad>* all : {&d.spheres.force, &d.spheres.torque}) std::fill_n(&(*all)[4 * g], 4, Quad{});
+      continue;
     }
-    storeFour(force, d.spheres.force, 4 * g);
-    storeFour(torque, d.spheres.torque, 4 * g);
+    const OwnAxes felt = toOwnAxes(d, s.felt, g);
+    storeFour(rotate(felt.rotation, times(s.carriedWeight[g].force, felt.vector)), d.spheres.force, 4 * g);
+    storeFour(rotate(felt.rotation, times(s.carriedWeight[g].moment, felt.vector)), d.spheres.torque, 4 * g);
   }
 }
 
