@@ -261,6 +261,7 @@ TEST_F(Recording, EveryMistakeInTheDescriptionIsNamedWithTheNearestName) {
       {"", "<columns rate=\"1\" position=\"1 2 3\" quaternion=\"1 2 3 4\" matrix=\"1 2 3 4 5 6 7 8 9\"/>",
        "r.xml:2: <columns> matrix="},
       {"map=\"sofa\"", columns, "r.xml:2: <columns>: map=\"sofa\" is no table"},
+      {"map=\"sofa\"", "<grip open=\"1\" closes=\"0\"/>", "r.xml:2: <grip>: map=\"sofa\" has no grip"},
   };
   for (const Case& c : cases) {
     const std::string message = complaint(c.attributes, c.inside, "1 2 3 4\n");

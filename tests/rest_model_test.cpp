@@ -103,9 +103,9 @@ TEST(RestModel, FrequenciesKnowNodesThatAreHeldOnSpheresThatAreNot) {
   }
 }
 
-// Of the energy after it is let go, over four swings.
+// Of the energy after it is let go, over four swings; an implicit step damps attachments as it does links.
 TEST(RestModel, DampingKnowsNodesThatAreHeldOnSpheresThatAreNot) {
-  for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit}) {
+  const auto ratioOf = [](Integrator integrator) {
     BodyDescription body = heldByNodes(false);
     body.tissue.damping = 0.05;
     constexpr int kSettle = 100;
@@ -124,10 +124,12 @@ TEST(RestModel, DampingKnowsNodesThatAreHeldOnSpheresThatAreNot) {
     };
     const double omega = world.lowestFrequency(0), period = 2 * std::numbers::pi / omega;
     const double before = advance(period), start = world.time(), after = advance(4 * period);
-    const double ratio = std::log(before / after) / (2 * omega * (world.time() - start));
-    std::printf("[  reached ] a ratio of %.4f where 0.05 is asked\n", ratio);
-    EXPECT_NEAR(ratio, 0.05, 0.005);
-  }
+    return std::log(before / after) / (2 * omega * (world.time() - start));
+  };
+  const double explicitly = ratioOf(Integrator::explicitEuler), implicitly = ratioOf(Integrator::implicit);
+  std::printf("[  reached ] ratios of %.4f and %.4f where 0.05 is asked\n", explicitly, implicitly);
+  EXPECT_NEAR(implicitly, 0.05, 0.005);
+  EXPECT_NEAR(explicitly, implicitly, 0.002) << "without what held attachments lack it is 0.006 less";
 }
 
 TEST(RotaryInertia, OfACellThatTurnsFastIsRaisedUntilTurningCostsNoStep) {

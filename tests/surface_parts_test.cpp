@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "app/files/model_file.h"
 #include "tests/dynamics_states.h"
 #include "tests/synthetic_model.h"
 
@@ -284,6 +285,59 @@ TEST(SurfaceParts, APendulumSwingsAsWithAFullSurface) {
   std::printf("[  reached ] after ten seconds %.4f of a swing is left, with a full surface %.4f\n", part, full);
   EXPECT_NEAR(part, full, 0.02);
   EXPECT_LT(part, 1);
+}
+
+static BodyDescription lopsided(SurfaceMode surface, std::vector<FixedSphere> fixed) {
+  const auto model =
+      std::make_shared<SoftBodyModel>(readModel(MEDULLA_SOURCE_DIR "/assets/gallbladder/gallbladder.model.xml"));
+  BodyDescription body = synthetic::body(model, 4e4, std::move(fixed));
+  body.surface = surface;
+  body.tissue.damping = 0;
+  return body;
+}
+
+// Kinetic and elastic, at most in four seconds.
+static double mostEnergy(World& world) {
+  double most = 0;
+  for (int k = 0; k < 200; ++k) {
+    world.advance({});
+    const Energies e = world.energies();
+    most = std::max(most, e.kinetic + e.elastic);
+  }
+  return most;
+}
+
+// Nothing damps it: a pin holds a sphere in the midst of a body that is not symmetric about anything.
+TEST(SurfaceParts, ALopsidedBodyOnAPinGainsNothing) {
+  const auto gain = [](SurfaceMode surface) {
+    World world({.gravity = {0.3, -9.81, 0.2}}, {lopsided(surface, {{1, FixedFreedom::translation}})});
+    const double first = mostEnergy(world);
+    for (int k = 0; k < 4; ++k) mostEnergy(world);
+    return mostEnergy(world) / first;
+  };
+  const double part = gain(SurfaceMode::contact), full = gain(SurfaceMode::full);
+  std::printf("[  reached ] after 24 s %.4f of its energy, with a full surface %.4f\n", part, full);
+  EXPECT_NEAR(part, full, 0.05);
+}
+
+// What is felt in free fall is nothing, however the body spins.
+TEST(SurfaceParts, AFallingBodyKeepsItsSpin) {
+  World world({}, {lopsided(SurfaceMode::contact, {})});
+  WorldData& d = world.data();
+  turn(d, {3, 20, 10});
+  const auto spin = [&d] {
+    Vector3d centre = Vector3d::Zero();
+    forEachMovingMass(d, [&](double m, const Vector3d& at, const Vector3d&) { centre += m * at; });
+    const Momentum all = movingMomentum(d);
+    return Vector3d(all.angular - (centre / movingMass(d)).cross(all.linear));
+  };
+  for (int k = 0; k < 5; ++k) world.advance({});
+  const Vector3d before = spin();
+  for (int k = 0; k < 100; ++k) world.advance({});
+  EXPECT_EQ(world.dynamicNodes(0), 0);
+  std::printf("[  reached ] spin changes by %.2g of itself in two seconds of falling\n",
+              (spin() - before).norm() / before.norm());
+  EXPECT_LT((spin() - before).norm(), 1e-6 * before.norm());
 }
 
 // A free tube is pulled along: what the tool gives is what spheres and moving nodes have, while nodes join and leave.

@@ -100,8 +100,8 @@ std::vector<int> cachedNumbers(const CacheReader& cache, const Wanted& wanted, c
     numbers.push_back(static_cast<int>(std::lround(number)));
     if (numbers.back() >= cache.pictures())
       throw inputError(options.cacheToRead, 0,
-                       fmt::format("holds pictures 0 to {}, not picture {}: expected --frames 0:{} or within",
-                                   cache.pictures() - 1, numbers.back(), cache.pictures()));
+                       fmt::format("holds pictures 0 to {}, up to {:.6g} s, not picture {}", cache.pictures() - 1,
+                                   (cache.pictures() - 1) / cache.layout().fps, numbers.back()));
   }
   return numbers;
 }

@@ -1,4 +1,3 @@
-
 #include "physics/dynamics/anchor.h"
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"

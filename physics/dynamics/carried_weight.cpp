@@ -8,7 +8,9 @@
 // The weight of nodes that are carried, whose mass is their spheres' but acts where they hang. What it does to each
 // sphere is linear in what is felt, and turns with the sphere: a map that every substep turns. A force and a moment
 // that stay for a frame lag behind by half of it, and a moment that lags feeds every swing: at 50 Hz a pendulum gained
-// six times its energy in 20 s, and a ball on a smooth floor began to spin.
+// six times its energy in 20 s. Felt is gravity, less what the body falls by as a whole, or one that falls freely would
+// begin to turn: the acceleration of its centre, or of what holds it. That of the carried mass alone answers to how the
+// spheres swing, who do not answer back: it fed a body on a pin even where nothing lagged.
 namespace medulla {
 
 namespace {
@@ -122,7 +124,7 @@ void layOutCarriedWeight(WorldData& d) {
   SurfaceParts& s = d.surface;
   if (s.nodes.empty() || vectorOf(d.gravity) == Eigen::Vector3d::Zero()) return;
   s.felt.resize(d.bodies.size());
-  s.momentum.resize(d.bodies.size());
+  s.falling.resize(d.bodies.size());
   s.carriedMass.resize(d.spheres.position.size());
   s.carriedWeight.resize(d.spheres.groups.size(), {{zeroVectors(), zeroVectors(), zeroVectors()},
                                                    {zeroVectors(), zeroVectors(), zeroVectors()}});
@@ -146,32 +148,51 @@ void weighCarriedNodes(WorldData& d) {
   }
 }
 
-// kg m/s, and kg.
-static Lanes carriedMomentum(const WorldData& d, int body) {
-  Lanes sum = splat(0);
-  for (const int i : spheresOf(d.ranges[body])) {
-    Lanes velocity = load(d.spheres.velocity[i]);
-    velocity[3] = 1;
-    sum = fma(splat(d.surface.carriedMass[i]), velocity, sum);
+// m/s, of the centre of a free body's spheres, else of what holds or drives it.
+static Lanes fallingVelocity(const WorldData& d, int body) {
+  const BodyRange& r = d.ranges[body];
+  if (!isFree(r)) {
+    const int sphere = r.support.point.sphere;
+    return sphere >= 0 ? load(d.spheres.velocity[r.firstSphere + sphere]) : splat(0);
   }
-  return sum;
+  Lanes momentum = splat(0);
+  double mass = 0;
+  for (const int i : spheresOf(r)) {
+    const double own = d.spheres.groups[i / 4].mass[i % 4];
+    momentum = fma(splat(own), load(d.spheres.velocity[i]), momentum);
+    mass += own;
+  }
+  return momentum / splat(mass);
 }
 
-void rememberMomenta(WorldData& d) {
+void rememberFalling(WorldData& d) {
   SurfaceParts& s = d.surface;
-  for (std::size_t b = 0; b < s.momentum.size(); ++b) store(s.momentum[b], carriedMomentum(d, static_cast<int>(b)));
+  for (std::size_t b = 0; b < s.falling.size(); ++b) store(s.falling[b], fallingVelocity(d, static_cast<int>(b)));
 }
 
 void feelGravity(WorldData& d, const Batch& batch) {
   SurfaceParts& s = d.surface;
   if (s.felt.empty()) return;
   for (const int b : batch.bodies) {
-    const Lanes now = carriedMomentum(d, b);
-    if (!(now[3] > 0)) continue;
-    const Lanes gained = withoutFourth(now - load(s.momentum[b]));
-    store(s.momentum[b], now);
-    store(s.felt[b], fnma(splat(1 / (now[3] * d.substep)), gained, load(d.gravity)));
+    const Lanes now = fallingVelocity(d, b);
+    store(s.felt[b], fnma(splat(1 / d.substep), now - load(s.falling[b]), load(d.gravity)));
+    store(s.falling[b], now);
   }
+}
+
+// Weight that is moved about within a body leaves no force on the whole, which maps that are turned by spheres apart,
+// or are not quite of now, would.
+static void balanceForces(WorldData& d, int body) {
+  std::vector<Quad>& force = d.spheres.force;
+  const std::vector<double>& carried = d.surface.carriedMass;
+  Lanes sum = splat(0);
+  double mass = 0;
+  for (const int i : spheresOf(d.ranges[body])) {
+    sum = sum + load(force[i]);
+    mass += carried[i];
+  }
+  if (mass == 0) return;
+  for (const int i : spheresOf(d.ranges[body])) store(force[i], fnma(splat(carried[i] / mass), sum, load(force[i])));
 }
 
 void startSphereForces(WorldData& d, const Batch& batch) {
@@ -185,6 +206,8 @@ void startSphereForces(WorldData& d, const Batch& batch) {
     storeFour(rotate(felt.rotation, times(s.carriedWeight[g].force, felt.vector)), d.spheres.force, 4 * g);
     storeFour(rotate(felt.rotation, times(s.carriedWeight[g].moment, felt.vector)), d.spheres.torque, 4 * g);
   }
+  if (s.felt.empty()) return;
+  for (const int b : batch.bodies) balanceForces(d, b);
 }
 
 }  // namespace medulla

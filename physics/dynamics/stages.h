@@ -90,9 +90,9 @@ void layOutDeadLoads(WorldData&);
 void placeCarriedNodes(WorldData&);
 void weighCarriedNodes(WorldData&);  // carried_weight.cpp, as part of it
 // carried_weight.cpp: what carried nodes weigh is less what their body falls by on the whole, or one that falls freely
-// would begin to turn: at a substep's end, its mean acceleration since rememberMomenta() or the last such end.
+// would begin to turn: at a substep's end, its acceleration since rememberFalling() or the last such end.
 void layOutCarriedWeight(WorldData&);
-void rememberMomenta(WorldData&);
+void rememberFalling(WorldData&);
 void feelGravity(WorldData&, const Batch&);
 
 // Angular velocity from orientation and angular momentum.

@@ -91,9 +91,11 @@ void stepFrameExplicitly(WorldData& d, const Loads& loads, std::vector<Eigen::Ve
 
 void stepFrameImplicitly(WorldData& d, const Loads& loads, std::vector<Eigen::Vector3d>& toolImpulse) {
   for (int k = 1; k <= d.substeps && d.awake.bodies > 0; ++k) {
-    if (d.frame < 0) runStage(d, dampBodies);  // later, the links' own damping is all that they need
+    if (d.frame < 0) {  // later, the links' own damping is all that they need
+      runStage(d, dampBodies);
+      refreshAngularVelocities(d);
+    }
     stepImplicitly(d, loads, timeOfSubstep(d, k), toolImpulse);
-    runStage(d, feelGravity);
   }
 }
 
@@ -256,7 +258,7 @@ std::vector<Eigen::Vector3d> World::advance(const Loads& loads) {
   wakeLoaded(d, loads);
   moveLoadedParts(d, loads);
   frameLoadedSkins(d, loads);
-  rememberMomenta(d);
+  rememberFalling(d);
   const bool implicit = d.settings.integrator == Integrator::implicit;
   (implicit ? stepFrameImplicitly : stepFrameExplicitly)(d, loads, toolImpulse);
   ++d.frame;
@@ -384,6 +386,10 @@ std::uint64_t World::stateHash() const {
   for (const SurfacePart& p : d.surface.parts)
     if (!p.always) hash.add(p.moves ? p.quietFrames : -1.0);
   for (const Quad& q : d.surface.felt) add(q, 3);
+  for (const CarriedWeight& w : d.surface.carriedWeight)
+    for (const auto* columns : {&w.force, &w.moment})
+      for (const Lanes3& column : *columns)
+        for (int lane = 0; lane < 4; ++lane) add(quadOf(vectorOf(column, lane)), 3);
   if (d.settings.integrator == Integrator::implicit)
     for (const double most : d.mostEnergy) hash.add(most);
   for (const Rest& r : d.rest) hash.add(r.asleep ? -1.0 : r.stillFrames);

@@ -284,8 +284,8 @@ struct SurfaceParts {
   std::vector<AttachmentGive> give;  // per group of dynamic nodes
   std::vector<Quad> shift;           // m, per node: from where it would hang still by itself
   // Of what carried nodes weigh; `felt` is empty where nothing is carried or has weight. Per body: m/s2, gravity less
-  // the mean acceleration of its carried mass in the last substep; kg m/s, that mass's momentum at its end, and kg.
-  std::vector<Quad> felt, momentum;
+  // how the body fell faster in the last substep; m/s, how fast it falls as a whole.
+  std::vector<Quad> felt, falling;
   std::vector<CarriedWeight> carriedWeight;  // per group of spheres
   std::vector<double> carriedMass;           // kg, per sphere
   std::vector<int> bodyOf;                   // per sphere
