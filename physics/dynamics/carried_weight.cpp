@@ -180,8 +180,8 @@ void feelGravity(WorldData& d, const Batch& batch) {
   }
 }
 
-// Weight that is moved about within a body leaves no force on the whole, which maps that are turned by spheres apart,
-// or are not quite of now, would.
+// Weight that is moved about within a free body leaves no force on the whole, which maps that are turned by spheres
+// apart, or are not quite of now, would. What holds a body may bear some of it.
 static void balanceForces(WorldData& d, int body) {
   std::vector<Quad>& force = d.spheres.force;
   const std::vector<double>& carried = d.surface.carriedMass;
@@ -207,7 +207,8 @@ void startSphereForces(WorldData& d, const Batch& batch) {
     storeFour(rotate(felt.rotation, times(s.carriedWeight[g].moment, felt.vector)), d.spheres.torque, 4 * g);
   }
   if (s.felt.empty()) return;
-  for (const int b : batch.bodies) balanceForces(d, b);
+  for (const int b : batch.bodies)
+    if (isFree(d.ranges[b])) balanceForces(d, b);
 }
 
 }  // namespace medulla
