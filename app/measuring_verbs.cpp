@@ -37,6 +37,15 @@ std::vector<double> numbersOf(const std::vector<std::string>& words, double unit
   return out;
 }
 
+// Who names a method or a step twice wants one curve of it.
+template <class T>
+void dropRepeats(std::vector<T>& list) {
+  std::vector<T> once;
+  for (const T& item : list)
+    if (std::find(once.begin(), once.end(), item) == once.end()) once.push_back(item);
+  list = std::move(once);
+}
+
 ChartOptions chartOptions(const ChartArguments& a) {
   ChartOptions options = a.options;
   options.run = runOptions(a.run);
@@ -44,6 +53,8 @@ ChartOptions chartOptions(const ChartArguments& a) {
   const bool chosen = std::erase(given, "auto") > 0;
   options.steps = numbersOf(given, 1e-3);
   if (chosen) options.steps.push_back(0);
+  dropRepeats(options.steps);
+  dropRepeats(options.methods);
   return options;
 }
 
@@ -60,6 +71,8 @@ StabilityOptions stabilityOptions(const StabilityArguments& a) {
   options.steps = numbersOf(a.steps, 1e-3);
   options.trialSteps = numbersOf(a.trialSteps, 1e-3);
   options.young = numbersOf(a.young, 1);
+  for (std::vector<double>* list : {&options.steps, &options.trialSteps, &options.young}) dropRepeats(*list);
+  dropRepeats(options.methods);
   return options;
 }
 

@@ -6,6 +6,7 @@
 
 #include "app/commands/commands.h"
 #include "app/enum_names.h"
+#include "app/files/mesh_file.h"
 #include "app/files/number_text.h"
 #include "app/files/output_file.h"
 #include "app/files/text.h"
@@ -268,10 +269,19 @@ Verb addCheck(CLI::App& app) {
 }
 
 Verb addInfo(CLI::App& app) {
-  const auto path = std::make_shared<std::string>();
-  CLI::App* c = app.add_subcommand("info", "tell what is in a model, a scene, a trajectory or a recording");
-  c->add_option("FILE", *path, "model, scene or recording (XML), or trajectory (CSV)")->required();
-  return {c, [path] { return runInfo(*path); }};
+  const auto options = std::make_shared<InfoOptions>();
+  CLI::App* c = app.add_subcommand("info", "tell what is in a mesh, a model, a scene, a trajectory or a recording");
+  c->add_option("FILE", options->path,
+                "mesh (OBJ, OFF, STL, PLY, ...), model, scene or recording (XML), or trajectory (CSV)")
+      ->required();
+  const CLI::Option* unit = c->add_option("--unit", options->unit, "unit of a mesh file")
+                                ->check(CLI::IsMember(lengthUnits()))
+                                ->capture_default_str();
+  return {c, [options, unit] {
+            if (unit->count() > 0 && !isMeshFile(options->path))
+              usageError("--unit", options->unit, "a mesh with it: other files are in metres");
+            return runInfo(*options);
+          }};
 }
 
 }  // namespace medulla

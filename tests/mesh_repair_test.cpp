@@ -293,7 +293,8 @@ TEST(MeshRepair, HolesThatMeetInAVertexAreFilledApart) {
   expectWhole(out, mesh);
   EXPECT_EQ(out.mesh.vertices.size(), mesh.vertices.size());
   EXPECT_NEAR(enclosedVolume(out.mesh), enclosedVolume(sphere(2)), 1e-15);
-  EXPECT_EQ(out.notes.size(), 2u);
+  ASSERT_EQ(out.notes.size(), 1u);
+  EXPECT_CONTAINS(out.notes[0], "filled 2 holes, the largest of ");
 }
 
 TEST(MeshRepair, LargeOpeningIsRefusedWithItsLength) {
@@ -345,8 +346,8 @@ TEST(MeshRepair, NestedComponentIsACavityWhateverItsWinding) {
     const RepairedMesh out = repairMesh(mesh);
     expectWhole(out, mesh);
     EXPECT_NEAR(enclosedVolume(out.mesh), enclosedVolume(sphere()) - hole, 1e-12);
-    EXPECT_EQ(out.notes[0], "kept a cavity of 128 triangles");
-    EXPECT_EQ(out.notes.size(), inward ? 1u : 2u);
+    const std::string turned = inward ? "" : ", which faced outward as a solid does, and was turned";
+    EXPECT_EQ(out.notes, std::vector<std::string>{"kept a cavity of 128 triangles" + turned});
   }
 }
 

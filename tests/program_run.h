@@ -1,5 +1,6 @@
 #pragma once
 
+#include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -30,6 +31,22 @@ inline std::vector<std::string> complaints(const ProgramResult& r) {
   for (std::string line; std::getline(lines, line);)
     if (line.find("s left") == std::string::npos) out.push_back(line);
   return out;
+}
+
+// Of a line "name value [unit]": what stands after the name; nothing where there is no such line.
+inline std::string valueOf(const std::string& out, const std::string& name) {
+  const std::size_t at = ("\n" + out).find("\n" + name + " ");
+  if (at == std::string::npos) return {};
+  const std::size_t start = at + name.size() + 1;
+  return out.substr(start, out.find('\n', start) - start);
+}
+
+inline void expectRefusal(const ProgramResult& r, int exitCode, const std::vector<std::string>& words) {
+  EXPECT_EQ(r.exitCode, exitCode) << r.err;
+  EXPECT_EQ(r.out, "");
+  EXPECT_EQ(complaints(r).size(), 1) << r.err;
+  for (const std::string& word : words)
+    EXPECT_NE(r.err.find(word), std::string::npos) << "no \"" << word << "\" in " << r.err;
 }
 
 struct ProgramOptions {

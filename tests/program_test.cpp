@@ -9,21 +9,6 @@ namespace medulla {
 
 static const std::string kScene = std::string(MEDULLA_SOURCE_DIR) + "/scenes/gallbladder.xml";
 
-static std::string valueOf(const std::string& out, const std::string& name) {
-  const std::size_t at = ("\n" + out).find("\n" + name + " ");
-  if (at == std::string::npos) return {};
-  const std::size_t start = at + name.size() + 1;
-  return out.substr(start, out.find('\n', start) - start);
-}
-
-static void expectRefusal(const ProgramResult& r, int exitCode, const std::vector<std::string>& words) {
-  EXPECT_EQ(r.exitCode, exitCode) << r.err;
-  EXPECT_EQ(r.out, "");
-  EXPECT_EQ(complaints(r).size(), 1) << r.err;
-  for (const std::string& word : words)
-    EXPECT_NE(r.err.find(word), std::string::npos) << "no \"" << word << "\" in " << r.err;
-}
-
 static const std::vector<std::string> kShort = {"--set", "clock.duration=0.2", "--set", "output.golden=0"};
 
 static std::vector<std::string> command(std::vector<std::string> words, const std::vector<std::string>& more = kShort) {
@@ -277,43 +262,6 @@ TEST(Program, BuildsSeveralBodiesAsEachAlone) {
       runProgram({"build", folder / "large.obj", folder / "dolphin.obj", "-o", folder / "none", "--spheres", "1"}), 1,
       {"1 spheres", "2 bodies"});
   EXPECT_FALSE(std::filesystem::exists(folder / "none"));
-}
-
-TEST(Program, InfoTellsOfModelsAndScenes) {
-  const std::string model = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.model.xml";
-  const ProgramResult ofModel = runProgram({"info", model});
-  ASSERT_EQ(ofModel.exitCode, 0) << ofModel.err;
-  EXPECT_EQ(valueOf(ofModel.out, "kind"), "model");
-  EXPECT_EQ(valueOf(ofModel.out, "spheres"), "7");
-  EXPECT_EQ(valueOf(ofModel.out, "triangles"), "466");
-  EXPECT_EQ(valueOf(ofModel.out, "mesh_hash").size(), 16u);
-  for (const char* name : {"settings", "links", "nodes", "volume", "extents", "gap_max", "cover", "mass_at_1000_kg/m3"})
-    EXPECT_NE(valueOf(ofModel.out, name), "") << name;
-  const ProgramResult ofScene = runProgram({"info", kScene});
-  EXPECT_NE(ofScene.out.find("natural_frequencies "), std::string::npos) << ofScene.out;
-  ASSERT_EQ(ofScene.exitCode, 0) << ofScene.err;
-  EXPECT_EQ(valueOf(ofScene.out, "kind"), "scene");
-  EXPECT_EQ(valueOf(ofScene.out, "body.gallbladder.spheres"), "7");
-  for (const char* name : {"duration", "servo", "dynamics", "substep", "bodies", "statics", "tools"})
-    EXPECT_NE(valueOf(ofScene.out, name), "") << name;
-  const TemporaryFolder folder;
-  folder.write("x.xml", "<other/>\n");
-  expectRefusal(runProgram({"info", folder / "x.xml"}), 1, {"x.xml:1", "scene"});
-  expectRefusal(runProgram({"info", folder / "none.xml"}), 1, {"none.xml"});
-}
-
-TEST(Program, InfoTellsOfTrajectoriesAndRecordings) {
-  const std::string scenes = std::string(MEDULLA_SOURCE_DIR) + "/scenes/";
-  const ProgramResult recording = runProgram({"info", scenes + "recorded/hand.xml"}),
-                      trajectory = runProgram({"info", scenes + "gallbladder.csv"});
-  EXPECT_EQ(valueOf(recording.out, "kind"), "trajectory") << recording.err;
-  EXPECT_EQ(valueOf(recording.out, "samples"), "292");
-  EXPECT_EQ(valueOf(recording.out, "gap_max"), "0.034 s");
-  for (const ProgramResult* r : {&recording, &trajectory}) EXPECT_EQ(valueOf(r->out, "grip_closings"), "1") << r->err;
-  EXPECT_EQ(valueOf(trajectory.out, "to"), "12 s");
-  const TemporaryFolder folder;
-  folder.write("bad.csv", "t,x\n");
-  expectRefusal(runProgram({"info", folder / "bad.csv"}), 1, {"bad.csv:1", "t[s]"});
 }
 
 TEST(Program, TheRecordedSceneRuns) {

@@ -48,6 +48,7 @@ TEST(Readme, EveryResultIsInTheListOfResults) {
   for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
            {"info", source + "assets/gallbladder/gallbladder.model.xml"},
            {"info", source + "assets/abdomen/liver.model.xml"},
+           {"info", source + "assets/liver/liver.obj"},
            {"info", source + "scenes/gallbladder.xml"},
            {"info", folder / "force.txt"},
            {"replay", source + "scenes/gallbladder.xml", "--set", "clock.duration=0.2", "--realtime", "--log", log,

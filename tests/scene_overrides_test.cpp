@@ -49,7 +49,8 @@ TEST_F(SceneOverrides, MistakesInOverridesNameTheOverride) {
   EXPECT_EQ(set("dynamics.gravty", "0 0 0"),
             "--set dynamics.gravty: the scene has nothing of this name; did you mean dynamics.gravity?");
   EXPECT_EQ(set("body.gallbladder", "x"),
-            "--set body.gallbladder: the scene has nothing of this name; did you mean body.gallbladder.name?");
+            "--set body.gallbladder: expected a value of it, such as body.gallbladder.model");
+  EXPECT_EQ(set("body", "x"), "--set body: expected a value of it, such as body.gallbladder.model");
   EXPECT_EQ(set("camera.keys.fov", "50"),
             "--set camera.keys.fov: the scene has nothing of this name, and several elements answer to camera.key.fov, "
             "which reaches none");

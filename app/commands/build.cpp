@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "app/commands/commands.h"
+#include "app/commands/mesh_notes.h"
 #include "app/enum_names.h"
 #include "app/files/fix_text.h"
 #include "app/files/input_error.h"
@@ -69,12 +70,6 @@ auto naming(const std::string& path, const Work& work) {
   }
 }
 
-// An organ of 60 m is a mesh in millimetres read as metres.
-void warnOfSize(const std::string& path, const TriangleMesh& mesh) {
-  const double size = boundsDiagonal(mesh);
-  if (size > 5 || size < 0.005) tell("{}: note: the mesh is {:.3g} m across; is --unit right?\n", path, size);
-}
-
 // A scene of it would move as bags of skin do, or turn inside out.
 void warnOfCover(const BuildJob& job) {
   constexpr double kLeast = 40;  // %; the scenes' leanest model, of limbs, has 58
@@ -121,12 +116,6 @@ void warnOfErrors(const BuildJob& job) {
         job.meshPath, links, n.ofFiniteElements.rms, job.report.longEdges ? "does a finer mesh" : "do more spheres");
 }
 
-// All that was repaired and found in one line.
-void tellRepairs(const std::string& path, const std::vector<std::string>& notes) {
-  if (notes.empty()) return;
-  tell("{}: mesh repair: {}\n", path, joined(notes, "; "));
-}
-
 std::vector<BuildJob> jobsOf(const BuildOptions& options) {
   std::vector<BuildJob> jobs;
   for (std::size_t m = 0; m < options.meshes.size(); ++m) {
@@ -166,8 +155,8 @@ void readMeshes(const BuildOptions& options, std::vector<BuildJob>& jobs) {
     const TriangleMesh input = readMesh(job.meshPath, scale);
     job.inputHash = hashMesh(input);
     job.mesh = naming(job.meshPath, [&] { return repairMesh(input); });
-    warnOfSize(job.meshPath, input);  // of one that is not refused
-    tellRepairs(job.meshPath, job.mesh.notes);
+    noteSize(job.meshPath, input);  // of one that is not refused
+    noteRepairs(job.meshPath, job.mesh.notes);
     job.settings.renderLevels = options.renderLevels.value_or(renderLevelsFor(job.mesh.mesh.triangles.size()));
     if (!job.finePath.empty()) job.fine = readMesh(job.finePath, scale);
   }

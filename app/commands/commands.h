@@ -32,8 +32,11 @@ int runNew(const NewOptions& options);
 
 int runCheck(const RunOptions& options);
 
-// What a model, a scene, a recording (told apart by their root element) or a trajectory (.csv) holds.
-int runInfo(const std::string& path);
+struct InfoOptions {
+  std::string path, unit = "m";  // unit: of a mesh
+};
+// What a mesh (told by its ending), a model, a scene, a recording (by their root element) or a trajectory holds.
+int runInfo(const InfoOptions& options);
 
 int runReplay(const RunOptions& options);
 

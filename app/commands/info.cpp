@@ -3,15 +3,19 @@
 #include <algorithm>
 
 #include "app/commands/commands.h"
+#include "app/commands/mesh_notes.h"
 #include "app/enum_names.h"
+#include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/recording_file.h"
 #include "app/files/text.h"
 #include "app/files/text_file.h"
 #include "app/files/trajectory_file.h"
 #include "app/files/xml_element.h"
+#include "app/standard_streams.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/model/build_report.h"
+#include "physics/model/mesh_repair.h"
 #include "physics/model/mesh_topology.h"
 
 namespace medulla {
@@ -160,9 +164,39 @@ std::vector<Result> trajectoryResults(const Trajectory& trajectory) {
   return results;
 }
 
+// What stands in the way of a model is told, not thrown: one looks at a mesh to learn what it lacks.
+std::vector<Result> meshResults(const std::string& path, const std::string& unit) {
+  const TriangleMesh mesh = readMesh(path, metresPerUnit(unit));
+  const Eigen::AlignedBox3d box = boundsOf(mesh.vertices);
+  std::vector<Result> results = {{"kind", "mesh", ""},
+                                 {"input_vertices", text(mesh.vertices.size()), ""},
+                                 {"input_triangles", text(mesh.triangles.size()), ""},
+                                 {"lower", text(box.min()), "m"},
+                                 {"upper", text(box.max()), "m"},
+                                 {"diagonal", text(boundsDiagonal(mesh)), "m"}};
+  noteSize(path, mesh);
+  try {
+    const RepairedMesh repaired = repairMesh(mesh);
+    noteRepairs(path, repaired.notes);
+    results.insert(results.end(), {{"nodes", text(repaired.mesh.vertices.size()), ""},
+                                   {"triangles", text(repaired.mesh.triangles.size()), ""},
+                                   {"volume", text(enclosedVolume(repaired.mesh)), "m3"},
+                                   {"buildable", "yes", ""}});
+  } catch (const std::runtime_error& why) {
+    tell("{}: note: no model can be built: {}\n", path, why.what());
+    results.push_back({"buildable", "no", ""});
+  }
+  return results;
+}
+
 }  // namespace
 
-int runInfo(const std::string& path) {
+int runInfo(const InfoOptions& options) {
+  const std::string& path = options.path;
+  if (isMeshFile(path)) {
+    printResults(meshResults(path, options.unit));
+    return 0;
+  }
   const bool table = !beginsAsXml(readTextFile(path));
   const std::string root = table ? "" : rootElementOf(path);
   if (table) {
@@ -172,9 +206,9 @@ int runInfo(const std::string& path) {
   } else if (root == "model") {
     printResults(modelResults(readModel(path)));
   } else {
-    RunOptions options;  // any other root is refused as no scene
-    options.scene = path;
-    printResults(sceneResults(loadRun(options)));
+    RunOptions run;  // any other root is refused as no scene
+    run.scene = path;
+    printResults(sceneResults(loadRun(run)));
   }
   return 0;
 }

@@ -45,6 +45,12 @@ double metresPerUnit(const std::string& unit) {
   throw std::runtime_error("unknown unit '" + unit + "', expected m, cm, mm, micron or inch");
 }
 
+bool isMeshFile(const std::string& path) {
+  const std::string extension = extensionOf(path);
+  return extension == ".obj" || extension == ".off" || extension == ".ply" ||
+         (extension != ".xml" && assimpReads(extension));
+}
+
 TriangleMesh readMesh(const std::string& path, double metresPerFileUnit) {
   requireMeshFile(path);
   const std::string extension = extensionOf(path);

@@ -63,6 +63,13 @@ std::string nearestPath(const std::string& path, const std::vector<Target>& targ
   return nearestName(path, alike.empty() ? known : alike);
 }
 
+// Of a path that stops at an element: the first value behind it, its name apart. Empty where there is none.
+std::string valueBehind(const std::string& path, const std::vector<Target>& targets) {
+  for (const Target& t : targets)
+    if (t.attribute != "name" && t.path.starts_with(path + ".")) return t.path;
+  return {};
+}
+
 OverriddenAttribute applyOverride(XmlElement& root, const SceneOverride& override) {
   const std::string where = "--set " + override.path;
   std::vector<Target> targets;
@@ -71,6 +78,8 @@ OverriddenAttribute applyOverride(XmlElement& root, const SceneOverride& overrid
   const auto matches = [&](const Target& t) { return t.path == override.path; };
   const auto found = std::find_if(targets.begin(), targets.end(), matches);
   if (found == targets.end()) {
+    if (const std::string value = valueBehind(override.path, targets); !value.empty())
+      throw std::runtime_error(where + ": expected a value of it, such as " + value);
     const std::string nearest = nearestPath(override.path, targets), nothing = ": the scene has nothing of this name";
     const auto isNearest = [&nearest](const Target& t) { return t.path == nearest; };
     if (std::count_if(targets.begin(), targets.end(), isNearest) > 1)

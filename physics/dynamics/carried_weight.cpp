@@ -71,7 +71,7 @@ struct OwnAxes {
   Lanes3 vector;  // of each sphere's body, in the sphere's axes
 };
 OwnAxes toOwnAxes(const WorldData& d, const std::vector<Quad>& ofBodies, int g) {
-  const int* body = &d.surface.bodyOf[4 * g];
+  const int* body = &d.spheres.bodyOf[4 * g];
   Lanes w;
   const Lanes3 q = gatherFour(d.spheres.orientation, 4 * g, w);
   const Rotation r = rotationOf(q, w);
@@ -128,9 +128,18 @@ void layOutCarriedWeight(WorldData& d) {
   s.carriedMass.resize(d.spheres.position.size());
   s.carriedWeight.resize(d.spheres.groups.size(), {{zeroVectors(), zeroVectors(), zeroVectors()},
                                                    {zeroVectors(), zeroVectors(), zeroVectors()}});
-  s.bodyOf.resize(d.spheres.position.size());
-  for (std::size_t b = 0; b < d.ranges.size(); ++b)
-    for (const int i : spheresOf(d.ranges[b])) s.bodyOf[i] = static_cast<int>(b);
+}
+
+static void sumMasses(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  s.carriedOf.assign(d.bodies.size(), 0);
+  s.massOf.assign(d.bodies.size(), 0);
+  for (int i = 0; i < d.spheres.count; ++i) {
+    const double mass = d.spheres.groups[i / 4].mass[i % 4];
+    s.carriedMass[i] = mass - s.spheres[i].mass;
+    s.carriedOf[d.spheres.bodyOf[i]] += s.carriedMass[i];
+    s.massOf[d.spheres.bodyOf[i]] += mass;
+  }
 }
 
 // Deformation alone changes the map in a sphere's axes. What is felt keeps its direction for long: right along it in
@@ -139,8 +148,7 @@ void weighCarriedNodes(WorldData& d) {
   SurfaceParts& s = d.surface;
   if (s.felt.empty()) return;
   if (s.partsAreNew) {
-    for (int i = 0; i < d.spheres.count; ++i)
-      s.carriedMass[i] = d.spheres.groups[i / 4].mass[i % 4] - s.spheres[i].mass;
+    sumMasses(d);
     for (int axis = 0; axis < 3; ++axis) correctAwake(d, [axis](int) { return Eigen::Vector3d::Unit(axis); });
     s.partsAreNew = false;
   } else {
@@ -156,13 +164,9 @@ static Lanes fallingVelocity(const WorldData& d, int body) {
     return sphere >= 0 ? load(d.spheres.velocity[r.firstSphere + sphere]) : splat(0);
   }
   Lanes momentum = splat(0);
-  double mass = 0;
-  for (const int i : spheresOf(r)) {
-    const double own = d.spheres.groups[i / 4].mass[i % 4];
-    momentum = fma(splat(own), load(d.spheres.velocity[i]), momentum);
-    mass += own;
-  }
-  return momentum / splat(mass);
+  for (const int i : spheresOf(r))
+    momentum = fma(splat(d.spheres.groups[i / 4].mass[i % 4]), load(d.spheres.velocity[i]), momentum);
+  return momentum / splat(d.surface.massOf[body]);
 }
 
 void rememberFalling(WorldData& d) {
@@ -185,13 +189,10 @@ void feelGravity(WorldData& d, const Batch& batch) {
 static void balanceForces(WorldData& d, int body) {
   std::vector<Quad>& force = d.spheres.force;
   const std::vector<double>& carried = d.surface.carriedMass;
-  Lanes sum = splat(0);
-  double mass = 0;
-  for (const int i : spheresOf(d.ranges[body])) {
-    sum = sum + load(force[i]);
-    mass += carried[i];
-  }
+  const double mass = d.surface.carriedOf[body];
   if (mass == 0) return;
+  Lanes sum = splat(0);
+  for (const int i : spheresOf(d.ranges[body])) sum = sum + load(force[i]);
   for (const int i : spheresOf(d.ranges[body])) store(force[i], fnma(splat(carried[i] / mass), sum, load(force[i])));
 }
 

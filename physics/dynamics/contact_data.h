@@ -97,7 +97,6 @@ struct ContactData {
   ContactMode mode = ContactMode::none;
   // Constants.
   std::vector<Quad> restBall;           // m, per sphere: the ball's centre in its sphere's frame, and its radius
-  std::vector<int> bodyOf;              // per sphere; -1: a pad
   std::vector<double> inverseCellMass;  // 1/kg, per sphere: with what its share of the surface weighs; 0: fixed
   std::vector<double> inverseYoung;     // 1/Pa, per sphere: of its tissue
   std::vector<Collider> colliders;

@@ -27,7 +27,6 @@ void addBalls(WorldData& d) {
   c.restBall.resize(d.spheres.position.size());
   c.inverseCellMass.resize(d.spheres.position.size(), 0);
   c.inverseYoung.resize(d.spheres.position.size(), 0);
-  c.bodyOf.resize(d.spheres.position.size(), -1);
   double sum = 0;
   int count = 0;
   for (std::size_t b = 0; b < d.bodies.size(); ++b) {
@@ -37,7 +36,6 @@ void addBalls(WorldData& d) {
       const int k = d.ranges[b].firstSphere + i;
       c.restBall[k] = quadOf(s.restBallCentre - s.restFrame);
       c.restBall[k].v[3] = s.radius;
-      c.bodyOf[k] = static_cast<int>(b);
       c.inverseYoung[k] = 1 / body.tissue.young;
       if (d.spheres.groups[k / 4].inverseMass[k % 4] > 0) c.inverseCellMass[k] = 1 / (body.tissue.density * s.volume);
       sum += s.radius;
@@ -199,7 +197,7 @@ void noteStartOverlaps(WorldData& d) {
   findStaticContacts(d, 0);
   for (const Contact& contact : c.contacts)
     if (-contact.gap > kInUse * contact.smallerRadius)
-      noteStartOverlap(c, c.bodyOf[contact.sphere[0]], -1, -contact.gap);
+      noteStartOverlap(c, d.spheres.bodyOf[contact.sphere[0]], -1, -contact.gap);
   c.contacts.clear();
   std::sort(c.startOverlaps.begin(), c.startOverlaps.end(), [](const BodyOverlap& a, const BodyOverlap& b) {
     return a.body0 != b.body0 ? a.body0 < b.body0 : a.body1 < b.body1;

@@ -116,7 +116,7 @@ void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int o
   const Quad& ball = c.ball[n.sphere];
   const Vector3d point = vectorOf(ball) - at.distance * at.normal;
   if ((point - c.fixedAt[n.shape * c.ball.size() + n.sphere]).norm() < ball.v[3]) return;
-  const int body = c.bodyOf[n.sphere];
+  const int body = d.spheres.bodyOf[n.sphere];
   Contact& contact = c.contacts.emplace_back();
   contact.key =
       kStaticKey | std::uint64_t{n.shape} << 34 | std::uint64_t{n.sphere} << 2 | static_cast<std::uint64_t>(ordinal);
@@ -134,7 +134,7 @@ void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int o
 
 std::array<int, 2> bodiesOf(const WorldData& d, std::uint64_t key) {
   const std::vector<Collider>& colliders = d.contact.colliders;
-  if (key & kStaticKey) return {d.contact.bodyOf[static_cast<std::uint32_t>(key >> 2)], -1};
+  if (key & kStaticKey) return {d.spheres.bodyOf[static_cast<std::uint32_t>(key >> 2)], -1};
   return {colliders[key >> 32].body, colliders[key & 0xffffffff].body};
 }
 
@@ -151,7 +151,7 @@ void listStaticNeighbours(WorldData& d) {
   for (std::uint32_t k = 0; k < c.statics.size(); ++k) {
     const StaticContactShape& shape = c.statics[k];
     for (std::uint32_t i = 0; i < c.ball.size(); ++i) {
-      if (c.inverseCellMass[i] == 0 || d.rest[c.bodyOf[i]].asleep) continue;  // fixed or a pad, or asleep
+      if (c.inverseCellMass[i] == 0 || d.rest[d.spheres.bodyOf[i]].asleep) continue;  // fixed or a pad, or asleep
       const Vector3d p = vectorOf(c.ball[i]);
       const double radius = c.ball[i].v[3];
       const int first = static_cast<int>(c.nearTriangles.size());

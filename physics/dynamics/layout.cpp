@@ -18,8 +18,9 @@ using Eigen::Vector3d;
 // Forces of a link divide by no less than this share of its rest length: two spheres pushed into one point stay finite.
 constexpr double kSmallestLength = 0.05;
 
-void addSpheres(WorldData& d, const BodyDescription& body, const BodyMechanics& mechanics) {
+void addSpheres(WorldData& d, int b, const BodyMechanics& mechanics) {
   Spheres& s = d.spheres;
+  const BodyDescription& body = d.bodies[b];
   const Eigen::Quaterniond q = Eigen::Quaterniond(body.worldFromModel.rotation()).normalized();
   for (std::size_t i = 0; i < body.model->spheres.size(); ++i) {
     const int k = s.count++;
@@ -30,7 +31,9 @@ void addSpheres(WorldData& d, const BodyDescription& body, const BodyMechanics& 
            {&s.position, &s.velocity, &s.angularMomentum, &s.angularVelocity, &s.force, &s.torque})
         a->resize(k + 4);
       s.orientation.resize(k + 4, Quad{{0, 0, 0, 1}});
+      s.bodyOf.resize(k + 4, 0);
     }
+    s.bodyOf[k] = b;
     s.position[k] = quadOf(body.worldFromModel * body.model->spheres[i].restFrame);
     s.orientation[k] = {{q.x(), q.y(), q.z(), q.w()}};
     SphereGroup& g = s.groups[k / 4];
@@ -333,7 +336,7 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
     r.lowestFrequency = mechanics[b].lowestFrequency;
     r.support = rigidSupport(d.bodies[b]);
     d.ranges.push_back(r);
-    addSpheres(d, d.bodies[b], mechanics[b]);
+    addSpheres(d, static_cast<int>(b), mechanics[b]);
     if (r.linkCount > 0) addLinks(d, d.bodies[b], mechanics[b], r.firstSphere);
   }
   d.links.frames.resize(d.links.groups.size());

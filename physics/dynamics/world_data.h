@@ -57,6 +57,7 @@ struct Spheres {
   std::vector<Quad> angularVelocity;     // rad/s, world; follows from the two above
   std::vector<Quad> force, torque;       // N, N m: sums of the current substep
   std::vector<SphereGroup> groups;
+  std::vector<int> bodyOf;           // per sphere; 0 of pads
   std::vector<int> firstSlot, slot;  // the link ends of each sphere: indices into Links::slots, link after link
 };
 
@@ -288,7 +289,7 @@ struct SurfaceParts {
   std::vector<Quad> felt, falling;
   std::vector<CarriedWeight> carriedWeight;  // per group of spheres
   std::vector<double> carriedMass;           // kg, per sphere
-  std::vector<int> bodyOf;                   // per sphere
+  std::vector<double> carriedOf, massOf;     // kg, per body: sums of the above, and of its spheres with it
   bool partsAreNew = true;                   // since `carriedWeight` was found
   // While it is found, under 1 m/s2 `along` a direction per body; N and N m, two per sphere.
   std::vector<Quad> along, weightAlong;

@@ -48,6 +48,13 @@ void checkSettings(const BuildSettings& s) {
     throw std::runtime_error(fmt::format("{} render levels; expected 0 to 4", s.renderLevels));
 }
 
+void requireDrawable(std::size_t triangles, int levels) {
+  constexpr std::size_t kMost = 4'000'000;  // 3 GB while they are made
+  if (triangles << (2 * levels) > kMost)
+    throw std::runtime_error(fmt::format("{} triangles, divided {} times, are {} to draw; expected {} at most", triangles,
+                                         levels, triangles << (2 * levels), kMost));
+}
+
 // Spheres without material of their own are dropped; links to them pass to the nearest other sphere.
 void dropEmptyCells(const VoxelBody& voxels, const MassProperties& exact, SpheresAndLinks& s) {
   for (;;) {
@@ -165,6 +172,7 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
     if (progress) progress(part);
   };
   checkSettings(settings);
+  requireDrawable(repaired.mesh.triangles.size(), settings.renderLevels);
   const BodyShape shape = measureShape(repaired.mesh, overshootOf(settings));
 
   SoftBodyModel model;

@@ -152,9 +152,10 @@ void fillSmallHoles(MeshUnderRepair& repair) {
       repair.mesh.triangles.push_back(t);
       for (int k = 0; k < 3; ++k) edges.insert(ordered(t[k], t[(k + 1) % 3]));
     }
-    repair.notes.push_back(
-        fmt::format("filled a hole of {} ({} edges)", millimetres(loop.length), loop.vertices.size()));
   }
+  const std::string size = fmt::format("of {} ({} edges)", millimetres(longest.length), longest.vertices.size());
+  repair.notes.push_back(loops.size() == 1 ? "filled a hole " + size
+                                           : fmt::format("filled {} holes, the largest {}", loops.size(), size));
 }
 
 }  // namespace medulla

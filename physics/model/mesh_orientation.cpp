@@ -122,17 +122,25 @@ void orientBodyAndCavities(MeshUnderRepair& repair) {
         fmt::format("the mesh holds {} separate bodies (triangles: {}), expected one: save each in a file of its own",
                     bodies, sizes));
   }
+  std::size_t cavities = 0, inCavities = 0, turned = 0;
   for (const Component& c : components) {
     const bool cavity = c.depth % 2 == 1;
-    if (cavity)
-      repair.notes.push_back(fmt::format("kept a cavity of {}", counted(c.triangles.size(), "triangle", "triangles")));
+    cavities += cavity ? 1 : 0;
+    inCavities += cavity ? c.triangles.size() : 0;
     if ((c.volume < 0) == cavity) continue;
     for (const int t : c.triangles) turn(repair.mesh.triangles[t]);
     if (cavity)
-      repair.notes.emplace_back("turned the cavity's surface to face into the cavity");
+      ++turned;
     else
       repair.notes.emplace_back("turned the surface inside out: it faced inward");
   }
+  if (cavities > 0)
+    repair.notes.push_back(fmt::format("kept {} of {}{}",
+                                       cavities == 1 ? "a cavity" : counted(cavities, "", "cavities"),
+                                       counted(inCavities, "triangle", "triangles"),
+                                       turned == 0     ? ""
+                                       : cavities == 1 ? ", which faced outward as a solid does, and was turned"
+                                                       : ", those turned that faced outward as solids do"));
 }
 
 }  // namespace medulla

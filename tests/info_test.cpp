@@ -1,0 +1,71 @@
+#include <gtest/gtest.h>
+
+#include "tests/program_run.h"
+#include "tests/temporary_folder.h"
+
+// `medulla info`: each kind of file, told by its ending or by its root element.
+namespace medulla {
+
+static const std::string kSource = std::string(MEDULLA_SOURCE_DIR) + "/";
+
+TEST(Info, TellsOfModelsAndScenes) {
+  const std::string model = kSource + "assets/gallbladder/gallbladder.model.xml";
+  const ProgramResult ofModel = runProgram({"info", model});
+  ASSERT_EQ(ofModel.exitCode, 0) << ofModel.err;
+  EXPECT_EQ(valueOf(ofModel.out, "kind"), "model");
+  EXPECT_EQ(valueOf(ofModel.out, "spheres"), "7");
+  EXPECT_EQ(valueOf(ofModel.out, "triangles"), "466");
+  EXPECT_EQ(valueOf(ofModel.out, "mesh_hash").size(), 16u);
+  for (const char* name : {"settings", "links", "nodes", "volume", "extents", "gap_max", "cover", "mass_at_1000_kg/m3"})
+    EXPECT_NE(valueOf(ofModel.out, name), "") << name;
+  const ProgramResult ofScene = runProgram({"info", kSource + "scenes/gallbladder.xml"});
+  EXPECT_NE(ofScene.out.find("natural_frequencies "), std::string::npos) << ofScene.out;
+  ASSERT_EQ(ofScene.exitCode, 0) << ofScene.err;
+  EXPECT_EQ(valueOf(ofScene.out, "kind"), "scene");
+  EXPECT_EQ(valueOf(ofScene.out, "body.gallbladder.spheres"), "7");
+  for (const char* name : {"duration", "servo", "dynamics", "substep", "bodies", "statics", "tools"})
+    EXPECT_NE(valueOf(ofScene.out, name), "") << name;
+  const TemporaryFolder folder;
+  folder.write("x.xml", "<other/>\n");
+  expectRefusal(runProgram({"info", folder / "x.xml"}), 1, {"x.xml:1", "scene"});
+  expectRefusal(runProgram({"info", folder / "none.xml"}), 1, {"none.xml"});
+}
+
+TEST(Info, TellsOfTrajectoriesAndRecordings) {
+  const std::string scenes = kSource + "scenes/";
+  const ProgramResult recording = runProgram({"info", scenes + "recorded/hand.xml"}),
+                      trajectory = runProgram({"info", scenes + "gallbladder.csv"});
+  EXPECT_EQ(valueOf(recording.out, "kind"), "trajectory") << recording.err;
+  EXPECT_EQ(valueOf(recording.out, "samples"), "292");
+  EXPECT_EQ(valueOf(recording.out, "gap_max"), "0.034 s");
+  for (const ProgramResult* r : {&recording, &trajectory}) EXPECT_EQ(valueOf(r->out, "grip_closings"), "1") << r->err;
+  EXPECT_EQ(valueOf(trajectory.out, "to"), "12 s");
+  const TemporaryFolder folder;
+  folder.write("bad.csv", "t,x\n");
+  expectRefusal(runProgram({"info", folder / "bad.csv"}), 1, {"bad.csv:1", "t[s]"});
+}
+
+TEST(Info, TellsOfMeshesWhetherAModelCanBeBuilt) {
+  const std::string mesh = kSource + "assets/gallbladder/gallbladder.obj";
+  const ProgramResult whole = runProgram({"info", mesh});
+  ASSERT_EQ(whole.exitCode, 0) << whole.err;
+  EXPECT_EQ(whole.err, "");
+  EXPECT_EQ(valueOf(whole.out, "kind"), "mesh");
+  EXPECT_EQ(valueOf(whole.out, "input_triangles"), "466");
+  EXPECT_EQ(valueOf(whole.out, "buildable"), "yes");
+  const ProgramResult scaled = runProgram({"info", mesh, "--unit", "cm"});
+  EXPECT_NEAR(std::stod(valueOf(scaled.out, "volume")), 1e-6 * std::stod(valueOf(whole.out, "volume")), 1e-15);
+  EXPECT_NE(scaled.err.find("is --unit right?"), std::string::npos) << scaled.err;
+  const TemporaryFolder folder;
+  folder.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 1\nf 1 2 3\n");
+  const ProgramResult open = runProgram({"info", folder / "open.obj"});
+  EXPECT_EQ(open.exitCode, 0);
+  EXPECT_EQ(valueOf(open.out, "buildable"), "no");
+  EXPECT_EQ(valueOf(open.out, "upper"), "1 2 1 m");
+  EXPECT_NE(open.err.find("no model can be built"), std::string::npos) << open.err;
+  expectRefusal(runProgram({"info", kSource + "scenes/gallbladder.csv", "--unit", "mm"}), 2, {"--unit", "a mesh"});
+  folder.write("bad.obj", "v 0 0\n");
+  expectRefusal(runProgram({"info", folder / "bad.obj"}), 1, {"bad.obj:1"});
+}
+
+}  // namespace medulla
