@@ -16,6 +16,7 @@
 #include "app/shape_mesh.h"
 #include "app/simulation.h"
 #include "physics/dynamics/fixation.h"
+#include "physics/sort_unique.h"
 #include "render/renderer.h"
 
 namespace medulla {
@@ -99,7 +100,17 @@ static void resolvePatches(const Scene& scene, SceneBody& body) {
                                identifyingCommand(body)));
 }
 
-// Nodes that are fixed, and the spheres that those hold.
+static void fixSphere(SceneBody& body, int sphere, FixedFreedom freedom) {
+  const auto known =
+      std::find_if(body.fixed.begin(), body.fixed.end(), [sphere](const FixedSphere& f) { return f.sphere == sphere; });
+  if (known == body.fixed.end())
+    body.fixed.push_back({sphere, freedom});
+  else if (freedom == FixedFreedom::all)
+    known->freedom = freedom;
+}
+
+// Nodes that are fixed, and the spheres that all of them together hold: regions that meet on a sphere hold it as one
+// that spans both would. It turns unless those hold it alone that let nothing turn.
 static void resolveFixes(const Scene& scene, SceneBody& body) {
   const SoftBodyModel& model = *body.model;
   if (body.links == LinkModel::identified) {
@@ -111,15 +122,16 @@ static void resolveFixes(const Scene& scene, SceneBody& body) {
     body.links = LinkModel::beam;
     body.fixedNodes.clear();
   }
+  std::vector<int> whollyHeld;
   for (const SceneFix& fix : body.fixes) {
     const std::vector<int> nodes = findNodes(scene, fix.line, fix.nodes, body);
-    for (const int sphere : spheresHeldBy(model, nodes)) {
-      const bool known =
-          std::any_of(body.fixed.begin(), body.fixed.end(), [&](const FixedSphere& f) { return f.sphere == sphere; });
-      if (!known) body.fixed.push_back({sphere, fix.freedom});
-    }
     body.fixedNodes.insert(body.fixedNodes.end(), nodes.begin(), nodes.end());
+    if (fix.freedom == FixedFreedom::all) whollyHeld.insert(whollyHeld.end(), nodes.begin(), nodes.end());
   }
+  sortUnique(body.fixedNodes);
+  sortUnique(whollyHeld);
+  for (const int sphere : spheresHeldBy(model, body.fixedNodes)) fixSphere(body, sphere, FixedFreedom::translation);
+  for (const int sphere : spheresHeldBy(model, whollyHeld)) fixSphere(body, sphere, FixedFreedom::all);
   // The nodes of a skin follow their spheres: where none is held, fixing them would do nothing.
   if (body.surface == SurfaceMode::skin && !body.fixes.empty() && body.fixed.empty())
     throw inputError(

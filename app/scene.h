@@ -117,6 +117,9 @@ struct SceneOverride {
   std::string path, value;
 };
 
+// Whether an override says how long the scene is: a run cut short from the command line, say.
+bool durationOverridden(const Scene& scene);
+
 // Throws std::runtime_error "FILE:LINE: what is wrong, what was expected", with "--set PATH" in the place of FILE:LINE
 // where an override is at fault. Files that the scene names are not opened.
 Scene readScene(const std::string& path, const std::vector<SceneOverride>& overrides = {});

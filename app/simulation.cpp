@@ -95,7 +95,7 @@ void Simulation::advanceDynamics() {
   // Ahead of what may throw: a frame that fails counts as tried.
   totals_.ticks += ticksPerFrame_;
   totals_.substeps += world_.substepsPerFrame();
-  totals_.simulated += frameDuration_;
+  totals_.simulated = (frame_ + 1) * frameDuration_;
   const double start = wallSeconds();
   const std::vector<Eigen::Vector3d> given = world_.advance(record_.loads);
   const double stepped = wallSeconds();

@@ -97,7 +97,8 @@ void scatter(WorldData& d, const Eigen::AlignedBox3d& box) {
   disturb(
       d,
       [&](const Vector3d&) -> Vector3d {
-        const Vector3d u(random.uniform(), random.uniform(), random.uniform());
+        Vector3d u;
+        for (int axis = 2; axis >= 0; --axis) u[axis] = random.uniform();
         return box.min() + u.cwiseProduct(box.sizes());
       },
       [&](const Vector3d&) {

@@ -122,6 +122,11 @@ PostProcess::PostProcess(int width, int height)
       glare_(std::size_t(cellsX_) * cellsY_),
       blurred_(glare_.size()) {
   for (std::size_t k = 3; k < black_.size(); k += 4) black_[k] = 255;
+}
+
+// For the first picture that is round: most never are.
+void PostProcess::findRim() {
+  const int width = width_, height = height_;
   const float h = float(height), inner = rimInner(float(width) / h), outer = rimOuter(float(width) / h);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
@@ -140,7 +145,8 @@ PostProcess::PostProcess(int width, int height)
     }
 }
 
-void PostProcess::fadeRim(Image& image) const {
+void PostProcess::fadeRim(Image& image) {
+  if (rim_.empty() && outside_.empty()) findRim();
   for (const Span& s : outside_) std::memcpy(&image.pixels[4ul * s.first], black_.data(), 4ul * s.count);
   for (const RimPixel& r : rim_) {
     std::uint8_t* p = &image.pixels[4ul * r.index];

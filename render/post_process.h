@@ -11,9 +11,9 @@ namespace medulla {
 class PostProcess {
  public:
   PostProcess(int width, int height);
-  void fadeRim(Image& image) const;  // darkens towards the endoscope's rim; black outside
-  void addGlare(Image& image);       // halo around highlights, as scattered by an endoscope's lenses
-  void smoothEdges(Image& image);    // FXAA (Lottes 2011) on pixels of high local contrast
+  void fadeRim(Image& image);      // darkens towards the endoscope's rim; black outside
+  void addGlare(Image& image);     // halo around highlights, as scattered by an endoscope's lenses
+  void smoothEdges(Image& image);  // FXAA (Lottes 2011) on pixels of high local contrast
 
  private:
   struct RimPixel {
@@ -27,6 +27,7 @@ class PostProcess {
     std::uint32_t index;
     std::uint8_t rgb[3];
   };
+  void findRim();
   void gatherHighlights(const Image& image);
   void blurGlare();
   void computeLuma(const Image& image);

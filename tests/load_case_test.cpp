@@ -162,6 +162,31 @@ TEST_F(LoadCase, PartsOfSpaceAndTheirVerticesMeanTheSameNodes) {
   EXPECT_LT((sum - Eigen::Vector3d(0, 0, 1e-2)).norm(), 1e-15);
 }
 
+TEST_F(LoadCase, RegionsHoldTogetherWhatOneOfThemAllHolds) {
+  const auto fixed = [&](const std::string& inside) {
+    std::vector<FixedSphere> out = loadScene(readScene(scene(inside))).scene.bodies[0].fixed;
+    std::sort(out.begin(), out.end(), [](const FixedSphere& a, const FixedSphere& b) { return a.sphere < b.sphere; });
+    return out;
+  };
+  const std::string left = "<fix box='-1 -0.02 -1 X 1 1'/>", right = "<fix box='X -0.02 -1 1 1 1'/>";
+  const std::vector<FixedSphere> whole = fixed(kHeld);
+  ASSERT_FALSE(whole.empty());
+  bool leftHoldsLess = false;
+  for (const char* x : {"-0.04", "-0.03", "-0.02"}) {
+    const auto at = [x](std::string region) { return region.replace(region.find('X'), 1, x); };
+    EXPECT_EQ(fixed(at(left) + at(right)), whole);
+    EXPECT_EQ(fixed(at(right) + at(left)), whole);
+    leftHoldsLess = leftHoldsLess || fixed(at(left) + "<fix spheres='0'/>").size() < whole.size();
+  }
+  EXPECT_TRUE(leftHoldsLess);
+  // What lets it turn, before or after, takes nothing from what does not.
+  std::string turning = kHeld;
+  turning.insert(turning.find("/>"), " dof='translation'");
+  for (const FixedSphere& f : fixed(turning)) EXPECT_EQ(f.freedom, FixedFreedom::translation);
+  EXPECT_EQ(fixed(turning + kHeld), whole);
+  EXPECT_EQ(fixed(kHeld + turning), whole);
+}
+
 TEST_F(LoadCase, MistakesNameFileAndLine) {
   folder.write("far.csv", "vertex\n10\n235\n");
   folder.write("nan.csv", "vertex,fx,fy,fz\n10,0,nan,0\n");

@@ -115,7 +115,7 @@ std::vector<double> scales(CacheReader& a, CacheReader& b, const std::vector<std
 }
 
 std::string describe(const CacheLayout& layout) {
-  std::string out = fmt::format("{:g} pictures per second", layout.fps);
+  std::string out = fmt::format("{} pictures per second", layout.fps);
   for (const CacheLayout::Body& body : layout.bodies)
     out += fmt::format(", {} of {} spheres and {} nodes", body.name, body.spheres, body.nodes);
   for (const std::string& tool : layout.tools) out += ", " + tool;
@@ -124,8 +124,9 @@ std::string describe(const CacheLayout& layout) {
 
 int compareCaches(const CompareOptions& options) {
   CacheReader a(options.a), b(options.b);
-  if (describe(a.layout()) != describe(b.layout()))
-    return differing({{"a", describe(a.layout()), ""}, {"b", describe(b.layout()), ""}});
+  const CacheLayout &ofA = a.layout(), &ofB = b.layout();
+  if (ofA.fps != ofB.fps || ofA.bodies != ofB.bodies || ofA.tools != ofB.tools)
+    return differing({{"a", describe(ofA), ""}, {"b", describe(ofB), ""}});
   const std::vector<std::string> fields = fieldsOf(a.layout());
   const std::vector<double> scale = options.tolerance > 0 ? scales(a, b, fields) : std::vector<double>();
   PictureState state;

@@ -56,11 +56,8 @@ std::vector<Result> modelResults(const SoftBodyModel& model) {
   for (const Result& r : buildResults(report))
     if (r.name != "seconds") results.push_back(r);
   if (model.identified) {
-    results.push_back({"identified_links", text(model.identified->links.size()), ""});
-    results.push_back({"identified_patches", text(model.identified->patches.size()), ""});
+    for (const Result& r : identifiedResults(*model.identified, std::nullopt)) results.push_back(r);
     results.push_back({"identified_poisson", text(model.identified->poisson), ""});
-    results.push_back({"identified_voxel", text(model.identified->voxel), "m"});
-    results.push_back({"identified_used", model.identified->usesFormulas ? "0" : "1", ""});
   }
   return results;
 }

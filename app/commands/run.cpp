@@ -71,8 +71,7 @@ void PictureTimes::afterFrame(const Simulation& simulation, const std::function<
 
 // One who shortens a scene knows what is not played.
 static bool isShortened(const Scene& scene, bool isExcerpt) {
-  return isExcerpt || std::any_of(scene.overridden.begin(), scene.overridden.end(),
-                                  [](const OverriddenAttribute& o) { return o.path == "clock.duration"; });
+  return isExcerpt || durationOverridden(scene);
 }
 
 // Scripted motions end before their scenes by intention, and the tool stands still from then on. What lies outside the

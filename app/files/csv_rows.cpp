@@ -7,6 +7,7 @@
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
 #include "app/files/text.h"
+#include "app/files/text_lines.h"
 
 namespace medulla {
 
@@ -17,17 +18,15 @@ static std::string_view trimmed(std::string_view text) {
 }
 
 // The next line without its comment and the white space around it; `rest` loses it.
-static std::string_view takeLine(std::string_view& rest) {
-  const std::size_t end = rest.find('\n');
-  const std::string_view line = rest.substr(0, end);
-  rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+static std::string_view takeRow(std::string_view& rest) {
+  const std::string_view line = takeLine(rest);
   return trimmed(line.substr(0, line.find('#')));
 }
 
 bool CsvRows::next() {
   cells_.clear();
   while (cells_.empty() && !rest_.empty()) {
-    std::string_view row = takeLine(rest_);
+    std::string_view row = takeRow(rest_);
     ++line_;
     while (!row.empty()) {
       const std::size_t end = separator_ == ' ' ? row.find_first_of(" \t") : row.find(separator_);

@@ -73,13 +73,6 @@ std::string_view takeWord(std::string_view& rest) {
   return word;
 }
 
-std::string_view takeLine(std::string_view& rest) {
-  const std::size_t end = rest.find('\n');
-  const std::string_view line = rest.substr(0, end);
-  rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
-  return line;
-}
-
 // ---- Header ----------------------------------------------------------------------------------------------
 
 Use useOf(const Element& element, const Property& property, std::string_view name) {

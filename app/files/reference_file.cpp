@@ -31,9 +31,7 @@ static std::optional<double> unitOfRemark(std::string_view remark, const std::st
 static double unitOf(std::string_view text, const std::string& name) {
   std::optional<double> unit;
   for (int line = 1; !text.empty(); ++line) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view whole = text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
+    const std::string_view whole = takeLine(text);
     if (!whole.starts_with('#')) continue;
     const std::optional<double> found = unitOfRemark(whole.substr(1), name, line);
     if (found && unit) throw inputError(name, line, "a second unit, expected one for all rows");

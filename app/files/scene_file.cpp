@@ -373,7 +373,7 @@ void readCaptions(const XmlElement& output, Scene& scene) {
   }
 }
 
-void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene) {
+void readOutput(const XmlElement& output, Scene& scene) {
   const std::vector<int> size = readIntegers(output, "size", 2, {kPictureSideMin, kPictureSideMax});
   if (!size.empty()) {
     if (size[0] % 2 != 0 || size[1] % 2 != 0)
@@ -386,8 +386,7 @@ void readOutput(const XmlElement& output, bool durationOverridden, Scene& scene)
   for (std::size_t k = 1; k < scene.goldenTimes.size(); ++k)
     if (scene.goldenTimes[k] <= scene.goldenTimes[k - 1]) refuse(output, "golden", "expected increasing times");
   // A run cut short from the command line is still a run; a scene file that contradicts itself is a mistake.
-  const bool overridden = durationOverridden && !scene.goldenTimes.empty();
-  if (overridden) std::erase_if(scene.goldenTimes, [&](double t) { return t > scene.duration; });
+  if (durationOverridden(scene)) std::erase_if(scene.goldenTimes, [&](double t) { return t > scene.duration; });
   if (!scene.goldenTimes.empty() && scene.goldenTimes.back() > scene.duration)
     refuse(output, "golden", "a time beyond the scene's duration");
   readCaptions(output, scene);
@@ -422,12 +421,15 @@ std::uint64_t hashOf(const XmlElement& e, bool motionOnly, std::uint64_t hash) {
 
 }  // namespace
 
+bool durationOverridden(const Scene& scene) {
+  return std::any_of(scene.overridden.begin(), scene.overridden.end(),
+                     [](const OverriddenAttribute& o) { return o.path == "clock.duration"; });
+}
+
 Scene readScene(const std::string& path, const std::vector<SceneOverride>& overrides) {
   Scene scene;
   const XmlElement root = readXml(
       path, sceneRules(), [&](XmlElement& editable) { scene.overridden = applyOverrides(editable, overrides); });
-  const bool durationOverridden = std::any_of(overrides.begin(), overrides.end(),
-                                              [](const SceneOverride& o) { return o.path == "clock.duration"; });
   scene.path = path;
   scene.name = readName(root);
   readClock(onlyChild(root, "clock"), scene);
@@ -437,7 +439,7 @@ Scene readScene(const std::string& path, const std::vector<SceneOverride>& overr
   readTools(root, scene);
   readCamera(onlyChild(root, "camera"), scene);
   readLight(onlyChild(root, "light"), scene);
-  readOutput(onlyChild(root, "output"), durationOverridden, scene);
+  readOutput(onlyChild(root, "output"), scene);
   scene.contentHash = hashOf(root, false, contentHash({}));
   scene.motionHash = hashOf(root, true, contentHash({}));
   return scene;

@@ -9,11 +9,16 @@
 
 namespace medulla {
 
+std::string_view takeLine(std::string_view& rest) {
+  const std::size_t end = rest.find('\n');
+  const std::string_view line = rest.substr(0, end);
+  rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+  return line;
+}
+
 // True when the line is continued on the next one.
 bool TextLines::splitLine() {
-  const std::size_t end = rest_.find('\n');
-  std::string_view text = rest_.substr(0, end);
-  rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+  std::string_view text = takeLine(rest_);
   ++line_;
   const std::size_t comment = text.find('#');
   text = text.substr(0, comment);

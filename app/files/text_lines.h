@@ -6,6 +6,9 @@
 
 namespace medulla {
 
+// The next line, without what ends it (LF); `rest` loses it.
+std::string_view takeLine(std::string_view& rest);
+
 // Walks a text line by line and splits it into words, for formats whose errors must name the line. Lines end in LF or
 // CRLF; # starts a comment; a backslash at the end of a line joins the next one (OBJ).
 class TextLines {

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "physics/dynamics/contact_stages.h"
+#include "physics/dynamics/identified_mechanics.h"
 #include "physics/dynamics/rigid_support.h"
 #include "physics/sort_unique.h"
 
@@ -37,7 +38,8 @@ void addBalls(WorldData& d) {
       c.restBall[k] = quadOf(s.restBallCentre - s.restFrame);
       c.restBall[k].v[3] = s.radius;
       c.inverseYoung[k] = 1 / body.tissue.young;
-      if (d.spheres.groups[k / 4].inverseMass[k % 4] > 0) c.inverseCellMass[k] = 1 / (body.tissue.density * s.volume);
+      if (d.spheres.groups[k / 4].inverseMass[k % 4] > 0)
+        c.inverseCellMass[k] = 1 / (body.tissue.density * sphereCell(body, i).volume);
       sum += s.radius;
       ++count;
     }
@@ -137,8 +139,14 @@ void forEachPair(const ContactData& c, const Visit& visit) {
   }
 }
 
-void excludeWhatOverlapsAtRest(WorldData& d) {
+// Among pairs as far apart as that may be, however short the lists of a run are beside small balls of other bodies.
+void excludeWhatTouchesAtRest(WorldData& d) {
   ContactData& c = d.contact;
+  const double margin = c.margin;
+  for (const Quad& ball : c.ball) c.margin = std::max(c.margin, kTouchingAtRest * ball.v[3]);
+  listNeighbours(d);
+  c.margin = margin;
+  c.listsAreOld = true;
   forEachPair(c, [&](std::uint32_t i, std::uint32_t j, double gap, double smaller) {
     if (c.colliders[i].body == c.colliders[j].body && gap < kTouchingAtRest * smaller) c.excluded[i].push_back(j);
   });
@@ -217,9 +225,7 @@ void layOutContact(WorldData& d, const std::vector<StaticShape>& statics) {
   addColliders(d);
   placeBalls(d);
   findWhatIsFixedToStatics(d);
-  listNeighbours(d);
-  excludeWhatOverlapsAtRest(d);
-  c.listsAreOld = true;
+  excludeWhatTouchesAtRest(d);
   listNeighbours(d);
   noteStartOverlaps(d);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "physics/dynamics/frame_turn.h"
+#include "physics/dynamics/neo_hookean.h"
 #include "physics/dynamics/world_data.h"
 
 // The measures of four identified links (physics/model/identified_network.h), their rates and, transposed, what

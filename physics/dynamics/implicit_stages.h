@@ -12,10 +12,10 @@ struct LinkBlocks;  // link_blocks.h
 void layOutImplicit(const WorldData& d, double duration, ImplicitData& s);
 
 // surface_map.cpp: the velocities with which spheres of this motion carry the anchors of all dynamic nodes, into
-// `carried`; overwrites the velocities in Links::frames.
+// `carried`; overwrites the velocities in Links::frames and the rates of identified frames.
 void carryMotion(WorldData& d, const Motion& motion, std::vector<Quad>& carried);
-// Its transpose: impulses on the anchors, added to the spheres' part of `motion`; overwrites the loads in Links::frames
-// and Links::slots.
+// Its transpose: impulses on the anchors, added to the spheres' part of `motion`; overwrites Links::loads and
+// Identified::loads.
 void returnImpulses(WorldData& d, const std::vector<Quad>& impulses, Motion& motion);
 // The links' part of it, of what acts on their anchors; at the frames of the last evaluateLinks().
 void returnLinkLoads(const WorldData& d, const std::vector<LinkLoads>& loads, Motion& motion);

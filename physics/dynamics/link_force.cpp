@@ -5,6 +5,7 @@
 #include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/link_blocks.h"
 #include "physics/dynamics/link_frame.h"
+#include "physics/dynamics/neo_hookean.h"
 #include "physics/dynamics/stages.h"
 
 // The elastic link (paper 2.2): six measures of the state q_m, each a smooth function of the two poses, and generalised
@@ -182,21 +183,6 @@ double foldEnergy(const LinkEnd& e, const Flexion& still, Lanes stiffnesses, int
   const double squared = still.a[lane] * still.a[lane] + still.b[lane] * still.b[lane];
   const Lanes both = masked(e.angle.folded, stiffnesses);
   return 0.5 * both[lane] * (kFoldAngle * kFoldAngle - squared);
-}
-
-// Neo-Hookean, incompressible: EA/3 (x - 1/x^2) at the stretch x, of stiffness EA at rest. Shorter than
-// `kStraightBelow` it goes on straight: the law stiffens as 1/x^3 there, and no explicit step would follow.
-MEDULLA_INLINE Lanes neoHookeanTension(Lanes stretch) {  // over EA
-  const Lanes x = larger(stretch, splat(kStraightBelow)), inverse = splat(1) / x;
-  constexpr double kSlope = (1 + 2 / (kStraightBelow * kStraightBelow * kStraightBelow)) / 3;
-  const Lanes below = splat(kSlope) * (stretch - x);
-  return fma(splat(1.0 / 3), fnma(inverse, inverse, x), below);
-}
-
-double neoHookeanEnergy(double stretch) {  // over EA L
-  const double x = std::max(stretch, kStraightBelow), below = stretch - x;
-  const double tension = (x - 1 / (x * x)) / 3, slope = (1 + 2 / (x * x * x)) / 3;
-  return (x * x / 2 + 1 / x - 1.5) / 3 + tension * below + slope * below * below / 2;
 }
 
 // What hangs on the link thins so that the area across it goes by 1 / (1 + 2 nu (x - 1)) at the stretch x: Poisson's

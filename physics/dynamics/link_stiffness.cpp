@@ -1,6 +1,7 @@
 #include "physics/dynamics/angles.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/link_blocks.h"
+#include "physics/dynamics/neo_hookean.h"
 
 // The links' stiffness matrices: G^T K G with the gradients G of their measures and K the stiffnesses between them
 // (Gauss and Newton), plus what a tension adds across the line. Both are positive semidefinite at any pose, so that
@@ -41,16 +42,11 @@ MEDULLA_INLINE EndRows endRows(const LinkGroup& g, const Spheres& s, const std::
   return {lineGradient(f, e.a), lineGradient(f, e.b), cross(e.a, f.n), cross(e.b, f.n)};
 }
 
-// Slope and value of the tension: link_force.cpp.
+// Slope and value of the tension, as in link_force.cpp: the bar's share of it is the beam's.
 void elongationLaw(const LinkGroup& g, Lanes length, Lanes& slope, Lanes& tension) {
-  const Lanes one = splat(1), third = splat(1.0 / 3);
-  const Lanes stretch = length * g.inverseRestLength;
-  const Lanes x = larger(stretch, splat(kStraightBelow)), inverse = one / x, inverse2 = inverse * inverse;
-  const Lanes hyperSlope = third * fma(splat(2), inverse2 * inverse, one);
-  const Lanes hyper = g.restLength * fma(hyperSlope, stretch - x, third * (x - inverse2));
-  const Lanes linear = length - g.restLength;
-  slope = g.elongation * fma(g.beam, hyperSlope - one, one);
-  tension = g.elongation * fma(g.beam, hyper - linear, linear);
+  const Lanes stretch = length * g.inverseRestLength, linear = length - g.restLength;
+  slope = g.elongation * fma(g.beam, neoHookeanSlope(stretch) - splat(1), splat(1));
+  tension = g.elongation * fma(g.beam, g.restLength * neoHookeanTension(stretch) - linear, linear);
 }
 
 // In axes turned about the line: link_force.cpp, `turned`.

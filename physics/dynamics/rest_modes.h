@@ -15,7 +15,8 @@ namespace medulla {
 // beams and shells).
 void raiseRotaryInertia(const BodyDescription& body, BodyMechanics& mechanics);
 
-// Sets both relaxations of `mechanics` from the tissue's damping ratio and returns the largest stable substep (s) of
+// Sets what damps `mechanics` (both relaxations, massDamping, settlingDamping) from the tissue's damping ratio, and
+// lowestFrequency, which it goes by, and returns the largest stable substep (s) of
 // the body under semi-implicit Euler with damping taken at the old velocity.
 double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrator integrator);
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "physics/dynamics/frame_turn.h"
+#include "physics/dynamics/neo_hookean.h"
 #include "physics/dynamics/world_data.h"
 
 // How nodes follow the frames they hang on (physics/model/identified_network.h), seen from the frame of their home

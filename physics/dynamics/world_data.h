@@ -64,9 +64,6 @@ struct Spheres {
 // ---- Links: four at a time; a batch's last group is filled up with copies that have no stiffness and whose slots
 // nobody reads.
 
-// Stretch under which the neo-Hookean tension goes on straight.
-constexpr double kStraightBelow = 0.75;
-
 struct LinkGroup {  // constants of four links
   std::uint32_t sphere0[4], sphere1[4];
   Lanes3 restT, restU;                  // centre line and a section axis at rest, in both spheres' frames
