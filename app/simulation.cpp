@@ -40,8 +40,11 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   sampleInputs(0, inputs_);
 
   std::vector<TouchableBody> bodies;
-  for (const SceneBody& body : loaded.scene.bodies)
-    bodies.push_back({body.model, world_.nodeGive(static_cast<int>(bodies.size()))});
+  for (const SceneBody& body : loaded.scene.bodies) bodies.push_back({body.model});
+  if (!loaded.trajectories.empty()) {
+    const std::vector<std::vector<NodeGive>> give = world_.nodeGive();
+    for (std::size_t b = 0; b < bodies.size(); ++b) bodies[b].give = give[b];
+  }
   std::vector<ToolSettings> tools;
   for (const SceneTool& tool : loaded.scene.tools) tools.push_back(tool.settings);
   servo_ = std::make_unique<Servo>(bodies, tools, tickDuration_, current_, inputs_, embree);

@@ -56,7 +56,7 @@ static Felt touchRod(const Rod& rod, const std::function<ToolSample(double)>& de
   const auto touched = std::make_shared<SoftBodyModel>(*model);
   touched->buckets.assign(1, {});
   for (std::size_t t = 0; t < touched->triangles.size(); ++t) touched->buckets[0].push_back(int(t));
-  Servo servo({{touched, world.nodeGive(0)}}, {tool}, kTick, now, {device(0)});
+  Servo servo({{touched, world.nodeGive()[0]}}, {tool}, kTick, now, {device(0)});
   Felt felt;
   Loads loads;
   Vector3d before = Vector3d::Zero();

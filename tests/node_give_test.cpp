@@ -33,7 +33,7 @@ static Give pushNode(BodyDescription body, int frames) {
   const Vector3d rest = frame.bodies[0].nodes[kPushed];
   for (int k = 0; k < frames; ++k) world.advance({});
   world.readFrame(frame);
-  return {world.nodeGive(0)[kPushed], inward.dot(frame.bodies[0].nodes[kPushed] - rest) / kForce};
+  return {world.nodeGive()[0][kPushed], inward.dot(frame.bodies[0].nodes[kPushed] - rest) / kForce};
 }
 
 // The other nodes beyond the neighbours, and the spheres, stand still.
@@ -47,7 +47,7 @@ TEST(NodeGive, ANodeGivesByItself) {
   EXPECT_LT(give.estimated.own, 1.1 * give.shown);
   EXPECT_EQ(give.estimated.carried, 0);
   const World world(WorldSettings{}, {body});
-  EXPECT_EQ(world.nodeGive(0)[0].own, 0);
+  EXPECT_EQ(world.nodeGive()[0][0].own, 0);
 }
 
 // On a skin nothing else gives: bodies that hardly move within a frame, and such as go all the way.

@@ -194,10 +194,9 @@ std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMe
   return out;
 }
 
-void raiseRotaryInertia(const BodyDescription& body, BodyMechanics& mechanics) {
+void raiseRotaryInertia(const RestModel& rest, BodyMechanics& mechanics) {
   // A step that is shorter by 2.5 % is let be; moments of inertia grow by a hundredth in all at most.
   constexpr double kExcess = 1.05, kMostAdded = 0.01, kLeastShare = 0.125;
-  const RestModel rest(body, mechanics);
   BodyMechanics locked = mechanics;
   locked.turns.assign(locked.turns.size(), false);
   const double moving = rest.largestEigenvalue(locked, 1, 1);
@@ -232,6 +231,7 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
   constexpr double kLargestCost = 1.3;
 
   const RestModel rest(body, mechanics);
+  if (integrator == Integrator::explicitEuler) raiseRotaryInertia(rest, mechanics);
   const double all = rest.largestEigenvalue(mechanics, 1, 1), links = rest.largestEigenvalue(mechanics, 1, 0),
                surface = rest.largestEigenvalue(mechanics, 0, 1);
   const LowestMode mode = lowestMode(body, mechanics);

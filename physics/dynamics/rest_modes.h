@@ -8,16 +8,19 @@
 // the second the step.
 namespace medulla {
 
+class RestModel;  // rest_model.h
+
 // Raises the moments of inertia of spheres that turn faster than anything moves, until the body's stiffest mode is
 // hardly faster than with all turning locked: for a semi-implicit step, which none should shorten. A surface that holds
 // on to a light cell of a thin rim would otherwise set the step of the whole body, though nobody sees that cell's own
 // turning; where masses sit, statics and slow modes stay (Key and Beisinger 1971; Hughes, Cohen and Haroun 1978 on
 // beams and shells).
-void raiseRotaryInertia(const BodyDescription& body, BodyMechanics& mechanics);
+void raiseRotaryInertia(const RestModel& rest, BodyMechanics& mechanics);
 
 // Sets what damps `mechanics` (both relaxations, massDamping, settlingDamping) from the tissue's damping ratio, and
 // lowestFrequency, which it goes by, and returns the largest stable substep (s) of
-// the body under semi-implicit Euler with damping taken at the old velocity.
+// the body under semi-implicit Euler with damping taken at the old velocity. For explicit steps moments of inertia are
+// raised before.
 double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrator integrator);
 
 // rad/s: the lowest mode of spheres and links that deforms the body, the surface's mass riding along; 0 where none

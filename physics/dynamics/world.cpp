@@ -178,7 +178,6 @@ std::vector<BodyMechanics> mechanicsOf(const std::vector<BodyDescription>& bodie
     try {
       mechanics.push_back(bodyMechanics(body));
       mechanics.back().firstLike = static_cast<int>(found);
-      if (integrator == Integrator::explicitEuler) raiseRotaryInertia(body, mechanics.back());
       stable = std::min(stable, dampBody(body, mechanics.back(), integrator));
     } catch (const std::runtime_error& e) {
       throw std::runtime_error(fmt::format("body '{}' cannot be simulated: {}", body.name, e.what()));
@@ -203,7 +202,7 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
              const std::vector<StaticShape>& statics) {
   checkSettings(settings);
   double stable = std::numeric_limits<double>::infinity();
-  const std::vector<BodyMechanics> mechanics = mechanicsOf(bodies, settings.integrator, stable);
+  std::vector<BodyMechanics> mechanics = mechanicsOf(bodies, settings.integrator, stable);
   data_ = layOut(settings, std::move(bodies), mechanics);
   data_->stableSubstep = stable;
   // Below this a second of simulation takes over an hour: a wrong unit rather than a stiff tissue.
@@ -217,12 +216,7 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
   data_->substeps = settings.substeps > 0 ? settings.substeps : chosenSubsteps(settings, data_->bodies, stable);
   data_->substep = settings.frameDuration / data_->substeps;
   data_->keptByDrag = 1 / (1 + data_->substep * settings.ambientDrag);
-  for (std::size_t b = 0; b < mechanics.size(); ++b) {
-    const auto like = static_cast<std::size_t>(mechanics[b].firstLike);
-    data_->nodeGive.push_back(
-        like < b ? std::vector<NodeGive>(data_->nodeGive[like])
-                 : medulla::nodeGive(data_->bodies[b], mechanics[b], {data_->substeps, data_->substep}));
-  }
+  data_->mechanics = std::move(mechanics);
   layOutDeadLoads(*data_);
   layOutContact(*data_, statics);
 }
@@ -323,8 +317,15 @@ double World::lowestFrequency(int body) const {
   return data_->ranges.at(body).lowestFrequency;
 }
 
-const std::vector<NodeGive>& World::nodeGive(int body) const {
-  return data_->nodeGive.at(body);
+std::vector<std::vector<NodeGive>> World::nodeGive() const {
+  const WorldData& d = *data_;
+  std::vector<std::vector<NodeGive>> out;
+  for (std::size_t b = 0; b < d.mechanics.size(); ++b) {
+    const auto like = static_cast<std::size_t>(d.mechanics[b].firstLike);
+    out.push_back(like < b ? std::vector<NodeGive>(out[like])
+                           : medulla::nodeGive(d.bodies[b], d.mechanics[b], {d.substeps, d.substep}));
+  }
+  return out;
 }
 
 int World::dynamicNodes(int body) const {

@@ -134,11 +134,12 @@ class World {
   // tool). Throws std::runtime_error naming body, time and cause when the state stops being finite.
   std::vector<Eigen::Vector3d> advance(const Loads& loads);
 
-  void readFrame(DynamicsFrame& out) const;               // resized once and reused
-  Energies energies() const;                              // evaluates the attachments anew: not beside any other call
-  double volumeRatio(int body) const;                     // enclosed by the nodes, over rest
-  double lowestFrequency(int body) const;                 // rad/s, of what deforms at rest; 0: nothing does
-  const std::vector<NodeGive>& nodeGive(int body) const;  // per node, within one dynamics frame
+  void readFrame(DynamicsFrame& out) const;  // resized once and reused
+  Energies energies() const;                 // evaluates the attachments anew: not beside any other call
+  double volumeRatio(int body) const;        // enclosed by the nodes, over rest
+  double lowestFrequency(int body) const;    // rad/s, of what deforms at rest; 0: nothing does
+  // Per body and node, within one dynamics frame: of all at once, since it takes as long as to make the world.
+  std::vector<std::vector<NodeGive>> nodeGive() const;
   int dynamicNodes(int body) const;  // that moved by themselves in the last frame: none on a skin or asleep
   // What contact has let through so far; who overlapped before anything moved, each pair of bodies once, in order.
   PenetrationReport penetration() const;

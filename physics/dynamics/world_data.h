@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "physics/dynamics/body_mechanics.h"
 #include "physics/dynamics/contact_data.h"
 #include "physics/dynamics/identified_data.h"
 #include "physics/dynamics/point_spring.h"
@@ -373,9 +374,9 @@ struct WorldData {
   Springs springs;
   Identified identified;
   SurfaceParts surface;
-  std::vector<Rest> rest;                       // per body
-  std::vector<std::vector<NodeGive>> nodeGive;  // per body: World::nodeGive()
-  std::vector<StillPlace> stillPlace;           // per sphere; state
+  std::vector<Rest> rest;                // per body
+  std::vector<BodyMechanics> mechanics;  // per body: what it was laid out by
+  std::vector<StillPlace> stillPlace;    // per sphere; state
   Awake awake;
   std::vector<SphereDrive> drives;
   std::vector<NodeForce> deadLoads;  // body after body, in the order described
