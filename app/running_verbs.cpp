@@ -270,9 +270,10 @@ Verb addCheck(CLI::App& app) {
 
 Verb addInfo(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App* c = app.add_subcommand("info", "tell what is in a mesh, a model, a scene, a trajectory or a recording");
-  c->add_option("FILE", options->path,
-                "mesh (OBJ, OFF, STL, PLY, ...), model, scene or recording (XML), or trajectory (CSV)")
+  CLI::App* c = app.add_subcommand("info", "tell what is in a file: mesh, model, scene, motion, log or state cache");
+  c->add_option(
+       "FILE", options->path,
+       "mesh (OBJ, OFF, STL, PLY, ...), model, scene or recording (XML), trajectory or log (CSV), or state cache")
       ->required();
   const CLI::Option* unit = c->add_option("--unit", options->unit, "unit of a mesh file")
                                 ->check(CLI::IsMember(lengthUnits()))

@@ -43,6 +43,23 @@ TEST(Info, TellsOfTrajectoriesAndRecordings) {
   const TemporaryFolder folder;
   folder.write("bad.csv", "t,x\n");
   expectRefusal(runProgram({"info", folder / "bad.csv"}), 1, {"bad.csv:1", "t[s]"});
+  expectRefusal(runProgram({"info", kSource + "docs/force.png"}), 1, {"force.png: is of no kind", "a mesh, a model"});
+}
+
+TEST(Info, TellsOfWhatRunsLeave) {
+  const TemporaryFolder folder;
+  const ProgramResult run = runProgram({"replay", kSource + "scenes/gallbladder.xml", "--set", "clock.duration=0.2",
+                                        "--log", folder / "run.csv", "--cache", folder / "run.cache"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const ProgramResult log = runProgram({"info", folder / "run.csv"}),
+                      cache = runProgram({"info", folder / "run.cache"});
+  EXPECT_EQ(valueOf(log.out, "kind"), "log") << log.err;
+  EXPECT_EQ(valueOf(log.out, "rows"), "10");
+  EXPECT_EQ(valueOf(log.out, "to"), "0.2 s");
+  EXPECT_EQ(valueOf(cache.out, "kind"), "cache") << cache.err;
+  EXPECT_EQ(valueOf(cache.out, "pictures"), "6");
+  EXPECT_EQ(valueOf(cache.out, "tools"), "grasper");
+  EXPECT_EQ(valueOf(cache.out, "hash"), valueOf(run.out, "hash"));
 }
 
 TEST(Info, TellsOfMeshesWhetherAModelCanBeBuilt) {

@@ -35,7 +35,8 @@ int runCheck(const RunOptions& options);
 struct InfoOptions {
   std::string path, unit = "m";  // unit: of a mesh
 };
-// What a mesh (told by its ending), a model, a scene, a recording (by their root element) or a trajectory holds.
+// What a mesh (told by its ending), a model, a scene, a recording (by their root element), a trajectory, a log or a
+// state cache holds.
 int runInfo(const InfoOptions& options);
 
 int runReplay(const RunOptions& options);

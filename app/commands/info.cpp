@@ -5,9 +5,12 @@
 #include "app/commands/commands.h"
 #include "app/commands/mesh_notes.h"
 #include "app/enum_names.h"
+#include "app/files/input_error.h"
+#include "app/files/log_table.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/recording_file.h"
+#include "app/files/state_cache.h"
 #include "app/files/text.h"
 #include "app/files/text_file.h"
 #include "app/files/trajectory_file.h"
@@ -186,27 +189,60 @@ std::vector<Result> meshResults(const std::string& path, const std::string& unit
   return results;
 }
 
+std::vector<Result> cacheResults(const std::string& path) {
+  const CacheReader cache(path);
+  const CacheLayout& layout = cache.layout();
+  std::vector<std::string> bodies;
+  for (const CacheLayout::Body& body : layout.bodies) bodies.push_back(body.name);
+  return {{"kind", "cache", ""},
+          {"pictures", fmt::format("{}", cache.pictures()), ""},
+          {"fps", text(layout.fps), "Hz"},
+          {"bodies", joined(bodies, " "), ""},
+          {"tools", joined(layout.tools, " "), ""},
+          {"hash", fmt::format("{:016x}", cache.finalHash()), ""}};
+}
+
+std::vector<Result> logResults(const std::string& path) {
+  const LogTable log = readLog(path, true);
+  if (log.isCut) tell("{}: note: ends in the midst of a row\n", path);
+  std::vector<Result> results = {
+      {"kind", "log", ""}, {"rows", text(log.value.size()), ""}, {"columns", text(log.columns.size()), ""}};
+  if (log.value.empty()) return results;
+  results.push_back({"from", text(log.value.front()[0]), "s"});
+  results.push_back({"to", text(log.value.back()[0]), "s"});
+  return results;
+}
+
+std::vector<Result> tableResults(const std::string& path, const std::string& table) {
+  if (table.find('\0') != std::string::npos)
+    throw inputError(
+        path, 0,
+        "is of no kind that is known here, expected a mesh, a model, a scene, a trajectory, a recording, a "
+        "log or a state cache");
+  const bool isLog = table.substr(0, table.find('\n')).find(",energy.kinetic,") != std::string::npos;
+  return isLog ? logResults(path) : trajectoryResults(readTrajectory(path));
+}
+
+std::vector<Result> xmlResults(const std::string& path) {
+  const std::string root = rootElementOf(path);
+  if (root == "recording") return trajectoryResults(readRecording(readRecordingMap(path)));
+  if (root == "model") return modelResults(readModel(path));
+  RunOptions run;  // any other root is refused as no scene
+  run.scene = path;
+  return sceneResults(loadRun(run));
+}
+
+std::vector<Result> resultsOf(const InfoOptions& options) {
+  if (isMeshFile(options.path)) return meshResults(options.path, options.unit);
+  if (isCache(options.path)) return cacheResults(options.path);
+  const std::string content = readTextFile(options.path);
+  return beginsAsXml(content) ? xmlResults(options.path) : tableResults(options.path, content);
+}
+
 }  // namespace
 
 int runInfo(const InfoOptions& options) {
-  const std::string& path = options.path;
-  if (isMeshFile(path)) {
-    printResults(meshResults(path, options.unit));
-    return 0;
-  }
-  const bool table = !beginsAsXml(readTextFile(path));
-  const std::string root = table ? "" : rootElementOf(path);
-  if (table) {
-    printResults(trajectoryResults(readTrajectory(path)));
-  } else if (root == "recording") {
-    printResults(trajectoryResults(readRecording(readRecordingMap(path))));
-  } else if (root == "model") {
-    printResults(modelResults(readModel(path)));
-  } else {
-    RunOptions run;  // any other root is refused as no scene
-    run.scene = path;
-    printResults(sceneResults(loadRun(run)));
-  }
+  printResults(resultsOf(options));
   return 0;
 }
 
