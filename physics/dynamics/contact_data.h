@@ -24,6 +24,11 @@ struct PairGroup {  // four near pairs; the last group is filled up with pairs t
   Lanes gapAtList;  // m
 };
 
+// Of a triangle: its edges (k: from corner k to the next) that no other triangle has, and the corners on any such.
+struct OpenRim {
+  std::array<bool, 3> edge, corner;
+};
+
 struct StaticContactShape {
   StaticShape::Kind kind;
   Eigen::Isometry3d worldFromShape;
@@ -31,6 +36,7 @@ struct StaticContactShape {
   double radius = 0;         // m, sphere
   double rootFriction = 0;   // the friction of a pair is the product of the two sides' roots
   SurfaceTree tree;          // mesh, world frame
+  std::vector<OpenRim> rim;  // mesh, per triangle of `tree`
 };
 
 struct StaticNeighbour {
@@ -107,6 +113,7 @@ struct ContactData {
   // m, statics x spheres: where the shape is nearest to the ball at the start, if the body is held there; else NaN
   std::vector<Eigen::Vector3d> fixedAt;
   double margin = 0;    // m: pairs nearer than this are listed
+  double reach = 0;     // m: two things nearer than this are looked at, as they might touch within the substep
   double freeMove = 0;  // m: what a ball may move before the lists are made anew
 
   // Lists, and the balls' places when they were made. Pairs are chosen from those of overlapping boxes, which are wide

@@ -55,7 +55,7 @@ void addContact(WorldData& d, std::uint32_t i, std::uint32_t j, double s, double
 
 void findPairContacts(WorldData& d, double moved) {
   ContactData& c = d.contact;
-  const double reach = contactReach(d);
+  const double reach = c.reach;
   const Lanes farAtList = splat(reach + 2 * moved), near = splat(reach);
   for (const PairGroup& g : c.pairs) {
     const Lanes perhaps = isLess(g.gapAtList, farAtList);
@@ -85,7 +85,7 @@ void findContacts(WorldData& d) {
 bool outrunsContact(const WorldData& d, double time) {
   const ContactData& c = d.contact;
   if (c.mode == ContactMode::none) return false;
-  const double half = 0.5 * contactReach(d);
+  const double half = 0.5 * c.reach;
   for (std::size_t i = 0; i < c.ball.size(); ++i) {
     const Lanes v = load(d.spheres.velocity[i]) + crossProduct(load(d.spheres.angularVelocity[i]), load(c.arm[i]));
     const double farthest = half + 0.5 * c.ball[i].v[3];
@@ -94,8 +94,30 @@ bool outrunsContact(const WorldData& d, double time) {
   return false;
 }
 
+// Explicit substeps are as long as tissue allows, a whole frame where nothing gives: what moves faster than kFastest is
+// looked at from as far away as it may close within one, and does not pass what it meets. Lists then go further, too.
+static void foreseeReach(WorldData& d) {
+  constexpr double kMost = 100;  // m/s: beyond, all would be near all
+  ContactData& c = d.contact;
+  Lanes squared = splat(0);
+  for (std::size_t i = 0; i < d.spheres.velocity.size(); i += 4) {
+    const Lanes3 v = gatherFour(d.spheres.velocity, i);
+    squared = larger(squared, dot(v, v));
+  }
+  const double fastest = std::sqrt(std::max(std::max(squared[0], squared[1]), std::max(squared[2], squared[3])));
+  const double closing = std::min(2 * fastest, kMost), least = kFastest * d.substep;
+  c.reach = std::max(least, closing * d.substep);
+  const bool isFast = c.reach > least;
+  const double needed = 2 * c.freeMove + (isFast ? 1.5 * c.reach : least);
+  const bool isShort = isFast && c.reach > c.margin - 2 * c.freeMove, isLong = c.margin > 4 * needed;
+  if (!isShort && !isLong) return;
+  c.margin = needed;
+  c.listsAreOld = true;
+}
+
 void resolveContacts(WorldData& d) {
   if (d.contact.mode == ContactMode::none) return;
+  foreseeReach(d);
   findContacts(d);
   solveContacts(d);
 }

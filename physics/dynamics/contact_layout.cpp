@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <stdexcept>
 
 #include "physics/dynamics/contact_stages.h"
 #include "physics/dynamics/identified_mechanics.h"
 #include "physics/dynamics/rigid_support.h"
+#include "physics/model/mesh_topology.h"
 #include "physics/sort_unique.h"
 
 namespace medulla {
@@ -45,7 +47,8 @@ void addBalls(WorldData& d) {
     }
   }
   c.freeMove = 0.5 * kMarginOverRadius * sum / std::max(1, count);
-  c.margin = 2 * c.freeMove + kFastest * d.substep;
+  c.reach = kFastest * d.substep;
+  c.margin = 2 * c.freeMove + c.reach;
   c.ball = c.restBall;
   c.arm.resize(c.ball.size());
   c.spheres.resize(d.spheres.position.size());
@@ -102,6 +105,30 @@ void decideWhoCollides(WorldData& d) {
   }
 }
 
+// Corners in one place are one, whatever a file has numbered them.
+std::vector<OpenRim> openRims(const SurfaceTree& tree) {
+  std::map<std::array<double, 3>, int> places;
+  TriangleMesh mesh;
+  for (const std::array<Vector3d, 3>& t : tree.corners) {
+    std::array<int, 3>& triangle = mesh.triangles.emplace_back();
+    for (int k = 0; k < 3; ++k)
+      triangle[k] = places.try_emplace({t[k].x(), t[k].y(), t[k].z()}, static_cast<int>(places.size())).first->second;
+  }
+  mesh.vertices.resize(places.size());
+  const std::vector<std::array<int, 3>> onEdges = trianglesOnEdges(mesh);
+  std::vector<bool> isOpen(places.size(), false);
+  for (std::size_t t = 0; t < onEdges.size(); ++t)
+    for (int k = 0; k < 3; ++k)
+      if (onEdges[t][k] == 1) isOpen[mesh.triangles[t][k]] = isOpen[mesh.triangles[t][(k + 1) % 3]] = true;
+  std::vector<OpenRim> out(onEdges.size());
+  for (std::size_t t = 0; t < out.size(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      out[t].edge[k] = onEdges[t][k] == 1;
+      out[t].corner[k] = isOpen[mesh.triangles[t][k]];
+    }
+  return out;
+}
+
 void addStatics(ContactData& c, const std::vector<StaticShape>& statics) {
   for (const StaticShape& s : statics) {
     const bool sizes = s.kind != StaticShape::Kind::box || s.size.minCoeff() > 0;
@@ -120,6 +147,7 @@ void addStatics(ContactData& c, const std::vector<StaticShape>& statics) {
     TriangleMesh inWorld = s.mesh;
     for (Vector3d& v : inWorld.vertices) v = s.worldFromShape * v;
     out.tree = makeSurfaceTree(inWorld);
+    out.rim = openRims(out.tree);
   }
 }
 

@@ -45,11 +45,8 @@ void solveContacts(WorldData& d);  // contact_solve.cpp: impulses on spheres
 // Gaps of a group's four pairs, at ContactData::ball; s and t are 0 on balls.
 ConeContact closestOfPairs(const ContactData& c, const PairGroup& g);
 
-// How far apart two things may be to be looked at: what closes within one whole substep at this speed (m/s).
+// m/s: what closes within one whole substep at this speed is looked at, in any case.
 constexpr double kFastest = 2;
-inline double contactReach(const WorldData& d) {
-  return kFastest * (d.settings.frameDuration / d.substeps);
-}
 
 // contact_find.cpp: whether a ball moves so far in `time` (s) at the present velocities that it might pass what it
 // touches before anything is looked for again.

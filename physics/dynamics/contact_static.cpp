@@ -64,10 +64,22 @@ struct Foot {
   double distance = std::numeric_limits<double>::infinity();
   double height = 0;  // over the triangle's plane
   Vector3d point, faceNormal;
+  bool onRim = false;  // where the surface ends: nothing is behind it there
 };
 
-Foot footOn(const SurfaceTree& tree, int triangle, const Vector3d& p) {
-  const std::array<Vector3d, 3>& t = tree.corners[triangle];
+bool isOnRim(const std::array<Vector3d, 3>& t, const OpenRim& rim, const Vector3d& point) {
+  constexpr double kSame = 1e-18;  // squared, of an edge's length
+  for (int k = 0; k < 3; ++k) {
+    const Vector3d edge = t[(k + 1) % 3] - t[k], way = point - t[k];
+    const double same = kSame * edge.squaredNorm();
+    if (rim.corner[k] && way.squaredNorm() <= same) return true;
+    if (rim.edge[k] && way.cross(edge).squaredNorm() <= same * edge.squaredNorm()) return true;
+  }
+  return false;
+}
+
+Foot footOn(const StaticContactShape& shape, int triangle, const Vector3d& p) {
+  const std::array<Vector3d, 3>& t = shape.tree.corners[triangle];
   Foot f;
   f.point = closestOnTriangle(p, t);
   f.distance = (p - f.point).norm();
@@ -75,6 +87,7 @@ Foot footOn(const SurfaceTree& tree, int triangle, const Vector3d& p) {
   const double area = across.norm();
   f.faceNormal = area > 0 ? Vector3d(across / area) : Vector3d::Zero();
   f.height = f.faceNormal.dot(p - f.point);
+  f.onRim = isOnRim(t, shape.rim[triangle], f.point);
   return f;
 }
 
@@ -87,25 +100,25 @@ bool isNearer(const Foot& a, const Foot& b) {
 }
 
 Nearest contactAt(const Foot& f, const Vector3d& p) {
-  const double side = f.height < 0 ? -1 : 1;
+  const double side = f.height < 0 && !f.onRim ? -1 : 1;
   if (f.distance < 1e-12) return {0, f.faceNormal};
   return {side * f.distance, side / f.distance * (p - f.point)};
 }
 
 // Triangles come with their distance of some time ago; meanwhile the ball has moved by at most `moved`.
-Touches touchesOf(const SurfaceTree& tree, const TriangleDistance* begin, const TriangleDistance* end,
+Touches touchesOf(const StaticContactShape& shape, const TriangleDistance* begin, const TriangleDistance* end,
                   const Vector3d& p, double within, double moved) {
   Foot nearest;
   for (const TriangleDistance* t = begin; t != end; ++t) {
     if (t->distance - moved > std::min(within, nearest.distance)) break;
-    const Foot f = footOn(tree, t->triangle, p);
+    const Foot f = footOn(shape, t->triangle, p);
     if (isNearer(f, nearest)) nearest = f;
   }
   Touches touches;
   if (!(nearest.distance < within)) return touches;
   touches.add(contactAt(nearest, p));
   for (const TriangleDistance* t = begin; t != end && t->distance - moved < within; ++t) {
-    const Foot f = footOn(tree, t->triangle, p);
+    const Foot f = footOn(shape, t->triangle, p);
     if (f.distance < within && f.height > (1 - 1e-9) * f.distance) touches.add(contactAt(f, p));
   }
   return touches;
@@ -172,7 +185,7 @@ void listStaticNeighbours(WorldData& d) {
 
 void findStaticContacts(WorldData& d, double moved) {
   ContactData& c = d.contact;
-  const double reach = contactReach(d);
+  const double reach = c.reach;
   for (const StaticNeighbour& n : c.staticNeighbours) {
     if (!(n.gapAtList - moved < reach)) continue;
     const StaticContactShape& shape = c.statics[n.shape];
@@ -184,7 +197,7 @@ void findStaticContacts(WorldData& d, double moved) {
       continue;
     }
     const TriangleDistance* near = c.nearTriangles.data();
-    const Touches touches = touchesOf(shape.tree, near + n.firstTriangle, near + n.endTriangle, p, within, moved);
+    const Touches touches = touchesOf(shape, near + n.firstTriangle, near + n.endTriangle, p, within, moved);
     for (int k = 0; k < touches.count; ++k) addContact(d, n, touches.at[k], k);
   }
 }
