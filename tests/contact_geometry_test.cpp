@@ -236,6 +236,28 @@ TEST(StaticShapes, ABallInAGrooveRestsOnBothSides) {
   EXPECT_NEAR(rest.y(), (0.01 - depth) * std::numbers::sqrt2, 1e-7);
 }
 
+// A surface that ends holds up nothing beyond its rim: a ball that rolls over it falls off, and is not lifted.
+TEST(StaticShapes, ABallRollsOffTheRimOfAnOpenMesh) {
+  StaticShape mesh;
+  mesh.kind = StaticShape::Kind::mesh;
+  mesh.mesh.vertices = {{-1, 0, -1}, {-1, 0, 1}, {0, 0, 1}, {0, 0, -1}, {0, 0, 1}, {-1, 0, -1}};  // corners twice
+  mesh.mesh.triangles = {{0, 1, 2}, {5, 4, 3}};
+  WorldSettings s;
+  s.contact = ContactMode::balls;
+  s.frameDuration = 0.001;
+  s.substeps = 1;
+  World world(s, {synthetic::ball("a", 0.01, {-0.02, 0.0101, 0.3}, 0.5)}, {mesh});
+  synthetic::throwBody(world, 0, {0.2, 0, 0});
+  double highest = 0;
+  for (int k = 0; k < 400; ++k) {
+    world.advance({});
+    highest = std::max(highest, double(world.data().spheres.position[0].v[1]));
+  }
+  EXPECT_LT(highest, 0.0102);
+  EXPECT_LT(world.data().spheres.position[0].v[1], -0.1);
+  EXPECT_LT(world.penetration().statics, 10);
+}
+
 // A wall that is wound inside out keeps what is in it, at 1 m/s and from any side.
 TEST(StaticShapes, AnInsideOutWallKeepsABallIn) {
   StaticShape wall;

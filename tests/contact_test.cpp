@@ -431,6 +431,25 @@ TEST(Contact, NothingPassesAtAMetrePerSecond) {
   }
 }
 
+// A single ball gives nowhere: a substep is a frame, in which it falls farther than what it meets is thick.
+TEST(Contact, AFastBallPassesNothingInLongSubsteps) {
+  StaticShape box;
+  box.kind = StaticShape::Kind::box;
+  box.size = {1, 0.01, 1};
+  for (const double speed : {1.0, 6.0, 20.0}) {
+    World onBox(settings(ContactMode::balls, 0.02), {ball("thrown", 0.02, {0, 1.7, 0})}, {box});
+    BodyDescription held = ball("held", 0.02, Vector3d::Zero());
+    held.fixed = {{0}};
+    World onBall(settings(ContactMode::balls, 0.02), {held, ball("thrown", 0.02, {0, 1.7, 0})});
+    throwBody(onBox, 0, {0, -speed, 0});
+    throwBody(onBall, 1, {0, -speed, 0});
+    advance(onBox, 100);
+    advance(onBall, 100);
+    EXPECT_GT(std::min(positionOf(onBox, 0).y(), positionOf(onBall, 1).y()), 0) << speed;
+    EXPECT_LT(std::max(onBox.penetration().statics, onBall.penetration().bodies), 10) << speed;
+  }
+}
+
 // Rods and lumps fall into a bowl. Nothing drives them there: each contact takes energy, and so does every link.
 TEST(Contact, AHeapInABowlComesToRest) {
   StaticShape bowl;

@@ -74,6 +74,33 @@ TEST(Link, BendingCostsEnergyWhateverTheTwist) {
   }
 }
 
+// An end that folds beyond 116 degrees, of a link that is bent at its other end: what it does goes on without a jump.
+TEST(Link, MomentsDoNotJumpAtTheFold) {
+  constexpr double kFold = 2.028757838110434, kBeside = 1e-7;  // rad; tan(fold) = -fold
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(2, 0.03, 0.01, 4, 6)), 5e3);
+  auto model = std::make_shared<SoftBodyModel>(*b.model);
+  for (LinkSection& s : model->links[0].sections) s.bendingMomentU *= 1.7;
+  b.model = model;
+  b.surface = SurfaceMode::skin;
+  b.tissue.damping = 0;
+  const auto torquesAt = [&b](double angle, double twist) {
+    World world(weightless(), {b});
+    WorldData& d = world.data();
+    const Vector3d line = (vectorOf(d.spheres.position[1]) - vectorOf(d.spheres.position[0])).normalized();
+    const Vector3d across = line.cross(Vector3d(0.3, 1, 0.2)).normalized();
+    turnBy(d, 0, 0.9 * line.cross(across) + 0.3 * across);
+    turnBy(d, 1, twist * line);
+    turnBy(d, 1, angle * across);
+    runStage(d, evaluateForces);
+    return std::pair(vectorOf(d.spheres.torque[0]), vectorOf(d.spheres.torque[1]));
+  };
+  for (const double twist : {0.0, 0.7}) {
+    const auto before = torquesAt(kFold - kBeside, twist), after = torquesAt(kFold + kBeside, twist);
+    EXPECT_LT((after.first - before.first).norm(), 1e-5 * before.first.norm());
+    EXPECT_LT((after.second - before.second).norm(), 1e-5 * before.second.norm());
+  }
+}
+
 TEST(Attachment, ForcesOnNodesAndSpheresAreMinusTheEnergyGradient) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     World world = bareChain(4, SurfaceMode::full, 0);

@@ -29,6 +29,10 @@ constexpr double kFoldAngle = 2.028757838110434;
 constexpr double kFoldCosine = -0.4421205929549983;
 constexpr double kFoldValue = 2.261826334114652;  // -1 / kFoldCosine
 
+// 75 degrees, and f there: from here on what both ends of a link share of their flexions levels off (link_force.cpp).
+constexpr double kLevelFrom = 1.3089969389957472;
+constexpr double kLevelValue = 1.3551733511720077;
+
 // From cos(theta), theta in 0..180 degrees. With x = sin^2(theta/2), w = cos(theta/2): f = asin(sqrt x) / (sqrt x w),
 // and h without cancellation where theta is small: (2 - 1/(1+w) - r (1-2x)) / (4 w^3). Lanes do not influence each
 // other.

@@ -30,6 +30,7 @@ void startDrivenBodies(WorldData& d) {
   for (const SphereDrive& drive : d.drives) {
     const BodyRange& r = d.ranges[drive.body];
     d.spheres.velocity[drive.sphere] = drive.velocity;
+    d.ledger[drive.body].begun = false;
     for (const int i : spheresOf(r))
       if (d.spheres.groups[i / 4].inverseMass[i % 4] > 0) d.spheres.velocity[i] = drive.velocity;
     for (const int i : r.node)

@@ -82,10 +82,10 @@ enum class Verdict { passes, slows, rests, fails };
 // J: of a body, or of an island of bodies that push each other, in the balance of its first.
 struct EnergyBalance {
   double kineticBefore = 0, elasticBefore = 0, kinetic = 0, elastic = 0;
-  double given = 0;   // by gravity, loads, contacts and paths
-  double chords = 0;  // of velocities across the tangents, because free bodies turn
-  double mass = 0;    // kg
-  double most = 0;    // WorldData::mostEnergy
+  double given = 0;                       // by gravity, loads, contacts and paths
+  double chords = 0;                      // of velocities across the tangents, because free bodies turn
+  double mass = 0;                        // kg
+  double most = 0, due = 0, mostDue = 0;  // EnergyLedger's, before
 };
 
 struct ImplicitData {

@@ -347,9 +347,9 @@ std::unique_ptr<WorldData> layOut(const WorldSettings& settings, std::vector<Bod
   layOutIdentified(d, mechanics);
   addSprings(d, mechanics);
   for (std::size_t b = 0; b < d.bodies.size(); ++b) addDrives(d, static_cast<int>(b));
+  d.ledger.resize(d.bodies.size());
   startDrivenBodies(d);
   listSlots(d);
-  d.mostEnergy.resize(d.bodies.size(), 0);
   d.creep.bodies.resize(d.bodies.size(), false);
   layOutRest(d);
   layOutSurfaceParts(d, mechanics);

@@ -124,6 +124,10 @@ MEDULLA_INLINE Lanes3 flexionGradient(const LinkEnd& e, const Flexion& m) {
               fma(e.angle.value * m.a, e.u, (e.angle.value * m.b) * e.v));
 }
 
+MEDULLA_INLINE Lanes isFar(const LinkEnd& e0, const LinkEnd& e1) {
+  return isLess(splat(kLevelValue), larger(e0.angle.value, e1.angle.value));
+}
+
 MEDULLA_INLINE Flexion damped(const Flexion& q, const Flexion& rate, Lanes relaxation) {
   return {fma(relaxation, rate.a, q.a), fma(relaxation, rate.b, q.b)};
 }
@@ -165,6 +169,93 @@ MEDULLA_INLINE Bending bend(const LinkGroup& l, Lanes twist, const Flexion& q0, 
   return b;
 }
 
+// Towards kFoldAngle, from which on flexions fall back as they rose, the coupling and the difference of the two
+// stiffnesses see less and less of them: of the length r of (a, b) no more than r - (r - kLevelFrom)^2 / 2 (kFoldAngle
+// - kLevelFrom), whose slope is 0 there. Else their moments would jump at the fold, and an end of a bent link that
+// comes to rest in such a dent is none that any step settles. A level that fades faster would stiffen links many times.
+struct Level {
+  Lanes share, slope;  // of a flexion that is seen; what d(seen) has of (q.dq) q besides share dq
+};
+Level levelOf(const Flexion& still) {
+  const Lanes one = splat(1), squared = fma(still.a, still.a, still.b * still.b), length = squareRoot(squared);
+  constexpr double kWidth = kFoldAngle - kLevelFrom;
+  const Lanes over = larger(length - splat(kLevelFrom), splat(0)), far = isLess(splat(0), over);
+  const Lanes safe = select(far, length, one), rise = larger(fnma(splat(1 / kWidth), over, one), splat(0));
+  const Lanes share = select(far, fnma(splat(0.5 / kWidth) * over / safe, over, one), one);
+  return {share, masked(far, (rise - share) / (safe * safe))};
+}
+
+// By what the seen flexion has as derivatives, or, of a change, what is seen of it: the same, being symmetric.
+Flexion seenOf(const Level& level, const Flexion& still, const Flexion& x) {
+  const Lanes along = level.slope * fma(still.a, x.a, still.b * x.b);
+  return {fma(along, still.a, level.share * x.a), fma(along, still.b, level.share * x.b)};
+}
+
+// What the coupling and the differences give, in the middle's axes.
+Flexion sharedMoments(const LinkGroup& l, Lanes ownV, Lanes ownU, const Flexion& own, const Flexion& other) {
+  const Lanes difference = splat(0.5) * (ownV - ownU);
+  return {fma(difference, own.a, l.coupleV * other.a), fnma(difference, own.b, l.coupleU * other.b)};
+}
+
+struct SharedBending {
+  Flexion still0, still1, moments0, moments1;  // in the middle's axes
+  Lanes cosine, sine;
+};
+SharedBending shareBending(const LinkGroup& l, Lanes twist, const Flexion& q0, const Flexion& q1, const Flexion& still0,
+                           const Flexion& still1) {
+  SharedBending b;
+  cosineSine(splat(0.5) * l.beam * twist, b.cosine, b.sine);
+  const Lanes back = splat(0) - b.sine;
+  b.still0 = turned(still0, b.cosine, b.sine);
+  b.still1 = turned(still1, b.cosine, back);
+  const Flexion m0 = turned(q0, b.cosine, b.sine), m1 = turned(q1, b.cosine, back);
+  b.moments0 = sharedMoments(l, l.flexionV0, l.flexionU0, m0, m1);
+  b.moments1 = sharedMoments(l, l.flexionV1, l.flexionU1, m1, m0);
+  return b;
+}
+
+Flexion scaled(Lanes by, const Flexion& q) {
+  return {by * q.a, by * q.b};
+}
+Flexion sumOf(const Flexion& p, const Flexion& q) {
+  return {p.a + q.a, p.b + q.b};
+}
+Flexion selected(Lanes which, const Flexion& p, const Flexion& q) {
+  return {select(which, p.a, q.a), select(which, p.b, q.b)};
+}
+
+// Instead of bend(), in the lanes `far`.
+[[gnu::noinline]] void bendFar(const LinkGroup& l, Lanes twist, const Flexion& q0, const Flexion& q1,
+                               const Flexion& still0, const Flexion& still1, Lanes far, Bending& b) {
+  const Level level0 = levelOf(still0), level1 = levelOf(still1);
+  const auto seen = [](const Level& level, const Flexion& still, const Flexion& q) {
+    return sumOf(scaled(level.share, still), seenOf(level, still, {q.a - still.a, q.b - still.b}));
+  };
+  const SharedBending shared = shareBending(l, twist, seen(level0, still0, q0), seen(level1, still1, q1),
+                                            scaled(level0.share, still0), scaled(level1.share, still1));
+  const auto moments = [](const Level& level, const Flexion& still, const Flexion& q, Lanes both, const Flexion& m) {
+    return sumOf(scaled(splat(0.5) * both, q), seenOf(level, still, m));
+  };
+  const Lanes back = splat(0) - shared.sine;
+  b.still0 = selected(far, shared.still0, b.still0);
+  b.still1 = selected(far, shared.still1, b.still1);
+  b.moments0 = selected(
+      far, moments(level0, still0, q0, l.flexionU0 + l.flexionV0, turned(shared.moments0, shared.cosine, back)),
+      b.moments0);
+  b.moments1 = selected(
+      far, moments(level1, still1, q1, l.flexionU1 + l.flexionV1, turned(shared.moments1, shared.cosine, shared.sine)),
+      b.moments1);
+}
+
+// Twice the energy of the flexions.
+Lanes bendingEnergy(const LinkGroup& l, Lanes twist, const Flexion& q0, const Flexion& q1) {
+  const Flexion seen0 = scaled(levelOf(q0).share, q0), seen1 = scaled(levelOf(q1).share, q1);
+  const SharedBending b = shareBending(l, twist, seen0, seen1, seen0, seen1);
+  const auto product = [](const Flexion& p, const Flexion& q) { return fma(p.a, q.a, p.b * q.b); };
+  const Lanes own = fma(l.flexionU0 + l.flexionV0, product(q0, q0), (l.flexionU1 + l.flexionV1) * product(q1, q1));
+  return fma(splat(0.5), own, product(b.still0, b.moments0) + product(b.still1, b.moments1));
+}
+
 // Derivative of that energy by the twist: d A0 = B0 / 2, d B0 = -A0 / 2, and end 1's the other way round.
 MEDULLA_INLINE Lanes bendingTorque(const LinkGroup& l, const Flexion& q0, const Flexion& q1) {
   const Lanes own = (l.flexionV0 - l.flexionU0) * (q0.a * q0.b) - (l.flexionV1 - l.flexionU1) * (q1.a * q1.b);
@@ -172,8 +263,7 @@ MEDULLA_INLINE Lanes bendingTorque(const LinkGroup& l, const Flexion& q0, const 
 }
 
 // Beyond kFoldAngle the mean of the two stiffnesses acts on what is left to 180 degrees instead of on the flexion:
-// energy k (g^2 - (a^2 + b^2) / 2) with g = kFoldAngle, in value and slope the same there, k g^2 at 180. The difference
-// of the stiffnesses and the coupling are left as they are.
+// energy k (g^2 - (a^2 + b^2) / 2) with g = kFoldAngle, in value and slope the same there, k g^2 at 180.
 MEDULLA_INLINE void fold(const LinkEnd& e, const Flexion& still, Lanes stiffnesses, Flexion& moments) {
   const Lanes both = masked(e.angle.folded, stiffnesses);
   moments.a = fnma(both, still.a, moments.a);
@@ -226,6 +316,8 @@ MEDULLA_INLINE void evaluate(const LinkGroup& link, const Spheres& spheres, Quad
   const Flexion q0 = damped(still0, flexionRate(m.end0, e.nRate, e.s0.angularVelocity, m.n), link.relaxation);
   const Flexion q1 = damped(still1, flexionRate(m.end1, e.nRate, e.s1.angularVelocity, m.n), link.relaxation);
   Bending b = bend(link, m.twist, q0, q1, still0, still1);
+  const Lanes far = isFar(m.end0, m.end1);
+  if (any(far)) bendFar(link, m.twist, q0, q1, still0, still1, far, b);
   fold(m.end0, still0, link.flexionU0 + link.flexionV0, b.moments0);
   fold(m.end1, still1, link.flexionU1 + link.flexionV1, b.moments1);
   const Lanes3 bend0 = flexionGradient(m.end0, b.moments0), bend1 = flexionGradient(m.end1, b.moments1);
@@ -363,9 +455,7 @@ double linkEnergy(const WorldData& d, std::vector<double>* ofBodies) {
         measure(link, gatherSpheres(d.spheres, link.sphere0, link.restArm0, link.hasArms),
                 gatherSpheres(d.spheres, link.sphere1, link.restArm1, link.hasArms), load(d.links.unwoundTwist[g]));
     const Flexion q0 = flexionOf(m.end0), q1 = flexionOf(m.end1);
-    const Bending b = bend(link, m.twist, q0, q1, q0, q1);
-    const Flexion &m0 = b.moments0, &m1 = b.moments1;
-    const Lanes twice = q0.a * m0.a + q0.b * m0.b + q1.a * m1.a + q1.b * m1.b + link.torsion * m.twist * m.twist;
+    const Lanes twice = bendingEnergy(link, m.twist, q0, q1) + link.torsion * m.twist * m.twist;
     const int lanes = std::min(4, d.links.count - 4 * static_cast<int>(g));
     for (int lane = 0; lane < lanes; ++lane) {
       const double own = energyOf(link, m, q0, q1, twice, lane);

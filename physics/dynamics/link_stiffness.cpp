@@ -21,6 +21,7 @@ MEDULLA_INLINE Lanes3 lineGradient(const LinkPose& f, const Lanes3& byN) {
 // d(f n.u) and d(f n.v) by n: link_force.cpp, flexionRate.
 struct EndGradients {
   Lanes3 a, b;
+  Lanes seen;  // of a change of the flexion's length, by the coupling: link_force.cpp, Level
 };
 
 EndGradients endGradients(const LinkGroup& g, const Spheres& s, const std::uint32_t* i, const Lanes3& n) {
@@ -29,17 +30,23 @@ EndGradients endGradients(const LinkGroup& g, const Spheres& s, const std::uint3
   const Rotation r = rotationOf(q, w);
   const Lanes3 t = rotate(r, g.restT), u = rotate(r, g.restU), v = cross(t, u);
   const AngleOverSine angle = angleOverSine(dot(n, t));
-  return {fnma(angle.slope * dot(n, u), t, angle.value * u), fnma(angle.slope * dot(n, v), t, angle.value * v)};
+  const Lanes along = dot(n, u), across = dot(n, v), one = splat(1);
+  const Lanes length = angle.value * squareRoot(fma(along, along, across * across));
+  constexpr double kWidth = kFoldAngle - kLevelFrom;
+  const Lanes over = larger(length - splat(kLevelFrom), splat(0));
+  return {fnma(angle.slope * along, t, angle.value * u), fnma(angle.slope * across, t, angle.value * v),
+          larger(fnma(splat(1 / kWidth), over, one), splat(0))};
 }
 
 // Gradients of an end's two flexions: by the line, and by the turning of its own sphere.
 struct EndRows {
   Lanes3 lineA, lineB, turnA, turnB;
+  Lanes seen;
 };
 
 MEDULLA_INLINE EndRows endRows(const LinkGroup& g, const Spheres& s, const std::uint32_t* i, const LinkPose& f) {
   const EndGradients e = endGradients(g, s, i, f.n);
-  return {lineGradient(f, e.a), lineGradient(f, e.b), cross(e.a, f.n), cross(e.b, f.n)};
+  return {lineGradient(f, e.a), lineGradient(f, e.b), cross(e.a, f.n), cross(e.b, f.n), e.seen};
 }
 
 // Slope and value of the tension, as in link_force.cpp: the bar's share of it is the beam's.
@@ -53,7 +60,7 @@ void elongationLaw(const LinkGroup& g, Lanes length, Lanes& slope, Lanes& tensio
 MEDULLA_INLINE EndRows turned(const EndRows& e, Lanes cosine, Lanes sine) {
   const auto a = [&](const Lanes3& ofA, const Lanes3& ofB) { return fma(sine, ofB, cosine * ofA); };
   const auto b = [&](const Lanes3& ofA, const Lanes3& ofB) { return fnma(sine, ofA, cosine * ofB); };
-  return {a(e.lineA, e.lineB), b(e.lineA, e.lineB), a(e.turnA, e.turnB), b(e.turnA, e.turnB)};
+  return {a(e.lineA, e.lineB), b(e.lineA, e.lineB), a(e.turnA, e.turnB), b(e.turnA, e.turnB), e.seen};
 }
 
 // What flexions and torsion add.
@@ -63,7 +70,8 @@ MEDULLA_INLINE void addTurning(const LinkGroup& g, const LinkPose& f, const Sphe
   const EndRows e0 = turned(endRows(g, s, g.sphere0, f), cosine, sine),
                 e1 = turned(endRows(g, s, g.sphere1, f), cosine, splat(0) - sine);
   const Lanes a0 = damped * g.flexionV0, b0 = damped * g.flexionU0, a1 = damped * g.flexionV1,
-              b1 = damped * g.flexionU1, ca = damped * g.coupleV, cb = damped * g.coupleU, twist = damped * g.torsion;
+              b1 = damped * g.flexionU1, twist = damped * g.torsion, seen = damped * (e0.seen * e1.seen),
+              ca = seen * g.coupleV, cb = seen * g.coupleU;
   const Lanes3 ofA0 = fma(ca, e1.lineA, a0 * e0.lineA), ofB0 = fma(cb, e1.lineB, b0 * e0.lineB);
   const Lanes3 ofA1 = fma(ca, e0.lineA, a1 * e1.lineA), ofB1 = fma(cb, e0.lineB, b1 * e1.lineB);
   const Lanes3 lineTwist = lineGradient(f, f.spinLever0 - f.spinLever1), ofTwist = twist * lineTwist;

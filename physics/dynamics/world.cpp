@@ -392,7 +392,8 @@ std::uint64_t World::stateHash() const {
       for (const Lanes3& column : *columns)
         for (int lane = 0; lane < 4; ++lane) add(quadOf(vectorOf(column, lane)), 3);
   if (d.settings.integrator == Integrator::implicit)
-    for (const double most : d.mostEnergy) hash.add(most);
+    for (const EnergyLedger& l : d.ledger)
+      for (const double energy : {l.most, l.due, l.mostDue}) hash.add(energy);
   for (const Rest& r : d.rest) hash.add(r.asleep ? -1.0 : r.stillFrames);
   for (const StillPlace& place : d.stillPlace) {
     add(place.position, 3);

@@ -314,6 +314,14 @@ struct StillPlace {  // where a sphere was at the first frame of Rest::stillFram
   Quad position, orientation;
 };
 
+// J, kinetic and elastic; state. `due` is what a body had at first and all that it was given since: with what it has
+// lost it has no more. `begun` is false before its first step.
+struct EnergyLedger {
+  double most = 0;  // at the beginning of any step so far
+  double due = 0, mostDue = 0;
+  bool begun = false;
+};
+
 // What a stage runs over: all that belongs to some bodies awake, in the arrays' order. Up to the contacts, a substep
 // takes one batch after the other through all its stages: a world outgrows a core's own cache, and each stage would
 // fetch everything anew.
@@ -383,7 +391,7 @@ struct WorldData {
   SkinLoads skinLoads;
   ContactData contact;
   std::vector<std::shared_ptr<ImplicitData>> implicit;  // per halving of the step; made when it is first needed
-  std::vector<double> mostEnergy;  // J, per body: kinetic and elastic, at the beginning of any implicit step so far
+  std::vector<EnergyLedger> ledger;                     // per body; of implicit steps
   CreepReport creep;
   bool creepsNow = false;  // some body, in the present substep
 
