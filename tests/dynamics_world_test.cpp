@@ -143,6 +143,20 @@ TEST(World, StableAtTheEstimateAndUnstableWellAbove) {
   }
 }
 
+// Each body by its own: one that can take any step asks for nothing, damped or not.
+TEST(World, UndampedBodiesAskForShorterSubsteps) {
+  const auto share = [](const std::vector<BodyDescription>& bodies) {
+    WorldSettings settings;
+    settings.frameDuration = 0.5;  // of many substeps
+    const World world(settings, bodies);
+    return world.substep() / world.stableSubstep();
+  };
+  EXPECT_NEAR(share({tube(6e3, 0.1)}), 0.8, 0.01);
+  EXPECT_NEAR(share({tube(6e3, 0)}), 0.6, 0.01);
+  BodyDescription soft = tube(6, 0);
+  EXPECT_NEAR(share({tube(6e3, 0.1), soft}), 0.8, 0.01);
+}
+
 TEST(World, ABlowUpNamesBodyTimeAndCause) {
   WorldSettings settings;
   settings.substeps = 1;

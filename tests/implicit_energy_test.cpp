@@ -104,6 +104,23 @@ TEST(ImplicitEnergy, WhatFoldsGainsNoMoreThanOrderTwoSwings) {
   }
 }
 
+// What a contact hands over is in the other's account when they part: nobody is held back for what he was given.
+TEST(ImplicitEnergy, BallsThatHaveMetAndPartedTakeWholeSteps) {
+  for (const double lightness : {1.0, 0.3}) {
+    WorldSettings settings = settingsOf({LinkModel::beam, 2, 0.005, 0});
+    settings.contact = ContactMode::balls;
+    settings.gravity.setZero();
+    World world(settings, {synthetic::ball("thrown", 0.01, Vector3d::Zero()),
+                           synthetic::ball("hit", lightness * 0.01, {0.03, 0, 0})});
+    synthetic::throwBody(world, 0, {0.2, 0, 0});
+    for (int k = 0; k < 100; ++k) world.advance({});
+    EXPECT_GT(world.data().spheres.velocity[1].v[0], 0.05);
+    world.data().implicit.clear();
+    for (int k = 0; k < 20; ++k) world.advance({});
+    EXPECT_EQ(world.data().implicit.size(), 1) << "steps of other lengths, or of one stage";
+  }
+}
+
 // A contact that pushes hands energy on: what it joins is judged together.
 TEST(ImplicitEnergy, WhatPushesAFailingBodyCreepsWithIt) {
   const Failing f{LinkModel::beam, 1, 0.02, 117};

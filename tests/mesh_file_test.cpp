@@ -76,7 +76,7 @@ TEST(ObjReader, ConcavePolygonsAreCutWithoutAFold) {
     }
     double area = 0, sum = 0;
     for (int k = 0; k < kCorners; ++k) area += corners[k].cross(corners[(k + 1) % kCorners]).z();
-    const TriangleMesh mesh = parseObj(face + "\n" + vertices, "a.obj");
+    const TriangleMesh mesh = parseObj(fmt::format("{}\n{}", face, vertices), "a.obj");
     ASSERT_EQ(mesh.triangles.size(), kCorners - 2u);
     for (const auto& [a, b, c] : mesh.triangles) {
       const double part = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).z();

@@ -112,8 +112,6 @@ struct ContactData {
   std::vector<StaticContactShape> statics;
   // m, statics x spheres: where the shape is nearest to the ball at the start, if the body is held there; else NaN
   std::vector<Eigen::Vector3d> fixedAt;
-  double margin = 0;    // m: pairs nearer than this are listed
-  double reach = 0;     // m: two things nearer than this are looked at, as they might touch within the substep
   double freeMove = 0;  // m: what a ball may move before the lists are made anew
 
   // Lists, and the balls' places when they were made. Pairs are chosen from those of overlapping boxes, which are wide
@@ -140,7 +138,9 @@ struct ContactData {
   // Per sphere, of the last substep with loads: what contacts made of its momenta; the loads of the next count on it.
   std::vector<MomentumChange> change;
   std::vector<HeldFriction> held;  // of implicit steps: of every contact that pushed in the last one, likewise
-  bool listsAreOld = true;         // whatever the balls have moved: bodies fell asleep or woke, or none yet
+  double reach = 0;         // m: two things nearer than this are looked at, as they might touch within the substep
+  double margin = 0;        // m: pairs nearer than this are listed
+  bool listsAreOld = true;  // whatever the balls have moved: bodies fell asleep or woke, or none yet
 
   PenetrationReport penetration;
   std::vector<BodyOverlap> startOverlaps;

@@ -101,7 +101,8 @@ static void foreseeReach(WorldData& d) {
   ContactData& c = d.contact;
   Lanes squared = splat(0);
   for (std::size_t i = 0; i < d.spheres.velocity.size(); i += 4) {
-    const Lanes3 v = gatherFour(d.spheres.velocity, i);
+    const Lanes3 arm = gatherFour(c.arm, i);  // of the substep before
+    const Lanes3 v = gatherFour(d.spheres.velocity, i) + cross(gatherFour(d.spheres.angularVelocity, i), arm);
     squared = larger(squared, dot(v, v));
   }
   const double fastest = std::sqrt(std::max(std::max(squared[0], squared[1]), std::max(squared[2], squared[3])));

@@ -105,14 +105,20 @@ void decideWhoCollides(WorldData& d) {
   }
 }
 
-// Corners in one place are one, whatever a file has numbered them.
+// Corners in one place are one, whatever a file has numbered them; edges that meet halfway are rims. Triangles that are
+// none have no edges.
 std::vector<OpenRim> openRims(const SurfaceTree& tree) {
   std::map<std::array<double, 3>, int> places;
   TriangleMesh mesh;
-  for (const std::array<Vector3d, 3>& t : tree.corners) {
-    std::array<int, 3>& triangle = mesh.triangles.emplace_back();
+  std::vector<std::size_t> whole;  // triangles of the tree
+  for (std::size_t i = 0; i < tree.corners.size(); ++i) {
+    const std::array<Vector3d, 3>& t = tree.corners[i];
+    std::array<int, 3> corners;
     for (int k = 0; k < 3; ++k)
-      triangle[k] = places.try_emplace({t[k].x(), t[k].y(), t[k].z()}, static_cast<int>(places.size())).first->second;
+      corners[k] = places.try_emplace({t[k].x(), t[k].y(), t[k].z()}, static_cast<int>(places.size())).first->second;
+    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
+    mesh.triangles.push_back(corners);
+    whole.push_back(i);
   }
   mesh.vertices.resize(places.size());
   const std::vector<std::array<int, 3>> onEdges = trianglesOnEdges(mesh);
@@ -120,11 +126,11 @@ std::vector<OpenRim> openRims(const SurfaceTree& tree) {
   for (std::size_t t = 0; t < onEdges.size(); ++t)
     for (int k = 0; k < 3; ++k)
       if (onEdges[t][k] == 1) isOpen[mesh.triangles[t][k]] = isOpen[mesh.triangles[t][(k + 1) % 3]] = true;
-  std::vector<OpenRim> out(onEdges.size());
-  for (std::size_t t = 0; t < out.size(); ++t)
+  std::vector<OpenRim> out(tree.corners.size(), OpenRim{});
+  for (std::size_t t = 0; t < onEdges.size(); ++t)
     for (int k = 0; k < 3; ++k) {
-      out[t].edge[k] = onEdges[t][k] == 1;
-      out[t].corner[k] = isOpen[mesh.triangles[t][k]];
+      out[whole[t]].edge[k] = onEdges[t][k] == 1;
+      out[whole[t]].corner[k] = isOpen[mesh.triangles[t][k]];
     }
   return out;
 }

@@ -106,8 +106,13 @@ Nearest contactAt(const Foot& f, const Vector3d& p) {
 }
 
 // Triangles come with their distance of some time ago; meanwhile the ball has moved by at most `moved`.
+// What lies behind a surface is held to be in it only `behind` m deep: farther away it is beyond, as under a table.
+struct Depth {
+  double within, behind;  // m, of the ball's centre
+};
 Touches touchesOf(const StaticContactShape& shape, const TriangleDistance* begin, const TriangleDistance* end,
-                  const Vector3d& p, double within, double moved) {
+                  const Vector3d& p, const Depth& depth, double moved) {
+  const double within = depth.within;
   Foot nearest;
   for (const TriangleDistance* t = begin; t != end; ++t) {
     if (t->distance - moved > std::min(within, nearest.distance)) break;
@@ -116,7 +121,9 @@ Touches touchesOf(const StaticContactShape& shape, const TriangleDistance* begin
   }
   Touches touches;
   if (!(nearest.distance < within)) return touches;
-  touches.add(contactAt(nearest, p));
+  const Nearest at = contactAt(nearest, p);
+  if (!(at.distance > -depth.behind)) return touches;
+  touches.add(at);
   for (const TriangleDistance* t = begin; t != end && t->distance - moved < within; ++t) {
     const Foot f = footOn(shape, t->triangle, p);
     if (f.distance < within && f.height > (1 - 1e-9) * f.distance) touches.add(contactAt(f, p));
@@ -197,7 +204,8 @@ void findStaticContacts(WorldData& d, double moved) {
       continue;
     }
     const TriangleDistance* near = c.nearTriangles.data();
-    const Touches touches = touchesOf(shape, near + n.firstTriangle, near + n.endTriangle, p, within, moved);
+    const Depth depth{within, c.ball[n.sphere].v[3] + kFastest * d.substep};
+    const Touches touches = touchesOf(shape, near + n.firstTriangle, near + n.endTriangle, p, depth, moved);
     for (int k = 0; k < touches.count; ++k) addContact(d, n, touches.at[k], k);
   }
 }

@@ -164,16 +164,19 @@ void visitBeyondMost(const WorldData& d, const ImplicitData& s, const Visit& vis
 }
 
 // What contacts hand over is in no body's own account: of an island each has what it has, and by its mass a share of
-// what the island has lost since.
-void keepAccounts(WorldData& d, const ImplicitData& s) {
-  for (std::size_t b = 0; b < s.bodies.size(); ++b) {
-    const EnergyBalance &own = s.bodies[b], &island = s.islands[s.island[b]];
-    const double lost = island.due + island.given - island.kinetic - island.elastic;
-    EnergyLedger& ledger = d.ledger[b];
-    ledger.due =
-        own.mass == island.mass ? own.due + own.given : own.kinetic + own.elastic + own.mass / island.mass * lost;
-    ledger.mostDue = std::max(ledger.mostDue, ledger.due);
-  }
+// what the island has lost since; where order 2 has swung above what was due, by its energy a share of that.
+double dueNow(const EnergyBalance& own, const EnergyBalance& island) {
+  if (own.mass == island.mass) return own.due + own.given;
+  const double due = island.due + island.given, energy = own.kinetic + own.elastic;
+  const double all = island.kinetic + island.elastic;
+  return 0 < all && due < all ? energy / all * due : energy + own.mass / island.mass * (due - all);
+}
+
+void keepAccountOf(WorldData& d, const ImplicitData& s, int body) {
+  if (s.verdicts[body] == Verdict::rests) return;  // it has not moved
+  EnergyLedger& ledger = d.ledger[body];
+  ledger.due = dueNow(s.bodies[body], s.islands[s.island[body]]);
+  ledger.mostDue = std::max(ledger.mostDue, ledger.due);
 }
 
 }  // namespace
@@ -214,8 +217,10 @@ bool keepEnergy(WorldData& d, ImplicitData& s, bool twoStages) {
     s.verdicts[b] = own == Verdict::rests && loses ? Verdict::passes : own;
   }
   if (std::count(s.verdicts.begin(), s.verdicts.end(), Verdict::fails) > 0) return false;
-  for (int b = 0; b < static_cast<int>(s.bodies.size()); ++b) keepEnergyOf(d, s, b);
-  keepAccounts(d, s);
+  for (int b = 0; b < static_cast<int>(s.bodies.size()); ++b) {
+    keepEnergyOf(d, s, b);
+    keepAccountOf(d, s, b);
+  }
   return true;
 }
 
@@ -226,7 +231,10 @@ void creep(WorldData& d, ImplicitData& s) {
   visitBeyondMost(d, s, [&](int b) { restore(d, s.before, b); });
   for (int b = 0; b < static_cast<int>(s.bodies.size()); ++b) {
     keepEnergyOf(d, s, b);
-    if (!hasFailed(s, b)) continue;
+    if (!hasFailed(s, b)) {
+      keepAccountOf(d, s, b);
+      continue;
+    }
     slowDown(d, b, 0);
     d.creep.bodies[b] = d.creepsNow = true;
   }
@@ -237,6 +245,8 @@ void creep(WorldData& d, ImplicitData& s) {
     if (hasFailed(s, b)) dropWholeTurns(d, b);
   runStage(d, evaluateForces);
   setElastic(d, s, &EnergyBalance::elastic);
+  for (int b = 0; b < static_cast<int>(s.bodies.size()); ++b)
+    if (hasFailed(s, b)) d.ledger[b].due = std::max(d.ledger[b].due, s.bodies[b].elastic);
   sumBalances(s);
   visitBeyondMost(d, s, [&](int b) {
     for (const int i : spheresOf(d.ranges[b])) d.spheres.orientation[i] = orientation[i];

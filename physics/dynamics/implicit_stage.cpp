@@ -166,39 +166,36 @@ void leadDriven(WorldData& d, ImplicitData& s, double end) {
   for (const SphereDrive& drive : d.drives) s.motion[2 * drive.sphere] = d.spheres.velocity[drive.sphere];
 }
 
-// A body that turns, free or on what holds it, goes on along arcs. To turn by R in the stage its velocity at r has to
-// be (R - 1) r / T, not w x r; and what it has of the stage before, of (1 - R^-1) r / T - w x r, is over. Guessed from
-// the velocities alone a stiff body would be stretched by its turning, and a thousandth of such a residual is more than
-// all that acts on it.
+// A body that turns goes on along arcs. To turn by R in the stage its velocity at r has to be (R - 1) r / T, not w x r;
+// and what it has of the stage before, of (1 - R^-1) r / T - w x r, is over. Guessed from the velocities alone a stiff
+// body would be stretched by its turning, and a thousandth of such a residual is more than all that acts on it.
 void followArcs(WorldData& d, ImplicitData& s) {
   s.turning.assign(d.ranges.size(), 0);
   for (EnergyBalance& e : s.bodies) e.chords = 0;
-  const auto turns = [](const BodyRange& r) { return r.support.freedom != RigidFreedom::none; };
-  if (std::none_of(d.ranges.begin(), d.ranges.end(), turns)) return;
+  if (std::none_of(d.ranges.begin(), d.ranges.end(), isFree)) return;
   place(d, s, 0);
   d.spheres.angularMomentum = s.start.angularMomentum;
   wholeMotions(d, s.whole);
   for (std::size_t b = 0; b < s.whole.size(); ++b) {
     const BodyRange& range = d.ranges[b];
-    if (!turns(range)) continue;
-    const RigidMotion motion = supportedMotion(d, static_cast<int>(b), s.whole[b]);
+    if (!isFree(range)) continue;
+    const RigidMotion motion = rigidMotionOf(s.whole[b]);
     const double angle = s.duration * motion.spin.norm();
     if (!(angle > 1e-6)) continue;
+    s.turning[b] = angle * std::sqrt(std::max(0.0, motion.spin.dot(spinMomentum(s.whole[b]))));
     const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, motion.spin.normalized()).toRotationMatrix();
     const auto bend = [&](const Eigen::Matrix3d& by, const Vector3d& x) {  // (by - 1) r / T less w x r
       const Vector3d r = x - motion.centre;
       return Vector3d((by * r - r) / s.duration - motion.spin.cross(r));
     };
     const Eigen::Matrix3d back = 2 * Eigen::Matrix3d::Identity() - turn.transpose();
-    double had = 0, size = 0, turning = 0;
+    double had = 0, size = 0;
     visitMasses(d, range, [&](double mass, const Vector3d& x, int quad) {
-      turning += mass * motion.spin.cross(x - motion.centre).squaredNorm();
       const Vector3d before = bend(back, x);
       had += mass * before.dot(vectorOf(s.motion[quad]) - velocityAt(motion, x));
       size += mass * before.squaredNorm();
     });
     const double share = size > 0 ? std::min(1.0, std::max(0.0, had / size)) : 0;
-    s.turning[b] = angle * std::sqrt(turning);
     s.bodies[b].chords = 0.5 * size;
     visitMasses(d, range, [&](double, const Vector3d& x, int quad) {
       s.motion[quad] = quadOf(vectorOf(s.motion[quad]) + bend(turn, x) - share * bend(back, x));

@@ -6,7 +6,8 @@
 // The links' stiffness matrices: G^T K G with the gradients G of their measures and K the stiffnesses between them
 // (Gauss and Newton), plus what a tension adds across the line. Both are positive semidefinite at any pose, so that
 // nothing has to be projected by eigenvalues, but for a compressed line, which takes stiffness away: that belongs to
-// the derivative near a solution, and is left out of a matrix that has to be definite. What is left out always, moments
+// the derivative near a solution, and is left out of a matrix that has to be definite. Near the fold the coupling alone
+// sees less of the flexions. What is left out always, moments
 // times second derivatives of the angles, vanishes at rest and changes how fast an iteration converges, not to what.
 // Tried: all of them to first order in the angles; assembling them takes the time that they spare.
 namespace medulla {

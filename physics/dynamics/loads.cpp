@@ -62,13 +62,13 @@ void addNodeImpulse(WorldData& d, int node, const HostPoint& host, const Vector3
     addImpulse(d, host.spheres[k], host.force[k] * impulse, host.torque[k] * impulse);
 }
 
-// Not less than the square of a matrix' largest stretch, at most 1.15 times it: the eighth root of A^8's norm, A = M^T
-// M. Sums of rows and columns would be as near, but hang on the axes, and what a skin gave to a tool on how it was
+// Not less than the square of a matrix' largest stretch, at most 1.08 times it: the eighth root of A^8's norm, A = M^T
+// M. Sums of rows and columns may be three times it and hang on the axes: what a skin gave to a tool hung on how it was
 // turned.
 double stretchBound(const Eigen::Matrix3d& m) {
   Eigen::Matrix3d power = m.transpose() * m;
   const double size = power.trace();
-  if (!(size > 0)) return 0;
+  if (size == 0) return 0;
   power /= size;
   for (int k = 0; k < 3; ++k) power = (power * power).eval();
   return size * std::sqrt(std::sqrt(std::sqrt(power.norm())));

@@ -51,34 +51,6 @@ RigidMotion rigidMotionOf(const WholeMotion& whole) {
   return {centre, whole.linear / whole.mass, inertia.inverse() * spinMomentum(whole)};
 }
 
-RigidMotion supportedMotion(const WorldData& d, int body, const WholeMotion& whole) {
-  const BodyRange& r = d.ranges[body];
-  if (isFree(r)) return rigidMotionOf(whole);
-  const auto placeOf = [&](const SupportPoint& p) {
-    return p.sphere >= 0 ? vectorOf(d.spheres.position[r.firstSphere + p.sphere])
-                         : vectorAt(d.nodes.position, r.node[p.node]);
-  };
-  const SupportPoint& point = r.support.point;
-  const Vector3d centre = placeOf(point);
-  RigidMotion motion{centre, Vector3d::Zero(), Vector3d::Zero()};
-  if (point.sphere >= 0) motion.velocity = vectorOf(d.spheres.velocity[r.firstSphere + point.sphere]);
-  if (r.support.freedom == RigidFreedom::none) return motion;
-  // Steiner's theorem, from the origin to a point that is not the centre of mass.
-  const Vector3d& moment = whole.moment;
-  const Matrix3d product = moment * centre.transpose();
-  const Matrix3d inertia = whole.inertia - 2 * moment.dot(centre) * Matrix3d::Identity() + product +
-                           product.transpose() + whole.mass * inertiaAt(centre);
-  const Vector3d momentum =
-      whole.angular - centre.cross(whole.linear) - (moment - whole.mass * centre).cross(motion.velocity);
-  if (r.support.freedom == RigidFreedom::aboutPoint) {
-    motion.spin = inertia.inverse() * momentum;
-  } else {
-    const Vector3d line = placeOf(r.support.second) - centre;
-    motion.spin = line.dot(momentum) / line.dot(inertia * line) * line;
-  }
-  return motion;
-}
-
 void addMomenta(WorldData& d, int body, const WholeMotion& now, const Vector3d& linear, const Vector3d& angular) {
   WholeMotion added = now;
   added.linear = linear;

@@ -26,8 +26,6 @@ struct RigidMotion {
 };
 // The rigid motion of these momenta; not finite where there is no mass or no inertia.
 RigidMotion rigidMotionOf(const WholeMotion& whole);
-// The same of what holds or drives the body leaves it: about the point or the line on which it turns, if any.
-RigidMotion supportedMotion(const WorldData& d, int body, const WholeMotion& whole);
 // N m s, about its own centre.
 inline Eigen::Vector3d spinMomentum(const WholeMotion& whole) {
   return whole.angular - whole.moment.cross(whole.linear) / whole.mass;

@@ -165,10 +165,15 @@ bool alike(const BodyDescription& a, const BodyDescription& b) {
          b.driven.empty();
 }
 
-// Per body; `stable` becomes the largest substep (s) that is stable for all. The modes at rest cost more than a hundred
+// s: substeps that are stable by the estimate, and by their share of it that is safe, for all bodies.
+struct StepLimits {
+  double stable = std::numeric_limits<double>::infinity(), safe = stable;
+};
+
+// Per body, and of all together. The modes at rest cost more than a hundred
 // substeps: a heap of like bodies has them once.
 std::vector<BodyMechanics> mechanicsOf(const std::vector<BodyDescription>& bodies, Integrator integrator,
-                                       double& stable) {
+                                       StepLimits& limits) {
   std::vector<BodyMechanics> mechanics;
   for (const BodyDescription& body : bodies) {
     const auto same = std::find_if(bodies.begin(), bodies.begin() + static_cast<std::ptrdiff_t>(mechanics.size()),
@@ -181,7 +186,10 @@ std::vector<BodyMechanics> mechanicsOf(const std::vector<BodyDescription>& bodie
     try {
       mechanics.push_back(bodyMechanics(body));
       mechanics.back().firstLike = static_cast<int>(found);
-      stable = std::min(stable, dampBody(body, mechanics.back(), integrator));
+      const double stable = dampBody(body, mechanics.back(), integrator);
+      limits.stable = std::min(limits.stable, stable);
+      limits.safe =
+          std::min(limits.safe, (body.tissue.damping < kLeastDamping ? kUndampedSafety : kStepSafety) * stable);
     } catch (const std::runtime_error& e) {
       throw std::runtime_error(fmt::format("body '{}' cannot be simulated: {}", body.name, e.what()));
     }
@@ -192,12 +200,9 @@ std::vector<BodyMechanics> mechanicsOf(const std::vector<BodyDescription>& bodie
 }  // namespace
 
 // Per dynamics frame. Steps that are stable may still miss what drives a body: of 5 ms, all that swings at 200 Hz.
-static int chosenSubsteps(const WorldSettings& settings, const std::vector<BodyDescription>& bodies, double stable) {
+static int chosenSubsteps(const WorldSettings& settings, const std::vector<BodyDescription>& bodies, double safe) {
   constexpr double kPerSwing = 16, kShortest = 1e-6;  // s; nobody waits for what swings faster
-  const bool undamped = std::any_of(bodies.begin(), bodies.end(),
-                                    [](const BodyDescription& b) { return b.tissue.damping < kLeastDamping; });
-  double longest =
-      settings.integrator == Integrator::implicit ? kImplicitStep : (undamped ? kUndampedSafety : kStepSafety) * stable;
+  double longest = settings.integrator == Integrator::implicit ? kImplicitStep : safe;
   for (const BodyDescription& body : bodies)
     for (const DrivenSphere& driven : body.driven)
       if (driven.amplitude > 0) longest = std::min(longest, std::max(kShortest, 1 / (kPerSwing * driven.frequency)));
@@ -207,21 +212,26 @@ static int chosenSubsteps(const WorldSettings& settings, const std::vector<BodyD
 World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
              const std::vector<StaticShape>& statics) {
   checkSettings(settings);
-  double stable = std::numeric_limits<double>::infinity();
-  std::vector<BodyMechanics> mechanics = mechanicsOf(bodies, settings.integrator, stable);
+  StepLimits limits;
+  std::vector<BodyMechanics> mechanics = mechanicsOf(bodies, settings.integrator, limits);
   data_ = layOut(settings, std::move(bodies), mechanics);
-  data_->stableSubstep = stable;
+  data_->stableSubstep = limits.stable;
   // Below this a second of simulation takes over an hour: a wrong unit rather than a stiff tissue.
   constexpr double kLeastSubstep = 1e-8;
-  if (settings.integrator == Integrator::explicitEuler && settings.substeps == 0 &&
-      kStepSafety * stable < kLeastSubstep)
+  if (settings.integrator == Integrator::explicitEuler && settings.substeps == 0 && limits.safe < kLeastSubstep)
     throw std::runtime_error(
         fmt::format("the stable substep is {:.3g} s: expected at least {:.0e} s; lower Young's "
                     "modulus or raise the density",
-                    stable, kLeastSubstep));
-  data_->substeps = settings.substeps > 0 ? settings.substeps : chosenSubsteps(settings, data_->bodies, stable);
+                    limits.stable, kLeastSubstep));
+  data_->substeps = settings.substeps > 0 ? settings.substeps : chosenSubsteps(settings, data_->bodies, limits.safe);
   data_->substep = settings.frameDuration / data_->substeps;
   data_->keptByDrag = 1 / (1 + data_->substep * settings.ambientDrag);
+  for (std::size_t b = 0; b < mechanics.size(); ++b) {  // of like bodies the first one's say all
+    const int like = mechanics[b].firstLike;
+    if (like == static_cast<int>(b)) continue;
+    mechanics[b] = {};
+    mechanics[b].firstLike = like;
+  }
   data_->mechanics = std::move(mechanics);
   layOutDeadLoads(*data_);
   layOutContact(*data_, statics);

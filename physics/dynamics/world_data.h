@@ -314,8 +314,8 @@ struct StillPlace {  // where a sphere was at the first frame of Rest::stillFram
   Quad position, orientation;
 };
 
-// J, kinetic and elastic; state. `due` is what a body had at first and all that it was given since: with what it has
-// lost it has no more. `begun` is false before its first step.
+// J, kinetic and elastic; state. `due` is what a body had at first and all that it was given since, as if it had lost
+// nothing. `begun`: of no account before its first step, nor before it is driven.
 struct EnergyLedger {
   double most = 0;  // at the beginning of any step so far
   double due = 0, mostDue = 0;
