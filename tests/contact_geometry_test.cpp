@@ -258,6 +258,38 @@ TEST(StaticShapes, ABallRollsOffTheRimOfAnOpenMesh) {
   EXPECT_LT(world.penetration().statics, 10);
 }
 
+// What is fast is looked at from afar, but not turned aside by what it misses: it passes a ball, a box and a sheet.
+TEST(StaticShapes, AFastBallIsNotTurnedAsideByWhatItMisses) {
+  StaticShape box = shapeOf(StaticShape::Kind::box), sphere = shapeOf(StaticShape::Kind::sphere), sheet;
+  box.worldFromShape.setIdentity();
+  sphere.worldFromShape.setIdentity();
+  box.size = {0.04, 0.04, 0.04};
+  sphere.radius = 0.02;
+  sheet.kind = StaticShape::Kind::mesh;
+  sheet.mesh.vertices = {{-1, 0, -1}, {-1, 0, 1}, {0.02, 0, 1}, {0.02, 0, -1}};
+  sheet.mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  BodyDescription held = synthetic::ball("held", 0.02, Vector3d::Zero());
+  held.fixed = {{0}};
+  WorldSettings s;
+  s.contact = ContactMode::balls;
+  s.gravity.setZero();
+  s.frameDuration = 0.02;
+  s.substeps = 1;
+  for (const double speed : {3.0, 10.0}) {
+    const BodyDescription thrown = synthetic::ball("thrown", 0.02, {0.06, 1.03, 0});
+    std::vector<World> worlds;
+    for (const StaticShape& shape : {box, sphere, sheet})
+      worlds.emplace_back(s, std::vector<BodyDescription>{thrown}, std::vector<StaticShape>{shape});
+    worlds.emplace_back(s, std::vector<BodyDescription>{thrown, held});
+    for (World& world : worlds) {
+      synthetic::throwBody(world, 0, {0, -speed, 0});
+      for (int k = 0; k < 40; ++k) world.advance({});
+      EXPECT_NEAR(world.data().spheres.position[0].v[0], 0.06, 1e-9) << speed;
+      EXPECT_NEAR(world.data().spheres.position[0].v[1], 1.03 - speed * world.time(), 1e-9) << speed;
+    }
+  }
+}
+
 // A wall that is wound inside out keeps what is in it, at 1 m/s and from any side.
 TEST(StaticShapes, AnInsideOutWallKeepsABallIn) {
   StaticShape wall;

@@ -51,11 +51,34 @@ void addContact(WorldData& d, std::uint32_t i, std::uint32_t j, double s, double
   contact.reach = {p.radius + 0.5 * contact.gap, -(q.radius + 0.5 * contact.gap)};
 }
 
+// Whether the two balls in which the colliders are nearest come to touch within the substep, as they move now: what is
+// fast, or far apart, would otherwise be turned aside by what it misses.
+bool willTouch(const WorldData& d, const PairGroup& g, int lane, const ConeContact& closest) {
+  const ContactData& c = d.contact;
+  const auto velocityAt = [&](const Collider& of, double along) -> Eigen::Vector3d {
+    return (1 - along) * ballVelocity(d, of.sphere0) + along * ballVelocity(d, of.sphere1);
+  };
+  const Collider &a = c.colliders[g.collider0[lane]], &b = c.colliders[g.collider1[lane]];
+  const BallAt p = ballAt(c, a, closest.s[lane]), q = ballAt(c, b, closest.t[lane]);
+  const Eigen::Vector3d way{q.centre[0] - p.centre[0], q.centre[1] - p.centre[1], q.centre[2] - p.centre[2]};
+  const Eigen::Vector3d closing = velocityAt(b, closest.t[lane]) - velocityAt(a, closest.s[lane]);
+  const double squared = closing.squaredNorm();
+  const double time = squared > 0 ? std::clamp(-way.dot(closing) / squared, 0.0, d.substep) : 0;
+  return (way + time * closing).norm() < p.radius + q.radius;
+}
+
 }  // namespace
+
+Eigen::Vector3d ballVelocity(const WorldData& d, std::uint32_t sphere) {
+  const Lanes turning = crossProduct(load(d.spheres.angularVelocity[sphere]), load(d.contact.arm[sphere]));
+  const Lanes v = load(d.spheres.velocity[sphere]) + turning;
+  return {v[0], v[1], v[2]};
+}
 
 void findPairContacts(WorldData& d, double moved) {
   ContactData& c = d.contact;
   const double reach = c.reach;
+  const bool asks = reach > leastReach(d);
   const Lanes farAtList = splat(reach + 2 * moved), near = splat(reach);
   for (const PairGroup& g : c.pairs) {
     const Lanes perhaps = isLess(g.gapAtList, farAtList);
@@ -63,7 +86,8 @@ void findPairContacts(WorldData& d, double moved) {
     const ConeContact closest = closestOfPairs(c, g);
     const int hits = _mm256_movemask_pd(masked(perhaps, isLess(closest.gap, near)));
     for (int k = 0; k < 4; ++k)
-      if (hits >> k & 1) addContact(d, g.collider0[k], g.collider1[k], closest.s[k], closest.t[k]);
+      if ((hits >> k & 1) != 0 && (!asks || !(closest.gap[k] > 0) || willTouch(d, g, k, closest)))
+        addContact(d, g.collider0[k], g.collider1[k], closest.s[k], closest.t[k]);
   }
 }
 
@@ -94,20 +118,24 @@ bool outrunsContact(const WorldData& d, double time) {
   return false;
 }
 
-// Explicit substeps are as long as tissue allows, a whole frame where nothing gives: what moves faster than kFastest is
-// looked at from as far away as it may close within one, and does not pass what it meets. Lists then go further, too.
+// Explicit substeps are as long as tissue allows, a whole frame where nothing gives. Where a ball outruns what is
+// looked at in any case (outrunsContact), all is looked at from as far away as the fastest may close within one, and
+// lists go further, too.
 static void foreseeReach(WorldData& d) {
   constexpr double kMost = 100;  // m/s: beyond, all would be near all
   ContactData& c = d.contact;
-  Lanes squared = splat(0);
+  const double h = d.substep, least = leastReach(d);
+  Lanes squared = splat(0);  // of the speeds of those that do
   for (std::size_t i = 0; i < d.spheres.velocity.size(); i += 4) {
+    Lanes radius;
+    gatherFour(c.ball, i, radius);
     const Lanes3 arm = gatherFour(c.arm, i);  // of the substep before
     const Lanes3 v = gatherFour(d.spheres.velocity, i) + cross(gatherFour(d.spheres.angularVelocity, i), arm);
-    squared = larger(squared, dot(v, v));
+    const Lanes farthest = splat(0.5 / h) * (splat(least) + radius), speed = dot(v, v);
+    squared = larger(squared, masked(isLess(farthest * farthest, speed), speed));
   }
   const double fastest = std::sqrt(std::max(std::max(squared[0], squared[1]), std::max(squared[2], squared[3])));
-  const double closing = std::min(2 * fastest, kMost), least = kFastest * d.substep;
-  c.reach = std::max(least, closing * d.substep);
+  c.reach = std::max(least, std::min(2 * fastest, kMost) * h);
   const bool isFast = c.reach > least;
   const double needed = 2 * c.freeMove + (isFast ? 1.5 * c.reach : least);
   const bool isShort = isFast && c.reach > c.margin - 2 * c.freeMove, isLong = c.margin > 4 * needed;

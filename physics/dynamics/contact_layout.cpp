@@ -47,7 +47,7 @@ void addBalls(WorldData& d) {
     }
   }
   c.freeMove = 0.5 * kMarginOverRadius * sum / std::max(1, count);
-  c.reach = kFastest * d.substep;
+  c.reach = leastReach(d);
   c.margin = 2 * c.freeMove + c.reach;
   c.ball = c.restBall;
   c.arm.resize(c.ball.size());

@@ -45,8 +45,14 @@ void solveContacts(WorldData& d);  // contact_solve.cpp: impulses on spheres
 // Gaps of a group's four pairs, at ContactData::ball; s and t are 0 on balls.
 ConeContact closestOfPairs(const ContactData& c, const PairGroup& g);
 
-// m/s: what closes within one whole substep at this speed is looked at, in any case.
+// m: what closes within one whole substep at this speed (m/s) is looked at, in any case.
 constexpr double kFastest = 2;
+inline double leastReach(const WorldData& d) {
+  return kFastest * (d.settings.frameDuration / d.substeps);
+}
+
+// m/s, of a ball's centre.
+Eigen::Vector3d ballVelocity(const WorldData& d, std::uint32_t sphere);
 
 // contact_find.cpp: whether a ball moves so far in `time` (s) at the present velocities that it might pass what it
 // touches before anything is looked for again.

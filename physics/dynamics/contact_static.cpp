@@ -150,6 +150,35 @@ void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int o
   contact.reach[1] = -(ball.v[3] + 0.5 * contact.gap);
 }
 
+double distanceFrom(const WorldData& d, const StaticNeighbour& n, const Vector3d& p) {
+  const ContactData& c = d.contact;
+  const StaticContactShape& shape = c.statics[n.shape];
+  if (shape.kind != StaticShape::Kind::mesh) return nearestOn(shape, p).distance;
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = n.firstTriangle; k < n.endTriangle; ++k)
+    least = std::min(least, (p - closestOnTriangle(p, shape.tree.corners[c.nearTriangles[k].triangle])).norm());
+  return least;
+}
+
+// Whether the ball, at this distance now, comes to touch the shape within the substep, as it moves now: by steps as
+// long as the way is clear. Asked where anything is fast: see contact_find.cpp.
+bool willTouch(const WorldData& d, const StaticNeighbour& n, double distance) {
+  constexpr int kSteps = 32;         // then it all but does
+  constexpr double kTouches = 1e-3;  // of its radius
+  const Quad& ball = d.contact.ball[n.sphere];
+  const Vector3d from = vectorOf(ball), velocity = ballVelocity(d, n.sphere);
+  const double radius = ball.v[3], speed = velocity.norm();
+  if (!(distance > radius) || !(d.contact.reach > leastReach(d))) return true;
+  double time = 0;
+  for (int k = 0; k < kSteps; ++k) {
+    const double gap = distanceFrom(d, n, from + time * velocity) - radius;
+    if (gap < kTouches * radius) return true;
+    time += gap / speed;
+    if (!(time < d.substep)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 std::array<int, 2> bodiesOf(const WorldData& d, std::uint64_t key) {
@@ -197,15 +226,16 @@ void findStaticContacts(WorldData& d, double moved) {
     if (!(n.gapAtList - moved < reach)) continue;
     const StaticContactShape& shape = c.statics[n.shape];
     const Vector3d p = vectorOf(c.ball[n.sphere]);
-    const double within = c.ball[n.sphere].v[3] + reach;
+    const double within = c.ball[n.sphere].v[3] + reach, always = c.ball[n.sphere].v[3] + leastReach(d);
     if (shape.kind != StaticShape::Kind::mesh) {
       const Nearest at = nearestOn(shape, p);
-      if (at.distance < within) addContact(d, n, at, 0);
+      if (at.distance < within && willTouch(d, n, at.distance)) addContact(d, n, at, 0);
       continue;
     }
     const TriangleDistance* near = c.nearTriangles.data();
-    const Depth depth{within, c.ball[n.sphere].v[3] + kFastest * d.substep};
+    const Depth depth{within, always};
     const Touches touches = touchesOf(shape, near + n.firstTriangle, near + n.endTriangle, p, depth, moved);
+    if (touches.count > 0 && !willTouch(d, n, touches.at[0].distance)) continue;
     for (int k = 0; k < touches.count; ++k) addContact(d, n, touches.at[k], k);
   }
 }

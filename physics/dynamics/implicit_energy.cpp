@@ -98,7 +98,8 @@ Verdict judge(const ImplicitData& s, const EnergyBalance& e, bool twoStages) {
   const double scale = e.kineticBefore + e.elasticBefore + std::abs(e.given), allowed = allowedOf(e);
   // Order 2 swings about it, but no gain is one to begin the next from.
   if (twoStages) {
-    const bool inAll = e.kinetic + e.elastic <= e.due + e.given + kSwings * e.mostDue;
+    const double most = e.due + e.given + kSwings * e.mostDue + restEnergy(s, e.mass);
+    const bool inAll = e.kinetic + e.elastic <= most;
     return inAll && e.kinetic <= allowed + kSwings * scale ? Verdict::passes : Verdict::fails;
   }
   if (e.kinetic <= allowed) return Verdict::passes;
