@@ -23,7 +23,7 @@ namespace medulla {
 namespace {
 
 // The estimate is of the body at rest; bending, folding and compression stiffen it. The step is this share of it: at
-// 0.8 as many bodies come through torture as at 0.7, at 0.85 fewer (equations/step.md).
+// 0.7 and 0.85 no more bodies come through torture (equations/step.md).
 constexpr double kStepSafety = 0.8;
 // Less than this ratio takes nothing of what a mode gains as it stiffens and softens with the swings of others: a rod
 // that a tool had left swinging had a hundred thousand times its energy after 15 s at 0.8; at 0.6 it keeps it.
