@@ -64,7 +64,7 @@ struct Foot {
   double distance = std::numeric_limits<double>::infinity();
   double height = 0;  // over the triangle's plane
   Vector3d point, faceNormal;
-  bool onRim = false;  // where the surface ends: nothing is behind it there
+  bool onRim = false;  // below the plane, where the surface ends: nothing is behind it there
 };
 
 bool isOnRim(const std::array<Vector3d, 3>& t, const OpenRim& rim, const Vector3d& point) {
@@ -87,7 +87,7 @@ Foot footOn(const StaticContactShape& shape, int triangle, const Vector3d& p) {
   const double area = across.norm();
   f.faceNormal = area > 0 ? Vector3d(across / area) : Vector3d::Zero();
   f.height = f.faceNormal.dot(p - f.point);
-  f.onRim = isOnRim(t, shape.rim[triangle], f.point);
+  f.onRim = f.height < 0 && isOnRim(t, shape.rim[triangle], f.point);
   return f;
 }
 
@@ -166,9 +166,10 @@ bool willTouch(const WorldData& d, const StaticNeighbour& n, double distance) {
   constexpr int kSteps = 32;         // then it all but does
   constexpr double kTouches = 1e-3;  // of its radius
   const Quad& ball = d.contact.ball[n.sphere];
-  const Vector3d from = vectorOf(ball), velocity = ballVelocity(d, n.sphere);
-  const double radius = ball.v[3], speed = velocity.norm();
+  const double radius = ball.v[3];
   if (!(distance > radius) || !(d.contact.reach > leastReach(d))) return true;
+  const Vector3d from = vectorOf(ball), velocity = ballVelocity(d, n.sphere);
+  const double speed = velocity.norm();
   double time = 0;
   for (int k = 0; k < kSteps; ++k) {
     const double gap = distanceFrom(d, n, from + time * velocity) - radius;
