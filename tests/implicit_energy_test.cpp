@@ -60,7 +60,7 @@ double strayOf(World& world, int body, const Vector3d& velocity, double duration
 TEST(ImplicitEnergy, WhatFliesBesideAFailingBodyFliesOn) {
   const Vector3d velocity(1, 2, 0.3);
   const BodyDescription ball = synthetic::ball("ball", 0.01, {1, 0, 0});
-  for (const Failing& f : {Failing{LinkModel::beam, 1, 0.02, 159}, Failing{LinkModel::identified, 1, 0.005, 2},
+  for (const Failing& f : {Failing{LinkModel::beam, 1, 0.005, 161}, Failing{LinkModel::identified, 1, 0.005, 2},
                            Failing{LinkModel::identified, 2, 0.05, 4}}) {
     World alone(settingsOf(f), {ball}), beside(settingsOf(f), {tube(f.links), ball});
     WorldData& d = beside.data();
@@ -123,7 +123,7 @@ TEST(ImplicitEnergy, BallsThatHaveMetAndPartedTakeWholeSteps) {
 
 // A contact that pushes hands energy on: what it joins is judged together.
 TEST(ImplicitEnergy, WhatPushesAFailingBodyCreepsWithIt) {
-  const Failing f{LinkModel::beam, 1, 0.02, 117};
+  const Failing f{LinkModel::beam, 1, 0.02, 55};
   WorldSettings settings = settingsOf(f);
   settings.contact = ContactMode::balls;
   World world(settings,

@@ -99,8 +99,30 @@ TEST(Link, MomentsDoNotJumpAtTheFold) {
     const auto before = torquesAt(kFold - kBeside, twist), after = torquesAt(kFold + kBeside, twist);
     EXPECT_LT((after.first - before.first).norm(), 1e-5 * before.first.norm());
     EXPECT_LT((after.second - before.second).norm(), 1e-5 * before.second.norm());
-    for (const double angle : {1.2, 1.5, 1.9, 2.2, 2.6}) torquesAt(angle, twist, 1e-6);
+    for (const double angle : {1.2, 1.5, 1.9, 2.2, 2.5, 2.7, 3.1}) torquesAt(angle, twist, 1e-6);
   }
+}
+
+// An end that swings round beside 180 degrees, near enough for its twist to move by all but a whole turn, comes back as
+// it was.
+TEST(Link, SwingingPastTheFoldWindsNothingUp) {
+  BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(2, 0.03, 0.01, 4, 6)), 5e3);
+  b.surface = SurfaceMode::skin;
+  World world(weightless(), {b});
+  WorldData& d = world.data();
+  const Vector3d line = (vectorOf(d.spheres.position[1]) - vectorOf(d.spheres.position[0])).normalized();
+  const Vector3d across = line.unitOrthogonal(), beside = line.cross(across);
+  const Quaterniond rest = orientation(d, 1);
+  constexpr double kMissed = 0.25;  // rad
+  constexpr int kSteps = 90;
+  for (int step = 0; step <= kSteps; ++step) {  // its rest line leads once round a cone about `beside`
+    const double angle = 2 * std::numbers::pi * step / kSteps;
+    setOrientation(d, 1, rest);
+    turnBy(d, 1, kMissed * std::sin(0.5 * angle) * across);
+    turnBy(d, 1, angle * beside);
+    runStage(d, evaluateForces);
+  }
+  EXPECT_LT(elastic(d), 1e-12);
 }
 
 TEST(Attachment, ForcesOnNodesAndSpheresAreMinusTheEnergyGradient) {

@@ -23,13 +23,16 @@ struct AngleOverSine {
 
 // Beyond this angle, 116 degrees, where f sin(theta) has slope 1 and f slope 0 on either side, tan(theta) = -theta, f
 // stays what it is: f sin(theta) falls back then as it rose. f itself grows without bound towards 180 degrees, where a
-// flexion has no direction, and no explicit step would follow. link_force.cpp turns the energy's sign there, so that it
+// flexion has no direction, and no explicit step would follow. link_fold.h turns the energy's sign there, so that it
 // rises on to 180.
 constexpr double kFoldAngle = 2.028757838110434;
 constexpr double kFoldCosine = -0.4421205929549983;
 constexpr double kFoldValue = 2.261826334114652;  // -1 / kFoldCosine
 
-// 75 degrees, and f there: from here on what both ends of a link share of their flexions levels off (link_force.cpp).
+// Cosine of 150 degrees, beyond which a link knows no twist (link_fold.h).
+constexpr double kBlindCosine = -0.8660254037844387;
+
+// 75 degrees, and f there: from here on what both ends of a link share of their flexions levels off (link_fold.cpp).
 constexpr double kLevelFrom = 1.3089969389957472;
 constexpr double kLevelValue = 1.3551733511720077;
 

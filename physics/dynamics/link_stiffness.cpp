@@ -1,15 +1,15 @@
-#include "physics/dynamics/angles.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/link_blocks.h"
+#include "physics/dynamics/link_fold.h"
 #include "physics/dynamics/neo_hookean.h"
 
 // The links' stiffness matrices: G^T K G with the gradients G of their measures and K the stiffnesses between them
 // (Gauss and Newton), plus what a tension adds across the line. Both are positive semidefinite at any pose, so that
 // nothing has to be projected by eigenvalues, but for a compressed line, which takes stiffness away: that belongs to
 // the derivative near a solution, and is left out of a matrix that has to be definite. Near the fold the coupling alone
-// sees less of the flexions. What is left out always, moments
-// times second derivatives of the angles, vanishes at rest and changes how fast an iteration converges, not to what.
-// Tried: all of them to first order in the angles; assembling them takes the time that they spare.
+// sees less of the flexions, and beyond it fades with the torsion. What is left out always, moments times second
+// derivatives of the angles, vanishes at rest and changes how fast an iteration converges, not to what. Tried: all of
+// them to first order in the angles; assembling them takes the time that they spare.
 namespace medulla {
 
 namespace {
@@ -19,10 +19,11 @@ MEDULLA_INLINE Lanes3 lineGradient(const LinkPose& f, const Lanes3& byN) {
   return f.inverseLength * fnma(dot(f.n, byN), f.n, byN);
 }
 
-// d(f n.u) and d(f n.v) by n: link_force.cpp, flexionRate.
+// d(f n.u) and d(f n.v) by n: link_measures.h, flexionRate.
 struct EndGradients {
   Lanes3 a, b;
-  Lanes seen;  // of a change of the flexion's length, by the coupling: link_force.cpp, Level
+  Lanes left;  // of torsion and coupling: link_fold.h, Fade
+  Lanes seen;  // of a change of the flexion's length, by the coupling: link_fold.cpp, Level
 };
 
 EndGradients endGradients(const LinkGroup& g, const Spheres& s, const std::uint32_t* i, const Lanes3& n) {
@@ -30,24 +31,25 @@ EndGradients endGradients(const LinkGroup& g, const Spheres& s, const std::uint3
   const Lanes3 q = gather(s.orientation[i[0]], s.orientation[i[1]], s.orientation[i[2]], s.orientation[i[3]], w);
   const Rotation r = rotationOf(q, w);
   const Lanes3 t = rotate(r, g.restT), u = rotate(r, g.restU), v = cross(t, u);
-  const AngleOverSine angle = angleOverSine(dot(n, t));
+  const Lanes cosine = dot(n, t);
+  const AngleOverSine angle = angleOverSine(cosine);
   const Lanes along = dot(n, u), across = dot(n, v), one = splat(1);
   const Lanes length = angle.value * squareRoot(fma(along, along, across * across));
   constexpr double kWidth = kFoldAngle - kLevelFrom;
   const Lanes over = larger(length - splat(kLevelFrom), splat(0));
   return {fnma(angle.slope * along, t, angle.value * u), fnma(angle.slope * across, t, angle.value * v),
-          larger(fnma(splat(1 / kWidth), over, one), splat(0))};
+          fadeAt(cosine).share, larger(fnma(splat(1 / kWidth), over, one), splat(0))};
 }
 
 // Gradients of an end's two flexions: by the line, and by the turning of its own sphere.
 struct EndRows {
   Lanes3 lineA, lineB, turnA, turnB;
-  Lanes seen;
+  Lanes left, seen;
 };
 
 MEDULLA_INLINE EndRows endRows(const LinkGroup& g, const Spheres& s, const std::uint32_t* i, const LinkPose& f) {
   const EndGradients e = endGradients(g, s, i, f.n);
-  return {lineGradient(f, e.a), lineGradient(f, e.b), cross(e.a, f.n), cross(e.b, f.n), e.seen};
+  return {lineGradient(f, e.a), lineGradient(f, e.b), cross(e.a, f.n), cross(e.b, f.n), e.left, e.seen};
 }
 
 // Slope and value of the tension, as in link_force.cpp: the bar's share of it is the beam's.
@@ -57,11 +59,11 @@ void elongationLaw(const LinkGroup& g, Lanes length, Lanes& slope, Lanes& tensio
   tension = g.elongation * fma(g.beam, g.restLength * neoHookeanTension(stretch) - linear, linear);
 }
 
-// In axes turned about the line: link_force.cpp, `turned`.
+// In axes turned about the line: link_measures.h, `turned`.
 MEDULLA_INLINE EndRows turned(const EndRows& e, Lanes cosine, Lanes sine) {
   const auto a = [&](const Lanes3& ofA, const Lanes3& ofB) { return fma(sine, ofB, cosine * ofA); };
   const auto b = [&](const Lanes3& ofA, const Lanes3& ofB) { return fnma(sine, ofA, cosine * ofB); };
-  return {a(e.lineA, e.lineB), b(e.lineA, e.lineB), a(e.turnA, e.turnB), b(e.turnA, e.turnB), e.seen};
+  return {a(e.lineA, e.lineB), b(e.lineA, e.lineB), a(e.turnA, e.turnB), b(e.turnA, e.turnB), e.left, e.seen};
 }
 
 // What flexions and torsion add.
@@ -71,8 +73,8 @@ MEDULLA_INLINE void addTurning(const LinkGroup& g, const LinkPose& f, const Sphe
   const EndRows e0 = turned(endRows(g, s, g.sphere0, f), cosine, sine),
                 e1 = turned(endRows(g, s, g.sphere1, f), cosine, splat(0) - sine);
   const Lanes a0 = damped * g.flexionV0, b0 = damped * g.flexionU0, a1 = damped * g.flexionV1,
-              b1 = damped * g.flexionU1, twist = damped * g.torsion, seen = damped * (e0.seen * e1.seen),
-              ca = seen * g.coupleV, cb = seen * g.coupleU;
+              b1 = damped * g.flexionU1, left = damped * (e0.left * e1.left), twist = left * g.torsion,
+              seen = left * (e0.seen * e1.seen), ca = seen * g.coupleV, cb = seen * g.coupleU;
   const Lanes3 ofA0 = fma(ca, e1.lineA, a0 * e0.lineA), ofB0 = fma(cb, e1.lineB, b0 * e0.lineB);
   const Lanes3 ofA1 = fma(ca, e0.lineA, a1 * e1.lineA), ofB1 = fma(cb, e0.lineB, b1 * e1.lineB);
   const Lanes3 lineTwist = lineGradient(f, f.spinLever0 - f.spinLever1), ofTwist = twist * lineTwist;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <algorithm>
-
 #include "physics/dynamics/simd.h"
 
 // An incompressible neo-Hookean bar: EA/3 (x - 1/x^2) at the stretch x, of stiffness EA at rest. Shorter than
@@ -25,10 +23,11 @@ MEDULLA_INLINE Lanes neoHookeanSlope(Lanes stretch) {
 }
 
 // Over EA L: the tension's integral from rest.
-inline double neoHookeanEnergy(double stretch) {
-  const double x = std::max(stretch, kStraightBelow), below = stretch - x;
-  const double tension = (x - 1 / (x * x)) / 3, slope = (1 + 2 / (x * x * x)) / 3;
-  return (x * x / 2 + 1 / x - 1.5) / 3 + tension * below + slope * below * below / 2;
+inline Lanes neoHookeanEnergy(Lanes stretch) {
+  const Lanes half = splat(0.5), x = larger(stretch, splat(kStraightBelow)), below = stretch - x;
+  const Lanes inverse = splat(1) / x, bar = fma(half * x, x, inverse) - splat(1.5);
+  const Lanes straight = fma(half * neoHookeanSlope(x), below, neoHookeanTension(x));
+  return fma(splat(1.0 / 3), bar, straight * below);
 }
 
 }  // namespace medulla
