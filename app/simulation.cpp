@@ -51,6 +51,7 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
 
   totals_.touched.resize(tools.size());
   totals_.held.resize(tools.size());
+  totals_.pressed.resize(bodies.size());
   totals_.closings.resize(tools.size());
   totals_.squeezedTicks.resize(tools.size());
   for (const ToolSample& input : inputs_) totals_.beganClosed.push_back(input.grip > kGripCloses);
@@ -110,6 +111,7 @@ void Simulation::advanceDynamics() {
   times_.dynamics = stepped - start;
   times_.surface = wallSeconds() - stepped;
   ++frame_;
+  visitLoadedNodes(record_.loads, [&](const auto& load, int) { totals_.pressed[load.body] = true; });
   accountTicks();
   accountImpulses(given);
   accountVolumes();

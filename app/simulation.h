@@ -72,6 +72,7 @@ struct RunTotals {
   double volumeRatioMin = 1, volumeRatioMax = 1;  // of any body
   long clampedTicks = 0, gripSlips = 0;           // of all tools
   std::vector<bool> touched, held;                // has tool k been in contact or held anything; has it held anything
+  std::vector<bool> pressed;                      // has any tool acted on body b
   std::vector<int> closings;                      // how often tool k's grip has closed since it began
   std::vector<bool> beganClosed;                  // was it closed then
   std::vector<long> squeezedTicks;                // of tool k

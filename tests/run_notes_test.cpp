@@ -38,6 +38,26 @@ TEST_F(RunNotes, JawsThatComeToWhereTheyCloseAndNoFurther) {
   EXPECT_EQ(notesOfGrips({0, 0.2, 0.49, 0}, 0.6), Notes{});
 }
 
+TEST_F(RunNotes, NumbersThatAreRightInOtherUnits) {
+  const auto notesWith = [&](const std::string& setting) {
+    return complaints(run({"check", "own/organ.xml", "--set", setting}));
+  };
+  EXPECT_EQ(notesWith("tissue.t.young=6"), Notes{"note: Young's modulus of body 'organ' is 6 Pa; is it in that unit?"});
+  EXPECT_EQ(notesWith("tissue.t.density=1.06"),
+            Notes{"note: the density of body 'organ' is 1.06 kg/m3; is it in that unit?"});
+  EXPECT_EQ(notesWith("dynamics.gravity=0 -9810 0"), Notes{"note: gravity is 9810 m/s2; is it in that unit?"});
+}
+
+TEST_F(RunNotes, AToolThatPressesASkinFeelsItTooHard) {
+  const auto notesOf = [&](const std::string& surface) {
+    return complaints(run({"replay", "own/organ.xml", "--set", "body.organ.surface=" + surface}));
+  };
+  EXPECT_EQ(notesOf("skin"),
+            Notes{"note: tools acted on body 'organ', whose surface=\"skin\" does not yield by itself: "
+                  "they feel it too hard; \"contact\" or \"full\" does"});
+  EXPECT_EQ(notesOf("contact"), Notes{});
+}
+
 TEST_F(RunNotes, AMotionThatDoesNotFitTheScene) {
   const auto notesOf = [&](const std::string& verb, double from, double to, const std::string& more = "") {
     folder.write("own/organ.csv", fmt::format("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n{},0,0,0.5,1,0,0,0,0\n"

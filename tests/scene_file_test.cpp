@@ -190,7 +190,8 @@ TEST_F(SceneFile, MistakesInTheStructureNameTheLineAndWhatWasExpected) {
   expectComplaints({
       {"position=\"0.1", "positon=\"0.1", R"(x.xml:10: <body> has no attribute "positon"; did you mean "position"?)"},
       {"<light ", "<lihgt ", R"(x.xml:24: <scene> has no child <lihgt>; did you mean "light"?)"},
-      {"<fix spheres=\"4\"", "<body spheres=\"4\"", R"(x.xml:13: <body> has no child <body>; did you mean "load"?)"},
+      {"<fix spheres=\"4\"", "<body spheres=\"4\"",
+       R"(x.xml:13: <body> has no child <body>; expected one of fix, drive, load, links, neighbours)"},
       {" duration=\"12\"", "", R"(x.xml:4: <clock> lacks the attribute "duration")"},
       {"<clock servo=\"1000\" dynamics=\"40\" duration=\"12\" settle=\"2\"/>", "", "x.xml:3: <scene> lacks a <clock>"},
       {"<dynamics ", "<dynamics/><dynamics ", "x.xml:5: <scene> has more than 1 <dynamics>"},

@@ -11,6 +11,14 @@ TEST(Text, WordsInMessagesAreShortAndOnOneLine) {
   EXPECT_EQ(inQuotes(std::string(1000, 'a')), "'" + std::string(60, 'a') + "...'");
 }
 
+TEST(Text, WordsThatResembleNothingAreToldWhatThereIs) {
+  const std::vector<std::string> units = {"m", "mm", "inch"};
+  EXPECT_EQ(nearestName("Mm", units), "mm");
+  EXPECT_EQ(hintOfNames("Mm", units), "did you mean \"mm\"?");
+  EXPECT_EQ(hintOfNames("colour", {"name", "look"}), "expected one of name, look");
+  EXPECT_EQ(hintOfNames("colour", {}), "");
+}
+
 TEST(Text, AShellTakesItForOneWord) {
   EXPECT_EQ(shellWord("../scenes/liver-2_b.xml"), "../scenes/liver-2_b.xml");
   EXPECT_EQ(shellWord("plane=0,-1,0,1.5e-05"), "plane=0,-1,0,1.5e-05");

@@ -77,9 +77,6 @@ std::map<std::string, std::string> filesOfTools(const std::string& option, const
 
 LoadedScene loadRun(const RunOptions& options);
 
-// On standard error: what can run, but is hardly meant.
-void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world);
-
 // Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` after the last, before
 // records, log and surfaces appear under their names: what fails there leaves those as they were. Until rest: as
 // RestWatch finds it; surfaces asked for at a later time are those at rest. Returns

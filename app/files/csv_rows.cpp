@@ -17,6 +17,12 @@ static std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
+// As spreadsheets and statistics programs write what is no number of theirs.
+static std::string_view unquoted(std::string_view cell) {
+  const bool quoted = cell.size() >= 2 && cell.front() == '"' && cell.back() == '"';
+  return quoted ? trimmed(cell.substr(1, cell.size() - 2)) : cell;
+}
+
 // The next line without its comment and the white space around it; `rest` loses it.
 static std::string_view takeRow(std::string_view& rest) {
   const std::string_view line = takeLine(rest);
@@ -30,7 +36,7 @@ bool CsvRows::next() {
     ++line_;
     while (!row.empty()) {
       const std::size_t end = separator_ == ' ' ? row.find_first_of(" \t") : row.find(separator_);
-      cells_.push_back(trimmed(row.substr(0, end)));
+      cells_.push_back(unquoted(trimmed(row.substr(0, end))));
       if (end == std::string_view::npos) break;
       row.remove_prefix(end + 1);
       if (separator_ == ' ')

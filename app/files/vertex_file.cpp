@@ -9,6 +9,7 @@
 
 #include "app/files/csv_rows.h"
 #include "app/files/input_error.h"
+#include "app/files/number_text.h"
 #include "app/files/text.h"
 #include "app/files/text_file.h"
 #include "physics/sort_unique.h"
@@ -38,6 +39,8 @@ void forEachVertex(std::string_view text, const std::string& name, const SoftBod
   for (; rows.next(); first = false) {
     if (first) rows.requireCommas();
     if (first && isHeader(rows.cells(), columns)) continue;
+    if (first && !parseNumber<double>(rows.cells()[0]))
+      rows.fail(fmt::format("the header is {}, expected {}", inQuotes(joined(rows.cells(), ",")), expected));
     rows.requireCells(columns.size(), expected);
     const int vertex = rows.index(0, columns[0], model.nodeOfInputVertex.size());
     const int node = model.nodeOfInputVertex[vertex];
@@ -64,7 +67,11 @@ std::vector<int> readVertices(const std::string& path, const SoftBodyModel& mode
 std::vector<DeadLoad> parseVertexForces(std::string_view text, const std::string& name, const SoftBodyModel& model,
                                         const DeadLoad& whole) {
   std::vector<DeadLoad> loads;
+  std::vector<bool> loaded(model.nodeOfInputVertex.size());
   forEachVertex(text, name, model, kForceColumns, [&](const CsvRows& row, int node) {
+    const int vertex = row.index(0, kForceColumns[0], loaded.size());
+    if (loaded[vertex]) row.fail(fmt::format("vertex {} stands twice", vertex));
+    loaded[vertex] = true;
     DeadLoad& load = loads.emplace_back(whole);
     load.node = node;
     for (int k = 0; k < 3; ++k) load.force[k] = row.number(k + 1, kForceColumns[k + 1]);

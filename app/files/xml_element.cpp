@@ -99,8 +99,8 @@ XmlElement parseXml(const std::string& path) {
 }
 
 std::string suggestion(const std::string& name, const std::vector<std::string>& known) {
-  const std::string nearest = nearestName(name, known);
-  return nearest.empty() ? "; it has none" : "; did you mean " + inQuotes(nearest, '"') + "?";
+  const std::string hint = hintOfNames(name, known);
+  return "; " + (hint.empty() ? "it has none" : hint);
 }
 
 void checkAttributes(const XmlElement& element, const XmlRule& rule) {
@@ -108,6 +108,7 @@ void checkAttributes(const XmlElement& element, const XmlRule& rule) {
   known.insert(known.end(), rule.optional.begin(), rule.optional.end());
   for (const XmlAttribute& a : element.attributes) {
     if (std::find(known.begin(), known.end(), a.name) != known.end()) continue;
+    if (a.name.starts_with("xmlns") || a.name.starts_with("xsi:")) continue;  // by which editors find the schema
     throw complaint(a.where,
                     "<" + element.name + "> has no attribute " + inQuotes(a.name, '"') + suggestion(a.name, known));
   }

@@ -24,9 +24,11 @@ void visitLinks(const Identified& s, const IdentifiedBody& body, const Visit& vi
         visit(s.links[g].frame0[lane], s.links[g].frame1[lane]);
 }
 
+// On the ridge itself, from either side, a body is pushed both ways, and no implicit step leaves it.
 bool anyTurnedTooFar(const Identified& s, const IdentifiedBody& body) {
+  constexpr double kRidge = 1e-3;  // of the cosine: a tenth of a degree
   bool any = false;
-  visitLinks(s, body, [&](auto a, auto b) { any = any || cosineOfHalf(s, a, b) < kFoldCosine; });
+  visitLinks(s, body, [&](auto a, auto b) { any = any || cosineOfHalf(s, a, b) < kFoldCosine + kRidge; });
   return any;
 }
 
