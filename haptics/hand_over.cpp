@@ -13,11 +13,12 @@ namespace {
 struct Path {
   Vector3d end, velocity;
 };
-// What one contact gets: of the tool's stiffness, of forceMax, how much deeper its anchor lies (m), and the coupling's
-// pull across the common push (m).
+// What one contact gets: of the tool's stiffness and damping, of forceMax, how much deeper its anchor lies (m), and the
+// coupling's pull across the common push (m). `steadying` (N s/m) adds to the tool's damping.
 struct Part {
   double stiffness = 1, forceMax = 1, deeper = 0;
   Vector3d across;
+  double steadying = 0;
 };
 }  // namespace
 
@@ -59,7 +60,7 @@ static void handOverContact(const BlendedSurface& surface, const ServoTool& tool
   spring.anchorVelocity = path.velocity;
   spring.outward = contact.normal;
   spring.stiffness = settings.stiffness * part.stiffness;
-  spring.damping = settings.damping * part.stiffness;
+  spring.damping = (settings.damping + part.steadying) * part.stiffness;
   spring.slides = proxy.slipping;
   spring.forceMax = settings.forceMax * part.forceMax;
   spring.friction = proxy.slipping ? settings.dynamicFriction : settings.staticFriction;
@@ -83,6 +84,19 @@ static double makeUpFor(const Proxy& proxy, const Path& path, const Vector3d& de
   return wanted > left ? wanted / left : 1;
 }
 
+// N s/m. Contacts are handed over once per frame, and a spring that is renewed after T gives back more than it took,
+// unless a damper of kT / 2 and more takes that (Colgate and Schenkel 1997). Deep in a liver, where shares and normals
+// of a dent's walls change from frame to frame, a tool of 400 N/m held still at 100 Hz swung tissue and hand between 1
+// and 18 N for ever; at kT it holds still. Of a device that moves such a damper would be felt as depth: it is gone
+// where the device moves by a hundredth of that depth in a frame, and a quarter percent of the push at most. Rejected:
+// twice as much, since jaws that close on the tissue then hold it otherwise; and a damper against the surface's own
+// velocity of the last frames, which leaves steady motion free, but makes free bodies heavier, and holds still less.
+static double steadying(const ServoTool& tool, const Path& path, double frameDuration) {
+  constexpr double kStill = 0.01;
+  const double still = kStill * tool.push / tool.settings.stiffness, moved = path.velocity.norm() * frameDuration;
+  return still > moved ? tool.settings.stiffness * frameDuration * (1 - moved / still) : 0;
+}
+
 // Several contacts stand oblique to the direction p of their common push (a groove, a dimple). The force on the proxy
 // is the sum of lambda_i n_i with lambda_i in the ratio of the shares s_i, and must be k D p: lambda_i = k D s_i / C
 // with C = sum_j s_j c_j and c_i = n_i . p. Spring i is compressed by D c_i only, so its stiffness is k s_i / (c_i C);
@@ -91,8 +105,8 @@ static double makeUpFor(const Proxy& proxy, const Path& path, const Vector3d& de
 // B = sum_j s_j b_j, and its anchor lies lambda_i / k_i - D c_i = D (b_i B / C - c_i) deeper, so that it starts with
 // the same force. Softer springs alone gave the tissue a third of what the hand felt, at rest and at any rate.
 // Each is limited to its part of forceMax in the ratio of the pressures, s_i / C.
-static void handOverContacts(const BlendedSurface& surface, double alpha, const ServoTool& tool, const Path& path,
-                             std::vector<ProxyContact>& contacts, Loads& out) {
+static void handOverContacts(const BlendedSurface& surface, double alpha, double frameDuration, const ServoTool& tool,
+                             const Path& path, std::vector<ProxyContact>& contacts, Loads& out) {
   patchContacts(surface, alpha, tool.proxy, tool.settings.radius, tool.patch, contacts);
   Vector3d push = Vector3d::Zero();
   for (const ProxyContact& contact : contacts) push += contact.share * contact.normal;
@@ -107,11 +121,12 @@ static void handOverContacts(const BlendedSurface& surface, double alpha, const 
   const double depth = std::max(0.0, push.dot(tool.proxy.centre - path.end));
   const double missing = std::max(0.0, tool.push / tool.settings.stiffness - depth);
   const double stiffer = makeUpFor(tool.proxy, path, missing * push, contacts);
+  const double damper = steadying(tool, path, frameDuration);
   for (const ProxyContact& contact : contacts) {
     const double bounded = cosine(contact) * boundedSum;
     handOverContact(surface, tool, path, contact,
                     {stiffer * contact.share / bounded, contact.share / sum,
-                     depth * (bounded / sum - contact.normal.dot(push)), across},
+                     depth * (bounded / sum - contact.normal.dot(push)), across, damper},
                     out);
   }
   if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.lastContact, {.across = pull}, out);
@@ -148,7 +163,7 @@ void handOverTool(const BlendedSurface& surface, double alpha, double frameDurat
   if (!tool.grip.held.empty())
     handOverGrip(surface, tool, path, frameDuration, out);
   else
-    handOverContacts(surface, alpha, tool, path, scratch, out);
+    handOverContacts(surface, alpha, frameDuration, tool, path, scratch, out);
 }
 
 }  // namespace medulla
