@@ -14,11 +14,13 @@ struct Path {
   Vector3d end, velocity;
 };
 // What one contact gets: of the tool's stiffness and damping, of forceMax, how much deeper its anchor lies (m), and the
-// coupling's pull across the common push (m). `steadying` (N s/m) adds to the tool's damping.
+// coupling's pull across the common push (m). `steadying` (N s/m) adds to the tool's damping, against the surface's own
+// velocity.
 struct Part {
   double stiffness = 1, forceMax = 1, deeper = 0;
-  Vector3d across;
+  Vector3d across = Vector3d::Zero();
   double steadying = 0;
+  Vector3d surfaceVelocity = Vector3d::Zero();
 };
 }  // namespace
 
@@ -61,6 +63,8 @@ static void handOverContact(const BlendedSurface& surface, const ServoTool& tool
   spring.outward = contact.normal;
   spring.stiffness = settings.stiffness * part.stiffness;
   spring.damping = (settings.damping + part.steadying) * part.stiffness;
+  if (part.steadying > 0)
+    spring.drift = part.steadying / (settings.damping + part.steadying) * (part.surfaceVelocity - path.velocity);
   spring.slides = proxy.slipping;
   spring.forceMax = settings.forceMax * part.forceMax;
   spring.friction = proxy.slipping ? settings.dynamicFriction : settings.staticFriction;
@@ -87,14 +91,25 @@ static double makeUpFor(const Proxy& proxy, const Path& path, const Vector3d& de
 // N s/m. Contacts are handed over once per frame, and a spring that is renewed after T gives back more than it took,
 // unless a damper of kT / 2 and more takes that (Colgate and Schenkel 1997). Deep in a liver, where shares and normals
 // of a dent's walls change from frame to frame, a tool of 400 N/m held still at 100 Hz swung tissue and hand between 1
-// and 18 N for ever; at kT it holds still. Of a device that moves such a damper would be felt as depth: it is gone
-// where the device moves by a hundredth of that depth in a frame, and a quarter percent of the push at most. Rejected:
-// twice as much, since jaws that close on the tissue then hold it otherwise; and a damper against the surface's own
-// velocity of the last frames, which leaves steady motion free, but makes free bodies heavier, and holds still less.
-static double steadying(const ServoTool& tool, const Path& path, double frameDuration) {
-  constexpr double kStill = 0.01;
+// and 18 N for ever; at kT it comes to rest within seconds, at 2 kT at once. Slack at the velocity that the surface had
+// over the last three frames, it leaves alone what moves steadily against the tool. It would make a free body heavier
+// that the tool sets in motion: it is for one that is still, gone where the device moves by a hundredth of the depth
+// that is felt in a frame, and whole after a while.
+static double steadying(ServoTool& tool, const Path& path, double frameDuration) {
+  constexpr double kDampers = 2, kStill = 0.01, kSettled = 0.4;  // s
   const double still = kStill * tool.push / tool.settings.stiffness, moved = path.velocity.norm() * frameDuration;
-  return still > moved ? tool.settings.stiffness * frameDuration * (1 - moved / still) : 0;
+  tool.stillFor = still > moved ? tool.stillFor + frameDuration : 0;
+  if (tool.stillFor == 0) return 0;
+  const double share = std::min(1.0, tool.stillFor / kSettled) * (1 - moved / still);
+  return kDampers * tool.settings.stiffness * frameDuration * share;
+}
+
+// m/s, of the surface at the contact, mean over the last frames.
+static Vector3d surfaceVelocity(const BlendedSurface& surface, const ProxyContact& contact, double frameDuration) {
+  Vector3d sum = Vector3d::Zero();
+  for (const std::vector<Vector3d>& step : surface.steps)
+    for (int i = 0; i < 3; ++i) sum += contact.weights[i] * step[surface.triangles[contact.triangle][i]];
+  return sum / (static_cast<double>(surface.steps.size()) * frameDuration);
 }
 
 // Several contacts stand oblique to the direction p of their common push (a groove, a dimple). The force on the proxy
@@ -105,7 +120,7 @@ static double steadying(const ServoTool& tool, const Path& path, double frameDur
 // B = sum_j s_j b_j, and its anchor lies lambda_i / k_i - D c_i = D (b_i B / C - c_i) deeper, so that it starts with
 // the same force. Softer springs alone gave the tissue a third of what the hand felt, at rest and at any rate.
 // Each is limited to its part of forceMax in the ratio of the pressures, s_i / C.
-static void handOverContacts(const BlendedSurface& surface, double alpha, double frameDuration, const ServoTool& tool,
+static void handOverContacts(const BlendedSurface& surface, double alpha, double frameDuration, ServoTool& tool,
                              const Path& path, std::vector<ProxyContact>& contacts, Loads& out) {
   patchContacts(surface, alpha, tool.proxy, tool.settings.radius, tool.patch, contacts);
   Vector3d push = Vector3d::Zero();
@@ -124,10 +139,11 @@ static void handOverContacts(const BlendedSurface& surface, double alpha, double
   const double damper = steadying(tool, path, frameDuration);
   for (const ProxyContact& contact : contacts) {
     const double bounded = cosine(contact) * boundedSum;
-    handOverContact(surface, tool, path, contact,
-                    {stiffer * contact.share / bounded, contact.share / sum,
-                     depth * (bounded / sum - contact.normal.dot(push)), across, damper},
-                    out);
+    handOverContact(
+        surface, tool, path, contact,
+        {stiffer * contact.share / bounded, contact.share / sum, depth * (bounded / sum - contact.normal.dot(push)),
+         across, damper, surfaceVelocity(surface, contact, frameDuration)},
+        out);
   }
   if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.lastContact, {.across = pull}, out);
 }
@@ -160,10 +176,12 @@ void handOverTool(const BlendedSurface& surface, double alpha, double frameDurat
                   ServoTool& tool, std::vector<ProxyContact>& scratch, Loads& out) {
   const Path path = devicePath(tool, frameDuration, tickDuration);
   tool.pathEnd = path.end;
-  if (!tool.grip.held.empty())
+  if (!tool.grip.held.empty()) {
+    tool.stillFor = 0;
     handOverGrip(surface, tool, path, frameDuration, out);
-  else
+  } else {
     handOverContacts(surface, alpha, frameDuration, tool, path, scratch, out);
+  }
 }
 
 }  // namespace medulla

@@ -33,6 +33,7 @@ struct ServoTool {
   std::optional<Eigen::Vector3d> pathEnd;  // m, of the device's path as handed over since the frame began
   double estimate = 0;                     // N, of the force at the last tick, before it was kept to the tissue's
   double push = 0;                         // N, along the normal, of what was felt at the last tick
+  double stillFor = 0;                     // s, that its device has been still while it pushes
   int ticks = 0;                           // in this frame
   bool isLeaving = false;
 };

@@ -168,7 +168,7 @@ void settleTool(WorldData& d, ImplicitData& s, std::size_t k, const StageLoads& 
   Vector3d pull, slip;  // along the axes
   for (int a = 0; a < 3; ++a) {
     slip[a] = load.axes[a].dot(p.anchorVelocity) - rate[a];
-    pull[a] = p.stiffness * load.axes[a].dot(p.anchor - x) + p.damping * slip[a];
+    pull[a] = p.stiffness * load.axes[a].dot(p.anchor - x) + p.damping * (load.axes[a].dot(p.slackVelocity) - rate[a]);
   }
   Vector3d force = pull, weight = Vector3d::Constant(spring);
   if (p.outward != nullptr) {

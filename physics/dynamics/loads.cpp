@@ -130,7 +130,7 @@ double settle(WorldData& d, const SettlingSpring& s, Vector3d& force) {
   const double h = d.substep, gain = p.stiffness * h * h + p.damping * h;
   Vector3d v = Vector3d::Zero();
   for (int i = 0; i < p.count; ++i) v += p.weights[i] * nodeVelocity(d, p.nodes[i], s.hosts[i]);
-  const Vector3d wanted = p.stiffness * (p.anchor - s.place - h * v) + p.damping * (p.anchorVelocity - v);
+  const Vector3d wanted = p.stiffness * (p.anchor - s.place - h * v) + p.damping * (p.slackVelocity - v);
   Vector3d next = force + (wanted - force) / (1 + gain * s.mobility);
   if (p.outward != nullptr) {
     const Vector3d& n = *p.outward;
@@ -157,6 +157,7 @@ PointSpring pointSpring(const WorldData& d, const Loads& loads, std::size_t k, d
     p.weights = t.weights;
     p.anchor = t.anchor - remaining * t.anchorVelocity;
     p.anchorVelocity = t.anchorVelocity;
+    p.slackVelocity = t.anchorVelocity + t.drift;
     p.outward = &t.outward;
     p.stiffness = t.stiffness;
     p.damping = t.damping;
@@ -170,7 +171,7 @@ PointSpring pointSpring(const WorldData& d, const Loads& loads, std::size_t k, d
     p.nodes[0] = d.ranges[held.body].node[held.node];
     p.weights[0] = 1;
     p.anchor = held.anchor - remaining * held.anchorVelocity;
-    p.anchorVelocity = held.anchorVelocity;
+    p.anchorVelocity = p.slackVelocity = held.anchorVelocity;
     p.stiffness = held.stiffness;
     p.damping = held.damping;
     p.forceMax = held.forceMax;

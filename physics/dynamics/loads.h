@@ -13,15 +13,15 @@ namespace medulla {
 struct SoftBodyModel;
 
 // The virtual coupling between a tool and the point of the surface that it touches. The surface point is
-// x = sum weights x_nodes; force on it: stiffness (anchor - x) + damping (anchorVelocity - x'), spread to the nodes by
-// the same weights (paper 4). A pushing spring never pulls: its component along `outward` is dropped when positive, and
-// across it holds by no more than friction times the push. One that slides is such a spring along `outward` alone, and
-// across it Coulomb's friction against the anchor's velocity: a spring would hold the tissue where it was touched at
-// the frame's start, as a drag of stiffness times the frame's duration, 8 N s/m at 50 Hz.
-// Of spring and damper together no more than `forceMax` is given, in the direction of the whole: what is limited pulls
-// with a constant force however far its anchor is, as a potential does that is quadratic first and a cone beyond
-// (Huber's), so that it gives back no more than it took. A softer spring instead, by what it gave lately, is a feedback
-// that is late by frames, and oscillates.
+// x = sum weights x_nodes; force on it: stiffness (anchor - x) + damping (anchorVelocity + drift - x'), spread to the
+// nodes by the same weights (paper 4). A pushing spring never pulls: its component along `outward` is dropped when
+// positive, and across it holds by no more than friction times the push. One that slides is such a spring along
+// `outward` alone, and across it Coulomb's friction against the anchor's velocity: a spring would hold the tissue where
+// it was touched at the frame's start, as a drag of stiffness times the frame's duration, 8 N s/m at 50 Hz. Of spring
+// and damper together no more than `forceMax` is given, in the direction of the whole: what is limited pulls with a
+// constant force however far its anchor is, as a potential does that is quadratic first and a cone beyond (Huber's), so
+// that it gives back no more than it took. A softer spring instead, by what it gave lately, is a feedback that is late
+// by frames, and oscillates.
 struct ToolSpring {
   int tool = 0;  // whose reaction this is
   int body = 0;
@@ -32,6 +32,7 @@ struct ToolSpring {
   Eigen::Vector3d outward = Eigen::Vector3d::UnitZ();        // unit surface normal at the contact
   double stiffness = 0;                                      // N/m
   double damping = 0;                                        // N s/m
+  Eigen::Vector3d drift = Eigen::Vector3d::Zero();           // m/s against the anchor, at which the damper is slack
   bool slides = false;
   double friction = std::numeric_limits<double>::infinity();  // Coulomb's, >= 0: dynamic where it slides, else static
   double forceMax = std::numeric_limits<double>::infinity();  // N

@@ -23,6 +23,7 @@ struct PointSpring {
   std::array<int, 3> nodes;  // indices in Nodes
   std::array<double, 3> weights;
   Eigen::Vector3d anchor, anchorVelocity;  // m, m/s, at the substep's end
+  Eigen::Vector3d slackVelocity;           // m/s, of the damper
   const Eigen::Vector3d* outward;          // null: pulls and pushes
   double stiffness, damping;
   bool slides;      // across `outward`: no spring, but Coulomb's friction
