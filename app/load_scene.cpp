@@ -91,13 +91,15 @@ static void resolvePatches(const Scene& scene, SceneBody& body) {
   std::sort(asked.begin(), asked.end());
   std::sort(known.begin(), known.end());
   if (model.identified && asked == known && std::abs(model.identified->poisson - body.tissue.poisson) < 1e-9) return;
-  throw inputError(scene.path, body.line,
-                   fmt::format("body \"{}\" has identified links, and its model {}; this would make it: {}", body.name,
-                               !model.identified ? "has none"
-                               : asked != known  ? "was identified with another part of its surface fixed"
-                                                 : fmt::format("was identified for a Poisson's ratio of {}",
-                                                               model.identified->poisson),
-                               identifyingCommand(body)));
+  throw inputError(
+      scene.path, body.line,
+      fmt::format("body \"{}\" has identified links, and its model {}; run where its mesh lies, this would make it: {}",
+                  body.name,
+                  !model.identified ? "has none"
+                  : asked != known
+                      ? "was identified with another part of its surface fixed"
+                      : fmt::format("was identified for a Poisson's ratio of {}", model.identified->poisson),
+                  identifyingCommand(body)));
 }
 
 static void fixSphere(SceneBody& body, int sphere, FixedFreedom freedom) {

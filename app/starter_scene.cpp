@@ -26,9 +26,18 @@ struct Layout {
   double size = 0;   // m, the box's diagonal
   double grain = 0;  // m, what the tool's own size and ways go by: `size`, on a thin body what its thickness asks for
   int axis = 0;      // of the box's longest side
+  int view = 2;      // along which the camera looks, from the positive side: z, or x across a body that is long in z
   double held = 0;   // -1 or 1: which end along the axis
   Vector3d touch = Vector3d::Zero(), normal = Vector3d::UnitZ();
 };
+
+Vector3d towardsCamera(const Layout& l) {
+  return Vector3d::Unit(l.view);
+}
+
+Vector3d rightOf(const Layout& l) {
+  return Vector3d::UnitY().cross(towardsCamera(l));
+}
 
 struct SurfacePoint {
   Vector3d at, normal;
@@ -53,9 +62,9 @@ std::vector<SurfacePoint> touchablePoints(const SoftBodyModel& m, double size) {
 SurfacePoint touchedPoint(const SoftBodyModel& m, const Layout& l) {
   Vector3d wanted = l.box.center();
   wanted[l.axis] -= 0.15 * l.held * l.box.sizes()[l.axis];
-  wanted.z() = l.box.max().z();
+  wanted[l.view] = l.box.max()[l.view];
   const auto distance = [&](const SurfacePoint& p) {
-    const double turnedAway = l.size * (1 - p.normal.z());
+    const double turnedAway = l.size * (1 - p.normal[l.view]);
     return (p.at - wanted).norm() + turnedAway;
   };
   const std::vector<SurfacePoint> points = touchablePoints(m, l.size);
@@ -96,6 +105,7 @@ Layout layOutScene(const SoftBodyModel& m) {
   l.box = boundsOf(m.restNodes);
   l.size = l.box.diagonal().norm();
   l.box.sizes().maxCoeff(&l.axis);
+  l.view = l.axis == 2 ? 0 : 2;
   l.held = l.axis == 1 || volumeBeyond(m, l, 1) > volumeBeyond(m, l, -1) ? 1 : -1;
   const SurfacePoint touched = touchedPoint(m, l);
   l.touch = touched.at;
@@ -150,9 +160,10 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
   const double stiffer = stiffening(model, held, tissue);
   tissue.young *= stiffer;
   constexpr double fov = 42, aspect = 16.0 / 9;
-  const Vector3d half = 0.5 * l.box.sizes(), centre = l.box.center();
-  const double halfHeight = 1.2 * std::max(half.y(), half.x() / aspect);
-  const double distance = half.z() + halfHeight / std::tan(0.5 * fov * std::numbers::pi / 180);
+  const Vector3d half = 0.5 * l.box.sizes(), centre = l.box.center(), toCamera = towardsCamera(l), right = rightOf(l);
+  const auto along = [&half](const Vector3d& axis) { return half.dot(axis.cwiseAbs()); };
+  const double halfHeight = 1.2 * std::max(half.y(), along(right) / aspect);
+  const double distance = along(toCamera) + halfHeight / std::tan(0.5 * fov * std::numbers::pi / 180);
   std::string out =
       fmt::format("<!-- {} with a tool that presses, grabs, pulls and twists it. SI units; y up. -->\n", name);
   out += fmt::format("<scene name=\"{}\">\n", name);
@@ -169,8 +180,8 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
   out += "    <!-- numbers of filling spheres; the model view shows the held ones grey -->\n";
   out += fmt::format("    <fix spheres=\"{}\"/>\n  </body>\n", numbersText(held));
   out += "  <!-- what it lies before; a mesh of yours is shape=\"mesh\" mesh=\"FILE\" -->\n";
-  out += fmt::format("  <static shape=\"plane\" position=\"{}\" normal=\"0 0 1\" look=\"wall\" contact=\"false\"/>\n",
-                     vectorText({centre.x(), centre.y(), l.box.min().z() - 0.15 * l.size}));
+  out += fmt::format("  <static shape=\"plane\" position=\"{}\" normal=\"{}\" look=\"wall\" contact=\"false\"/>\n",
+                     vectorText(centre - (along(toCamera) + 0.15 * l.size) * toCamera), vectorText(toCamera));
   // Three times as stiff as what the tool touches, at its size: as organs' scenes have it.
   out += fmt::format(
       "  <tool name=\"{}\" trajectory=\"{}.csv\" radius=\"{:.3g}\" stiffness=\"{:.3g}\" damping=\"{:.3g}\" "
@@ -179,16 +190,17 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
       name == "grasper" ? "tool" : "grasper", name, 0.03 * l.grain, 0.2 * tissue.young * l.size,
       0.4 * std::sqrt(stiffer) * std::pow(scale, 2.5), stiffer * 8 * std::pow(scale, 3),
       stiffer * 8 * std::pow(scale, 3), 0.08 * l.grain);
-  out += fmt::format("  <camera position=\"{}\" target=\"{}\" fov=\"{}\"/>\n",
-                     vectorText(centre + distance * Vector3d::UnitZ()), vectorText(centre), fov);
+  out += fmt::format("  <camera position=\"{}\" target=\"{}\" fov=\"{}\"/>\n", vectorText(centre + distance * toCamera),
+                     vectorText(centre), fov);
   out += fmt::format("  <light offset=\"{}\" reference_distance=\"{:.3g}\"/>\n",
-                     vectorText(distance * Vector3d(-0.1, 0.12, 0)), distance);
+                     vectorText(distance * (0.12 * Vector3d::UnitY() - 0.1 * right)), distance);
   out += "  <output size=\"1280 720\" fps=\"30\" golden=\"0 2.2 5.5\"/>\n</scene>\n";
   return out;
 }
 
 std::string trajectoryText(const Layout& l) {
-  const Vector3d shaft = (l.normal + Vector3d(0.35, 0.3, 0.2)).normalized();  // comes in from the upper right
+  const Vector3d view = 0.35 * rightOf(l) + 0.3 * Vector3d::UnitY() + 0.2 * towardsCamera(l);
+  const Vector3d shaft = (l.normal + view).normalized();  // comes in from the upper right
   const Eigen::Quaterniond straight = rotationBetween(Vector3d::UnitZ(), shaft);
   const Eigen::Quaterniond twisted = straight * Eigen::AngleAxisd(1.2, Vector3d::UnitZ());
   Vector3d sideways = Vector3d::Zero();

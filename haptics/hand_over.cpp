@@ -88,28 +88,32 @@ static double makeUpFor(const Proxy& proxy, const Path& path, const Vector3d& de
   return wanted > left ? wanted / left : 1;
 }
 
+constexpr int kFrames = 3;
+
 // N s/m. Contacts are handed over once per frame, and a spring that is renewed after T gives back more than it took,
 // unless a damper of kT / 2 and more takes that (Colgate and Schenkel 1997). Deep in a liver, where shares and normals
 // of a dent's walls change from frame to frame, a tool of 400 N/m held still at 100 Hz swung tissue and hand between 1
 // and 18 N for ever; at kT it comes to rest within seconds, at 2 kT at once. Slack at the velocity that the surface had
-// over the last three frames, it leaves alone what moves steadily against the tool. It would make a free body heavier
-// that the tool sets in motion: it is for one that is still, gone where the device moves by a hundredth of the depth
-// that is felt in a frame, and whole after a while.
+// over the last frames, it leaves alone what moves steadily against the tool. It would make a free body heavier that
+// the tool sets in motion, and drag on what it has just done: it is for one that is still, gone where the device moves
+// by a hundredth of the depth that is felt in a frame, begins when the last frames are of that time, and is whole after
+// a while.
 static double steadying(ServoTool& tool, const Path& path, double frameDuration) {
   constexpr double kDampers = 2, kStill = 0.01, kSettled = 0.4;  // s
   const double still = kStill * tool.push / tool.settings.stiffness, moved = path.velocity.norm() * frameDuration;
   tool.stillFor = still > moved ? tool.stillFor + frameDuration : 0;
-  if (tool.stillFor == 0) return 0;
-  const double share = std::min(1.0, tool.stillFor / kSettled) * (1 - moved / still);
-  return kDampers * tool.settings.stiffness * frameDuration * share;
+  const double since = tool.stillFor - kFrames * frameDuration;
+  if (!(since > 0)) return 0;
+  return kDampers * tool.settings.stiffness * frameDuration * std::min(1.0, since / kSettled) * (1 - moved / still);
 }
 
-// m/s, of the surface at the contact, mean over the last frames.
+// m/s, of the surface at the contact, mean over kFrames.
 static Vector3d surfaceVelocity(const BlendedSurface& surface, const ProxyContact& contact, double frameDuration) {
+  static_assert(kFrames == std::tuple_size_v<decltype(BlendedSurface::steps)>);
   Vector3d sum = Vector3d::Zero();
   for (const std::vector<Vector3d>& step : surface.steps)
     for (int i = 0; i < 3; ++i) sum += contact.weights[i] * step[surface.triangles[contact.triangle][i]];
-  return sum / (static_cast<double>(surface.steps.size()) * frameDuration);
+  return sum / (kFrames * frameDuration);
 }
 
 // Several contacts stand oblique to the direction p of their common push (a groove, a dimple). The force on the proxy

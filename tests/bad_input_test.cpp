@@ -26,6 +26,16 @@ TEST_F(BadInput, AStaticMeshBeyondWhatCanBeDrawnIsRefused) {
                 "own/organ.xml:1: own/far.obj reaches 1e+39 m from its origin, expected at most 1000 m");
 }
 
+TEST_F(BadInput, NothingIsWrittenToStandardOutputOrToAFolderThatIsCalledAsAModel) {
+  expectRefused(run({"render", "own/organ.xml", "-o", "-"}), "-: is no file");
+  expectRefused(run({"replay", "own/organ.xml", "--log", "-"}), "-: is no file");
+  folder.write("a.obj", "");
+  expectRefused(run({"build", "a.obj", "own/a.obj", "-o", "both.xml"}),
+                "both.xml: expected the name of a folder for the models of 2 meshes");
+  EXPECT_FALSE(std::filesystem::exists(folder / "-"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "both.xml"));
+}
+
 TEST_F(BadInput, AMeshThatIsFarTooLargeIsRefusedInOneLine) {
   folder.write("m.obj", "v 1e7 0 0\nv 0 1e7 0\nv 0 0 1e7\nv 0 0 0\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n");
   expectRefused(run({"build", "m.obj", "-o", "m.xml"}), "is the unit right?");

@@ -162,8 +162,14 @@ TEST_F(OwnGolden, WhatCannotBeComparedIsSaid) {
       golden({"--dir", "pictures", "--update", "own/other.xml", "own/organ.xml"}),
       "--update own/other.xml: neither one of the scenes of this call (own/organ.xml) nor a moment of one; each");
   expectRefused(golden({"own/organ.xml", "./own/organ.xml", "--dir", "pictures"}), "two scenes of the name organ");
+  expectRefused(golden({"own/organ.xml", "--dir", "own/organ.xml"}), "own/organ.xml: is no folder");
+  expectRefused(golden({"own/organ.xml", "--dir", "pictures", "--failures", "./pictures"}),
+                "--failures ./pictures: the golden images lie there, expected another folder");
   const ProgramResult twice = golden({"--dir", "pictures", "--update", "own/organ.xml", "--update", "own/organ.xml"});
   EXPECT_EQ(twice.out, "pictures/organ_8.png written\npictures/organ_10.png written\n") << twice.err;
+  write({.golden = "0.39 0.4"});
+  EXPECT_NE(golden({"own/organ.xml", "--dir", "pictures"}).out.find("two golden moments are picture 10 at 25 Hz"),
+            std::string::npos);
   write({.golden = "0.4"});
   std::filesystem::remove(folder / "pictures/organ_10.png");
   const ProgramResult r = golden({"own/organ.xml", "--dir", "pictures"});

@@ -65,7 +65,8 @@ TEST_F(IdentifiedScene, RunsHeldByItsPatch) {
 }
 
 TEST_F(IdentifiedScene, WithoutItsNetworkPatchOrRatioItIsRefusedAndTheRightBuildNamed) {
-  const std::string build = "; this would make it: medulla build pear.obj --spheres 7 --identify --poisson ";
+  const std::string build =
+      "; run where its mesh lies, this would make it: medulla build pear.obj --spheres 7 --identify --poisson ";
   EXPECT_EQ(refusal(scene(kHeld, "plain.xml")),
             "case.xml:3: body \"pear\" has identified links, and its model has none" + build +
                 "0.45 --fix plane=0,-1,0,0.02 -o plain.xml");

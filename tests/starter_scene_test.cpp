@@ -131,6 +131,25 @@ TEST(StarterScene, TheToolIsNoThickerThanAThinBody) {
   EXPECT_LT(scene.tools[0].settings.gripRadius, 0.01);
 }
 
+// From its end a long body hides behind the tool.
+TEST(StarterScene, ABodyIsSeenAcrossItsLongestSide) {
+  const TemporaryFolder folder;
+  const TriangleMesh mesh = cylinderMesh(0.2, 0.02, 12, 20);  // along x
+  for (const int axis : {0, 2}) {
+    std::string obj;
+    for (const Eigen::Vector3d& x : mesh.vertices)
+      obj += axis == 0 ? fmt::format("v {} {} {}\n", x.x(), x.y(), x.z())
+                       : fmt::format("v {} {} {}\n", x.y(), x.z(), x.x());
+    for (const auto& [a, b, c] : mesh.triangles) obj += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
+    const std::string name = fmt::format("bar{}", axis);
+    folder.write(name + ".obj", obj);
+    ASSERT_EQ(runProgram({"new", folder / (name + ".obj"), "-o", folder / name}).exitCode, 0);
+    const Scene scene = readScene(folder / (name + "/" + name + ".xml"));
+    const Eigen::Vector3d view = scene.camera[0].position - scene.camera[0].target;
+    EXPECT_GT(view[axis == 0 ? 2 : 0], 0.99 * view.norm());
+  }
+}
+
 TEST(StarterScene, HarmsNothingThatIsThere) {
   const TemporaryFolder folder;
   ASSERT_EQ(makeStarter(folder).exitCode, 0);

@@ -17,7 +17,7 @@ TEST_F(OwnScene, AStillToolComesToRestDeepInADent) {
     motion += fmt::format("{:.1f},{:.6f},{:.6f},{:.6f},1,0,0,0,0\n", 0.1 * k, at.x(), at.y(), at.z());
   }
   folder.write("own/liver.csv", motion);
-  folder.write("own/liver.xml", fmt::format(R"(<scene name="liver"><clock servo="1200" dynamics="200" duration="3.5"/>
+  folder.write("own/liver.xml", fmt::format(R"(<scene name="liver"><clock servo="1200" dynamics="200" duration="4"/>
 <dynamics gravity="0 0 0"/><tissue name="t" young="5000" damping="0.2"/>
 <body name="liver" model="{}/assets/liver/liver.model.xml" tissue="t" look="liver" links="springs" surface="contact">
 <fix box="-0.13 0.02 -0.08 -0.02 0.12 -0.038"/><fix box="-0.012 0.06 -0.05 0.016 0.12 0.01"/></body>
@@ -30,7 +30,7 @@ TEST_F(OwnScene, AStillToolComesToRestDeepInADent) {
   const auto column = std::find(log.columns.begin(), log.columns.end(), "tool.force.x") - log.columns.begin();
   Eigen::AlignedBox3d forces;
   for (const std::vector<double>& row : log.value)
-    if (row[0] > 2.5) forces.extend(Eigen::Vector3d(row[column], row[column + 1], row[column + 2]));
+    if (row[0] > 3) forces.extend(Eigen::Vector3d(row[column], row[column + 1], row[column + 2]));
   EXPECT_GT(forces.center().norm(), 1.5);
   EXPECT_LT(forces.diagonal().norm(), 0.02 * forces.center().norm());
 }

@@ -118,6 +118,9 @@ void warnOfErrors(const BuildJob& job) {
 
 std::vector<BuildJob> jobsOf(const BuildOptions& options) {
   std::vector<BuildJob> jobs;
+  if (options.meshes.size() > 1 && fs::path(options.output).extension() == ".xml")
+    throw std::runtime_error(fmt::format("{}: expected the name of a folder for the models of {} meshes",
+                                         options.output, options.meshes.size()));
   for (std::size_t m = 0; m < options.meshes.size(); ++m) {
     BuildJob& job = jobs.emplace_back();
     job.meshPath = options.meshes[m];

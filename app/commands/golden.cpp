@@ -72,6 +72,9 @@ std::vector<Moment> momentsOf(const Scene& scene) {
     Moment moment;
     moment.frame = std::min(static_cast<int>(std::lround(time * scene.fps)), pictureCount(scene) - 1);
     moment.name = fmt::format("{}_{}", stemOf(scene.path), moment.frame);
+    if (!moments.empty() && moments.back().frame == moment.frame)
+      throw std::runtime_error(
+          fmt::format("{}: two golden moments are picture {} at {:.6g} Hz", scene.path, moment.frame, scene.fps));
     moments.push_back(std::move(moment));
   }
   return moments;
@@ -326,8 +329,18 @@ int compareScenes(const std::vector<std::string>& scenes, const GoldenOptions& o
 
 }  // namespace
 
+// Golden images have a folder of their own.
+static void requireApart(const std::string& folder, const GoldenOptions& options) {
+  std::error_code none;
+  if (fs::exists(folder) && !fs::is_directory(folder)) throw std::runtime_error(folder + ": is no folder");
+  if (fs::equivalent(folder, options.failures, none))
+    throw std::runtime_error("--failures " + options.failures +
+                             ": the golden images lie there, expected another folder");
+}
+
 int runGolden(const GoldenOptions& options) {
   const std::vector<std::string> scenes = goldenScenes(options);
+  for (const std::string& scene : scenes) requireApart(goldenFolderOf(scene, options), options);
   if (!options.update.empty()) return updateImages(scenes, options);
   const OutputFolder made(options.failures);
   return compareScenes(scenes, options);

@@ -34,8 +34,14 @@ FolderLock::~FolderLock() {
   ::close(descriptor_);
 }
 
+// As other programs take it, though nothing here writes there but results.
+static const std::string& namedFile(const std::string& path) {
+  if (path == "-") throw std::runtime_error("-: is no file; standard output holds the results, name a file");
+  return path;
+}
+
 OutputFile::OutputFile(const std::string& path)
-    : path_(path), file_(path), descriptor_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
+    : path_(namedFile(path)), file_(path), descriptor_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
   if (descriptor_ < 0) throw unwritable(path_);
 }
 
@@ -96,6 +102,7 @@ void requireWritable(const std::vector<std::string>& paths) {
 }
 
 OutputFolder::OutputFolder(const std::string& path) {
+  namedFile(path);
   std::error_code error;
   std::filesystem::path missing = path;
   // A link that leads nowhere is there, and not ours to remove.

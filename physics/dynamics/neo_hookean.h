@@ -25,7 +25,8 @@ MEDULLA_INLINE Lanes neoHookeanSlope(Lanes stretch) {
 // Over EA L: the tension's integral from rest.
 inline Lanes neoHookeanEnergy(Lanes stretch) {
   const Lanes half = splat(0.5), x = larger(stretch, splat(kStraightBelow)), below = stretch - x;
-  const Lanes inverse = splat(1) / x, bar = fma(half * x, x, inverse) - splat(1.5);
+  const Lanes longer = x - splat(1);
+  const Lanes bar = longer * longer * (x + splat(2)) / (x + x);  // x^2 / 2 + 1 / x - 3 / 2, without their rounding
   const Lanes straight = fma(half * neoHookeanSlope(x), below, neoHookeanTension(x));
   return fma(splat(1.0 / 3), bar, straight * below);
 }
