@@ -91,15 +91,14 @@ static double makeUpFor(const Proxy& proxy, const Path& path, const Vector3d& de
 constexpr int kFrames = 3;
 
 // N s/m. Contacts are handed over once per frame, and a spring that is renewed after T gives back more than it took,
-// unless a damper of kT / 2 and more takes that (Colgate and Schenkel 1997). Deep in a liver, where shares and normals
-// of a dent's walls change from frame to frame, a tool of 400 N/m held still at 100 Hz swung tissue and hand between 1
-// and 18 N for ever; at kT it comes to rest within seconds, at 2 kT at once. Slack at the velocity that the surface had
-// over the last frames, it leaves alone what moves steadily against the tool. It would make a free body heavier that
-// the tool sets in motion, and drag on what it has just done: it is for one that is still, gone where the device moves
-// by a hundredth of the depth that is felt in a frame, begins when the last frames are of that time, and is whole after
-// a while.
+// unless a damper of kT / 2 and more takes that (Colgate and Schenkel 1997): README, what the dynamics gets. Slack at
+// the velocity that the surface had over the last kFrames, it leaves alone what moves steadily against the tool. It
+// would make a free body heavier that the tool sets in motion: it is for a tool that is still, gone where the device
+// moves by kStill of the depth that is felt in a frame, starts once all kFrames lie within that time, and grows over
+// kSettled. With kT a tool deep in a liver came to rest within seconds, with 2 kT at once.
 static double steadying(ServoTool& tool, const Path& path, double frameDuration) {
-  constexpr double kDampers = 2, kStill = 0.01, kSettled = 0.4;  // s
+  constexpr double kDampers = 2, kStill = 0.01;
+  constexpr double kSettled = 0.4;  // s
   const double still = kStill * tool.push / tool.settings.stiffness, moved = path.velocity.norm() * frameDuration;
   tool.stillFor = still > moved ? tool.stillFor + frameDuration : 0;
   const double since = tool.stillFor - kFrames * frameDuration;

@@ -3,6 +3,7 @@
 #include "physics/dynamics/node_motion.h"
 #include "physics/dynamics/stages.h"
 #include "tests/complaint.h"
+#include "tests/contact_bodies.h"
 #include "tests/dynamics_states.h"
 #include "tests/identified_model.h"
 #include "tests/synthetic_model.h"
@@ -235,6 +236,31 @@ TEST(Loads, AtRestTheForceIsStiffnessTimesDistance) {
     EXPECT_GT(expected.norm(), 1e-4);
     EXPECT_LT((impulse[0] - expected).norm(), 1e-3 * expected.norm());
   }
+}
+
+// Of a surface that moves away at the anchor's velocity and the drift the damper takes nothing.
+TEST(Loads, ADamperIsSlackAtItsDriftAgainstTheAnchor) {
+  for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit})
+    for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+      WorldSettings settings = weightless();
+      settings.integrator = integrator;
+      BodyDescription b = synthetic::body(synthetic::shortTube(), 6e3);
+      b.surface = surface;
+      const auto impulseWith = [&](double share) {
+        World world(settings, {b});
+        ToolSpring s = pushAt(world, 30, 0);
+        const Vector3d away = 0.1 * s.outward;
+        synthetic::throwBody(world, 0, away);
+        s.stiffness = 0;
+        s.damping = 20;
+        s.drift = share * away;
+        Loads loads;
+        loads.toolSprings = {s};
+        return world.advance(loads)[0].norm();
+      };
+      EXPECT_LT(impulseWith(1), 1e-9);
+      EXPECT_GT(impulseWith(0), 1e-3);
+    }
 }
 
 // What lies on a floor is stopped by it after the loads, which must not yield to the velocity that the floor takes

@@ -123,6 +123,13 @@ TEST(Link, SwingingPastTheFoldWindsNothingUp) {
     runStage(d, evaluateForces);
   }
   EXPECT_LT(elastic(d), 1e-12);
+  // Folded by 160 degrees it knows no twist.
+  const Vector3d fold = 160.0 / 180 * std::numbers::pi * beside;
+  turnBy(d, 1, fold);
+  const double folded = elastic(d);
+  turnBy(d, 1, Eigen::AngleAxisd(fold.norm(), beside) * line);
+  EXPECT_GT(folded, 1e-5);
+  EXPECT_NEAR(elastic(d), folded, 1e-9 * folded);
 }
 
 TEST(Attachment, ForcesOnNodesAndSpheresAreMinusTheEnergyGradient) {

@@ -94,7 +94,7 @@ TEST(VertexFile, MistakesNameTheLine) {
   EXPECT_EQ(vertices("-1\n"), "v.csv:1: column vertex is '-1', expected a whole number from 0 to 5");
   EXPECT_EQ(vertices("0\n1.5\n"), "v.csv:2: column vertex is '1.5', expected a whole number from 0 to 5");
   EXPECT_EQ(vertices("0,1\n"), "v.csv:1: 2 columns in this row, expected vertex");
-  EXPECT_EQ(vertices("vertices\n0\n"), "v.csv:1: the header is 'vertices', expected vertex");
+  EXPECT_EQ(vertices("vertices\n0\n"), "v.csv:1: the first row is 'vertices', expected a header vertex or numbers");
   EXPECT_EQ(vertices("vertex\n\n2\n"), "v.csv:3: vertex 2 is none of the surface: repair dropped it from the mesh");
   EXPECT_EQ(vertices("vertex\n"), "v.csv: no rows, expected at least one of vertex");
   EXPECT_EQ(vertices(""), "v.csv: no rows, expected at least one of vertex");
@@ -102,8 +102,9 @@ TEST(VertexFile, MistakesNameTheLine) {
   EXPECT_EQ(forces("0,1e999,0,0\n"), "f.csv:1: column fx[N] is '1e999', expected a finite number");
   EXPECT_EQ(forces("vertex,fx,fy,fz\n0,0,0\n"), "f.csv:2: 3 columns in this row, expected vertex,fx[N],fy[N],fz[N]");
   EXPECT_EQ(forces("0,0,0,\n"), "f.csv:1: column fz[N] is '', expected a finite number");
-  EXPECT_EQ(forces("vertex,fx[mN],fy[mN],fz[mN]\n0,1,2,3\n"),
-            "f.csv:1: the header is 'vertex,fx[mN],fy[mN],fz[mN]', expected vertex,fx[N],fy[N],fz[N]");
+  EXPECT_EQ(
+      forces("vertex,fx[mN],fy[mN],fz[mN]\n0,1,2,3\n"),
+      "f.csv:1: the first row is 'vertex,fx[mN],fy[mN],fz[mN]', expected a header vertex,fx[N],fy[N],fz[N] or numbers");
   EXPECT_EQ(forces("1,0,0,0\n1,0,0,1\n"), "f.csv:2: vertex 1 stands twice");
   EXPECT_EQ(forces("7,0,0,0\n"), "f.csv:1: column vertex is '7', expected a whole number from 0 to 5");
 }
@@ -219,7 +220,8 @@ TEST_F(LoadCase, MistakesNameFileAndLine) {
             "case.xml:4: list of vertices \"none.csv\" does not exist");
   EXPECT_EQ(refusal("<load file='none.csv'/>"), "case.xml:4: file of forces \"none.csv\" does not exist");
   EXPECT_EQ(refusal("<load file='nan.csv'/>"), "nan.csv:2: column fy[N] is 'nan', expected a finite number");
-  EXPECT_EQ(refusal("<load file='far.csv'/>"), "far.csv:1: the header is 'vertex', expected vertex,fx[N],fy[N],fz[N]");
+  EXPECT_EQ(refusal("<load file='far.csv'/>"),
+            "far.csv:1: the first row is 'vertex', expected a header vertex,fx[N],fy[N],fz[N] or numbers");
   folder.write("semicolons.csv", "vertex;fx[N];fy[N];fz[N]\n1;0;0;1\n");
   EXPECT_EQ(refusal("<load file='semicolons.csv'/>"),
             "semicolons.csv:1: columns are separated by semicolons, expected commas");

@@ -56,7 +56,7 @@ struct SpringBody {
         v += spring.weights[k] * velocity[spring.nodes[k]];
       }
       Eigen::Vector3d f = spring.stiffness * (spring.anchor - left * spring.anchorVelocity - x) +
-                          spring.damping * (spring.anchorVelocity - v);
+                          spring.damping * (spring.anchorVelocity + spring.drift - v);
       f -= std::max(0.0, f.dot(spring.outward)) * spring.outward;
       if (spring.slides) {  // regularised: full friction from 1 mm/s on
         const Eigen::Vector3d push = f.dot(spring.outward) * spring.outward, slip = spring.anchorVelocity - v;

@@ -340,8 +340,8 @@ static void requireApart(const std::string& folder, const GoldenOptions& options
 
 int runGolden(const GoldenOptions& options) {
   const std::vector<std::string> scenes = goldenScenes(options);
-  for (const std::string& scene : scenes) requireApart(goldenFolderOf(scene, options), options);
   if (!options.update.empty()) return updateImages(scenes, options);
+  for (const std::string& scene : scenes) requireApart(goldenFolderOf(scene, options), options);
   const OutputFolder made(options.failures);
   return compareScenes(scenes, options);
 }

@@ -128,7 +128,7 @@ static void printUnits(const LoadedScene& loaded) {
     for (const Eigen::Vector3d& x : body.model->restNodes) bodies.extend(body.worldFromModel * x);
   for (std::size_t k = 0; k < scene.statics.size(); ++k) {
     const double size = boundsDiagonal(loaded.statics[k]), around = bodies.diagonal().norm();
-    if (!scene.statics[k].meshPath.empty() && (size > 100 * around || size < 0.001 * around))
+    if (!scene.statics[k].meshPath.empty() && (size > 50 * around || size < 0.01 * around))
       tell("note: {} is {:.3g} m across, beside bodies of {:.3g} m in all; is its unit right?\n",
            scene.statics[k].meshPath, size, around);
   }
@@ -138,7 +138,11 @@ static void printPassedThrough(const Scene& scene) {
   if (scene.dynamics.contact != ContactMode::none) return;
   const bool any =
       std::any_of(scene.statics.begin(), scene.statics.end(), [](const SceneStatic& s) { return s.contact; });
-  if (any) tell("note: bodies pass through static shapes: <dynamics contact=\"none\">\n");
+  if (any)
+    tell(
+        "note: bodies pass through static shapes: <dynamics contact=\"balls\"> lets them lie on these, "
+        "contact=\"false\" "
+        "of the shapes ends this note\n");
 }
 
 void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world) {
@@ -212,9 +216,8 @@ void printNotes(const LoadedScene& loaded, const RunTotals& totals, const CreepR
         totals.volumeRatioMin);
   else if (totals.volumeRatioMax > 2)
     tell(
-        "note: a body was blown up to {:.3g} times its volume: its tissue is too soft for what acts on it, or a step "
-        "too "
-        "long\n",
+        "note: a body was blown up to {:.3g} times its volume: its tissue is too soft for what acts on it, or a "
+        "step too long\n",
         totals.volumeRatioMax);
   if (creep.substeps == 0) return;
   std::vector<std::string> names;

@@ -17,7 +17,7 @@ static std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-// As spreadsheets and statistics programs write what is no number of theirs.
+// Spreadsheets and statistics programs put quotes around text. A separator or # within them is one all the same.
 static std::string_view unquoted(std::string_view cell) {
   const bool quoted = cell.size() >= 2 && cell.front() == '"' && cell.back() == '"';
   return quoted ? trimmed(cell.substr(1, cell.size() - 2)) : cell;

@@ -34,7 +34,7 @@ FolderLock::~FolderLock() {
   ::close(descriptor_);
 }
 
-// As other programs take it, though nothing here writes there but results.
+// Other programs take - for standard output, which carries the results alone here.
 static const std::string& namedFile(const std::string& path) {
   if (path == "-") throw std::runtime_error("-: is no file; standard output holds the results, name a file");
   return path;

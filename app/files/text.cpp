@@ -66,13 +66,15 @@ std::size_t editsBetween(const std::string& a, const std::string& b) {
   return d[a.size()][b.size()];
 }
 
+constexpr std::size_t kLongestName = 200;  // nobody mistypes more; the table of edits is quadratic
+
 struct NearName {
   std::string name;
   std::size_t edits = std::numeric_limits<std::size_t>::max();
 };
 
 NearName nearest(const std::string& name, const std::vector<std::string>& known) {
-  const std::string wanted = lowered(name.substr(0, 200));  // nobody mistypes more; the table is quadratic
+  const std::string wanted = lowered(name.substr(0, kLongestName));
   NearName best;
   for (const std::string& candidate : known)
     if (const std::size_t edits = editsBetween(wanted, lowered(candidate)); edits < best.edits)
@@ -89,7 +91,7 @@ std::string nearestName(const std::string& name, const std::vector<std::string>&
 std::string hintOfNames(const std::string& name, const std::vector<std::string>& known) {
   if (known.empty()) return {};
   const NearName best = nearest(name, known);
-  const bool alike = 2 * best.edits <= std::max(name.size(), best.name.size());
+  const bool alike = 2 * best.edits <= std::max(std::min(name.size(), kLongestName), best.name.size());
   return alike ? "did you mean " + inQuotes(best.name, '"') + "?" : "expected one of " + joined(known, ", ");
 }
 

@@ -40,7 +40,8 @@ void forEachVertex(std::string_view text, const std::string& name, const SoftBod
     if (first) rows.requireCommas();
     if (first && isHeader(rows.cells(), columns)) continue;
     if (first && !parseNumber<double>(rows.cells()[0]))
-      rows.fail(fmt::format("the header is {}, expected {}", inQuotes(joined(rows.cells(), ",")), expected));
+      rows.fail(fmt::format("the first row is {}, expected a header {} or numbers", inQuotes(joined(rows.cells(), ",")),
+                            expected));
     rows.requireCells(columns.size(), expected);
     const int vertex = rows.index(0, columns[0], model.nodeOfInputVertex.size());
     const int node = model.nodeOfInputVertex[vertex];

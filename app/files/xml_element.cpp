@@ -108,7 +108,7 @@ void checkAttributes(const XmlElement& element, const XmlRule& rule) {
   known.insert(known.end(), rule.optional.begin(), rule.optional.end());
   for (const XmlAttribute& a : element.attributes) {
     if (std::find(known.begin(), known.end(), a.name) != known.end()) continue;
-    if (a.name.starts_with("xmlns") || a.name.starts_with("xsi:")) continue;  // by which editors find the schema
+    if (a.name.starts_with("xmlns:") || a.name.starts_with("xsi:")) continue;  // by which editors find the schema
     throw complaint(a.where,
                     "<" + element.name + "> has no attribute " + inQuotes(a.name, '"') + suggestion(a.name, known));
   }

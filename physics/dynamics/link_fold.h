@@ -37,8 +37,9 @@ MEDULLA_INLINE Fade fadeAt(Lanes cosine) {
 // the present pose.
 void bendFar(const LinkGroup& l, const LinkMeasures& m, const Flexion& q0, const Flexion& q1, const Flexion& still0,
              const Flexion& still1, Lanes far, Bending& b);
-// Of the flexions' gradients by n and the twist's moment: as what they belong to fades, it pulls the link straight.
-// What has faded forgets its turns: an end that swings past 180 degrees on one side would gain one.
+// Fades the twist's moment, and adds to the gradients by n the energy's slope by that: a link that is twisted gives its
+// torsion up by folding on. What has faded forgets its turns, since an end that swings past 180 degrees on one side
+// would gain one; nodes that hang by the twist then jump by their share of the turn, as they would have been wound up.
 void fade(const LinkGroup& l, const LinkMeasures& m, const Flexion& still0, const Flexion& still1, Lanes3& bend0,
           Lanes3& bend1, Lanes& twistMoment, Quad& unwoundTwist);
 
