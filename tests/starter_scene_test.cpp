@@ -144,7 +144,7 @@ TEST(StarterScene, ABodyIsSeenAcrossItsLongestSide) {
     const std::string name = fmt::format("bar{}", axis);
     folder.write(name + ".obj", obj);
     ASSERT_EQ(runProgram({"new", folder / (name + ".obj"), "-o", folder / name}).exitCode, 0);
-    const Scene scene = readScene(folder / (name + "/" + name + ".xml"));
+    const Scene scene = readScene(folder / fmt::format("{0}/{0}.xml", name));
     const Eigen::Vector3d view = scene.camera[0].position - scene.camera[0].target;
     EXPECT_GT(view[axis == 0 ? 2 : 0], 0.99 * view.norm());
   }

@@ -13,8 +13,9 @@
 // Springs between tools and surface nodes. A node weighs tens of milligrams and a virtual coupling has hundreds of N/m
 // and up to 1 N s/m: explicitly that needs substeps of 0.05 ms. Each load therefore solves
 //   f = k (a - x - h v) + c (s - v)
-// with the velocity s at which the damper is slack and the velocity v that all other forces *and f itself* leave at the substep's end. Rejected: raising the number of
-// substeps while a tool touches (6 times the cost, and a step that depends on the tool).
+// with the velocity s at which the damper is slack and the velocity v that all other forces *and f itself* leave at the
+// substep's end. Rejected: raising the number of substeps while a tool touches (6 times the cost, and a step that
+// depends on the tool).
 namespace medulla {
 
 namespace {

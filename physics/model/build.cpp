@@ -51,8 +51,8 @@ void checkSettings(const BuildSettings& s) {
 void requireDrawable(std::size_t triangles, int levels) {
   constexpr std::size_t kMost = 4'000'000;  // 3 GB while they are made
   if (triangles << (2 * levels) > kMost)
-    throw std::runtime_error(fmt::format("{} triangles, divided {} times, are {} to draw; expected {} at most", triangles,
-                                         levels, triangles << (2 * levels), kMost));
+    throw std::runtime_error(fmt::format("{} triangles, divided {} times, are {} to draw; expected {} at most",
+                                         triangles, levels, triangles << (2 * levels), kMost));
 }
 
 // Spheres without material of their own are dropped; links to them pass to the nearest other sphere.
