@@ -145,7 +145,7 @@ static void handOverContacts(const BlendedSurface& surface, double alpha, double
     handOverContact(
         surface, tool, path, contact,
         {stiffer * contact.share / bounded, contact.share / sum, depth * (bounded / sum - contact.normal.dot(push)),
-         across, damper, surfaceVelocity(surface, contact, frameDuration)},
+         across, damper, damper > 0 ? surfaceVelocity(surface, contact, frameDuration) : Vector3d(path.velocity)},
         out);
   }
   if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.lastContact, {.across = pull}, out);

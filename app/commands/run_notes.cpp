@@ -126,8 +126,9 @@ static void printUnits(const LoadedScene& loaded) {
   Eigen::AlignedBox3d bodies;
   for (const SceneBody& body : scene.bodies)
     for (const Eigen::Vector3d& x : body.model->restNodes) bodies.extend(body.worldFromModel * x);
+  const double around = bodies.diagonal().norm();
   for (std::size_t k = 0; k < scene.statics.size(); ++k) {
-    const double size = boundsDiagonal(loaded.statics[k]), around = bodies.diagonal().norm();
+    const double size = boundsDiagonal(loaded.statics[k]);
     if (!scene.statics[k].meshPath.empty() && (size > 50 * around || size < 0.01 * around))
       tell("note: {} is {:.3g} m across, beside bodies of {:.3g} m in all; is its unit right?\n",
            scene.statics[k].meshPath, size, around);
@@ -141,8 +142,7 @@ static void printPassedThrough(const Scene& scene) {
   if (any)
     tell(
         "note: bodies pass through static shapes: <dynamics contact=\"balls\"> lets them lie on these, "
-        "contact=\"false\" "
-        "of the shapes ends this note\n");
+        "contact=\"false\" of the shapes ends this note\n");
 }
 
 void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world) {
