@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -80,8 +79,7 @@ void refuseOtherKinds(const std::string& option, const std::string& path, const 
   constexpr std::string_view kinds[] = {".xml", ".xsd", ".csv",  ".cache", ".obj",  ".off",  ".ply", ".stl",
                                         ".mp4", ".gif", ".webm", ".png",   ".webp", ".html", ".svg", ".md",
                                         ".c",   ".h",   ".cpp",  ".py",    ".sh",   ".json", ".yml"};
-  std::string own = std::filesystem::path(path).extension().string();
-  std::transform(own.begin(), own.end(), own.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string own = lowered(std::filesystem::path(path).extension().string());
   if (own.empty() || own == ending) return;
   if (std::find(std::begin(kinds), std::end(kinds), own) != std::end(kinds))
     usageError(option, path, "a file that ends in " + ending);
@@ -173,7 +171,7 @@ void requireCommand(const CLI::App& app, const std::string& word) {
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
     known.push_back(command->get_name());
   if (word.starts_with('-') || std::find(known.begin(), known.end(), word) != known.end()) return;
-  throw CLI::ParseError("there is no command \"" + word + "\"; did you mean " + nearestName(word, known) + "?",
+  throw CLI::ParseError("there is no command \"" + word + "\"; " + hintOfNames(word, known),
                         CLI::ExitCodes::ExtrasError);
 }
 
@@ -196,9 +194,8 @@ void requireOptions(const CLI::App& command, const std::vector<std::string>& wor
     if (word == "--") return;
     const std::string name = word.substr(0, word.find('='));
     if (!name.starts_with("--") || std::find(known.begin(), known.end(), name) != known.end()) continue;
-    throw CLI::ParseError(
-        "medulla " + command.get_name() + " has no option " + name + "; did you mean " + nearestName(name, known) + "?",
-        CLI::ExitCodes::ExtrasError);
+    throw CLI::ParseError("medulla " + command.get_name() + " has no option " + name + "; " + hintOfNames(name, known),
+                          CLI::ExitCodes::ExtrasError);
   }
 }
 

@@ -92,7 +92,7 @@ void readView(const RenderArguments& a, ViewOptions& view) {
   try {
     view.shown = readShown(a.show);
   } catch (const std::invalid_argument& error) {
-    usageError("--show", joined(a.show, ","), error.what());
+    throw CLI::ValidationError("--show " + joined(a.show, ","), error.what());
   }
   const auto isTissue = [](ViewKind kind) { return kind == ViewKind::tissue; };
   if (namesModelPart(a.show) && std::all_of(view.panels.begin(), view.panels.end(), isTissue))

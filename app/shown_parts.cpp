@@ -30,7 +30,7 @@ static const ShownPart& findPart(const std::string& name) {
   std::vector<std::string> known;
   known.reserve(parts.size());
   for (const ShownPart& p : parts) known.emplace_back(p.name);
-  throw std::invalid_argument(joined(known, ", ") + "; did you mean \"" + nearestName(name, known) + "\"?");
+  throw std::invalid_argument(hintAndNames(name, known));
 }
 
 bool namesModelPart(const std::vector<std::string>& names) {

@@ -296,7 +296,7 @@ TEST(Program, HelpAndVersion) {
 
 TEST(ProgramRefuses, WrongUsageWithCodeTwo) {
   expectRefusal(runProgram({"replay"}), 2, {"SCENE"});
-  expectRefusal(runProgram({"rneder", kScene}), 2, {"rneder", "did you mean render?"});
+  expectRefusal(runProgram({"rneder", kScene}), 2, {"rneder", "did you mean \"render\"?"});
   expectRefusal(runProgram({"new", "egg.obj", "--sphere", "9"}), 2, {"no option --sphere", "--spheres", "new --help"});
   expectRefusal(runProgram({"replay", kScene, "--log-rate", "tick"}), 2, {"--log-rate", "--log"});
   expectRefusal(runProgram({"render", kScene, "--size", "10x"}), 2, {"--size"});
@@ -338,7 +338,8 @@ TEST(ProgramRefuses, BadTrajectories) {
   folder.write("unit.xml", "<recording file='r.txt' map='sofa'><units length='meter'/></recording>");
   folder.write("short.xml", "<recording file='r.csv' map='jigsaws' part='slave_left'/>");
   folder.write("r.csv", "1 2 3\n");
-  expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "unit.xml"}), 1, {"unit.xml:1", "\"m\""});
+  expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "unit.xml"}), 1,
+                {"unit.xml:1", "expected one of m, cm"});
   expectRefusal(runProgram({"check", kScene, "--trajectory", folder / "short.xml"}), 1, {"r.csv:1", "76"});
   expectRefusal(runProgram({"replay", kScene, "--trajectory", folder / "short.xml", "--log", folder / "r.csv"}), 1,
                 {"r.csv:1"});

@@ -1,6 +1,5 @@
 #include "app/files/mesh_file.h"
 
-#include <cctype>
 #include <filesystem>
 #include <system_error>
 
@@ -9,6 +8,7 @@
 #include "app/files/obj_reader.h"
 #include "app/files/off_reader.h"
 #include "app/files/ply_reader.h"
+#include "app/files/text.h"
 #include "app/files/text_file.h"
 
 namespace medulla {
@@ -16,9 +16,7 @@ namespace medulla {
 namespace {
 
 std::string extensionOf(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
+  return lowered(std::filesystem::path(path).extension().string());
 }
 
 // Complaints that all formats share, before any reader sees the path.

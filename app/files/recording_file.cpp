@@ -55,7 +55,7 @@ std::string locate(const ColumnChoice& choice, const std::vector<std::string>& h
     else if (header.empty())
       return fmt::format("column {} is wanted, but the file has no header", inQuotes(column));
     else
-      return fmt::format("no column {}; did you mean {}?", inQuotes(column), inQuotes(nearestName(column, header)));
+      return fmt::format("no column {}; {}", inQuotes(column), hintOfNames(column, header));
   }
   return "";
 }

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
+#include "app/files/text.h"
 #include "app/files/text_file.h"
 #include "app/files/text_lines.h"
 
@@ -18,8 +18,7 @@ static std::optional<double> unitOfRemark(std::string_view remark, const std::st
   TextLines lines(remark, name);
   if (!lines.next()) return {};
   const auto& words = lines.words();
-  std::string first(words[0]);
-  std::transform(first.begin(), first.end(), first.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string first = lowered(words[0]);
   if (!first.starts_with("unit")) return {};
   const std::optional<double> unit = words.size() == 3 ? parseNumber<double>(words[1]) : std::nullopt;
   if (first != "unit" || !unit || !(*unit > 0) || words[2] != "m")

@@ -102,7 +102,7 @@ Tissue findTissue(const XmlElement& body, const std::vector<NamedTissue>& tissue
     if (t.name == name) return t.tissue;
     known.push_back(t.name);
   }
-  refuse(body, "tissue", "no <tissue> of this name; did you mean \"" + nearestName(name, known) + "\"?");
+  refuse(body, "tissue", "no <tissue> of this name; " + hintOfNames(name, known));
 }
 
 Region readRegion(const XmlElement& e) {
@@ -211,8 +211,7 @@ void readNeighbours(const XmlElement& root, Scene& scene) {
       for (const std::string& name : readWords(*e, "names")) {
         const auto found = std::find(known.begin(), known.end(), name);
         if (found == known.end())
-          refuse(*e, "names",
-                 fmt::format("no <body> is named \"{}\"; did you mean \"{}\"?", name, nearestName(name, known)));
+          refuse(*e, "names", fmt::format("no <body> is named \"{}\"; {}", name, hintOfNames(name, known)));
         if (name == known[b]) refuse(*e, "names", "a body is no neighbour of itself");
         out.push_back(static_cast<int>(found - known.begin()));
       }

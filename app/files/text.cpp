@@ -5,15 +5,20 @@
 
 namespace medulla {
 
-std::string inQuotes(std::string_view word, char mark) {
+// On one line, without what terminals obey.
+static std::string shortened(std::string_view word) {
   constexpr std::size_t kLongest = 60;
-  std::string out(1, mark);
+  std::string out;
   for (const char c : word.substr(0, kLongest)) {
     const bool blank = c == '\n' || c == '\t' || c == '\r', control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
     out += blank ? ' ' : control ? '?' : c;
   }
   if (word.size() > kLongest) out += "...";
-  return out + mark;
+  return out;
+}
+
+std::string inQuotes(std::string_view word, char mark) {
+  return mark + shortened(word) + mark;
 }
 
 std::string shellWord(std::string_view word) {
@@ -40,14 +45,14 @@ std::string escapedXml(std::string_view text) {
   return out;
 }
 
-namespace {
-
 std::string lowered(std::string_view text) {
   std::string out(text);
   for (char& c : out)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   return out;
 }
+
+namespace {
 
 // Optimal string alignment distance, row by row.
 std::size_t editsBetween(const std::string& a, const std::string& b) {
@@ -82,6 +87,14 @@ NearName nearest(const std::string& name, const std::vector<std::string>& known)
   return best;
 }
 
+// Names may be those of a file's columns: any, and many.
+std::string listed(const std::vector<std::string>& known) {
+  constexpr std::size_t kMost = 30;
+  std::string out;
+  for (std::size_t k = 0; k < std::min(known.size(), kMost); ++k) out += (k > 0 ? ", " : "") + shortened(known[k]);
+  return out + (known.size() > kMost ? ", ..." : "");
+}
+
 }  // namespace
 
 std::string nearestName(const std::string& name, const std::vector<std::string>& known) {
@@ -92,7 +105,12 @@ std::string hintOfNames(const std::string& name, const std::vector<std::string>&
   if (known.empty()) return {};
   const NearName best = nearest(name, known);
   const bool alike = 2 * best.edits <= std::max(std::min(name.size(), kLongestName), best.name.size());
-  return alike ? "did you mean " + inQuotes(best.name, '"') + "?" : "expected one of " + joined(known, ", ");
+  return alike ? "did you mean " + inQuotes(best.name, '"') + "?" : "expected one of " + listed(known);
+}
+
+std::string hintAndNames(const std::string& name, const std::vector<std::string>& known) {
+  const std::string hint = hintOfNames(name, known), all = listed(known);
+  return hint.ends_with(all) ? hint : hint + " known: " + all;
 }
 
 }  // namespace medulla

@@ -16,12 +16,18 @@ std::string shellWord(std::string_view word);
 // As an attribute's value, or between tags.
 std::string escapedXml(std::string_view text);
 
+// Letters of ASCII alone, whatever the locale.
+std::string lowered(std::string_view text);
+
 // The known name with the fewest edits (insert, delete, replace, swap neighbours), whatever the case of letters, the
 // first among equals; "" of none.
 std::string nearestName(const std::string& name, const std::vector<std::string>& known);
 
 // The same as a hint, 'did you mean "a"?', or, where none is alike, 'expected one of a, b, c'; "" where none is known.
 std::string hintOfNames(const std::string& name, const std::vector<std::string>& known);
+
+// For short lists, which are named whole: 'did you mean "a"? known: a, b, c', or 'expected one of a, b, c'.
+std::string hintAndNames(const std::string& name, const std::vector<std::string>& known);
 
 // "a, b, c". By hand: g++ 12 sees an overflow in fmt::join where there is none.
 template <class Names>

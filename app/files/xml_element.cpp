@@ -280,8 +280,7 @@ int readChoice(const XmlElement& element, const std::string& attribute, const st
   if (!a) return fallback;
   const auto found = std::find(known.begin(), known.end(), a->value);
   if (found != known.end()) return static_cast<int>(found - known.begin());
-  const std::string nearest = inQuotes(nearestName(a->value, known), '"');
-  refuse(element, attribute, "did you mean " + nearest + "? known: " + joined(known, ", "));
+  refuse(element, attribute, hintAndNames(a->value, known));
 }
 
 }  // namespace medulla
