@@ -11,21 +11,22 @@ namespace medulla {
 struct HeldOffset {
   int node = 0;            // of BlendedSurface
   Eigen::Vector3d offset;  // m, in the tool's frame: twisting the tool twists the tissue
+  double share = 1;        // above 0, of the tool's stiffness and forces; 1 in all
 };
 
 struct Grip {
   bool closed = false;
   bool slipped = false;          // closed, but what it held has torn away
   std::vector<HeldOffset> held;  // empty while open, and when the grip closed on nothing or slipped
-  double give = 0;               // m/N, of what is held, by the nodes' own; 0 where a node does not give
+  double give = 0;               // m/N, of what is held, by the nodes' own; 0 where none gives
 };
 
 // Opens or closes by the sample's grip (closed above kGripCloses). Closing on `contact`, also at a run's first tick,
-// holds every node of the touched body within gripRadius of the contact point, and at least the three of the touched
-// triangle, where they are: the springs are slack then. Null: nothing is touched. `grip.held` must have room for every
-// node of the surface: nothing is allocated here.
+// holds the nodes of the touched body within gripRadius of the contact point, less firmly towards its rim, and at least
+// those of the touched triangle, where they are: the springs are slack then. Null: nothing is touched. `grip.held` must
+// have room for every node of the surface: nothing is allocated here.
 void updateGrip(const BlendedSurface& surface, double alpha, const ProxyContact* contact, const ToolSample& device,
-                double gripRadius, Grip& grip);
+                const ToolSettings& tool, Grip& grip);
 
 // The tissue tears away: the grip holds nothing until it opens and closes again.
 inline void letSlip(Grip& grip) {
@@ -38,13 +39,13 @@ inline Eigen::Vector3d heldTarget(const ToolSample& device, const HeldOffset& he
   return device.position + device.worldFromTool * held.offset;
 }
 
-// Mean of `of(held)`, m, over what is held.
+// Mean of `of(held)`, m, over what is held, by its shares.
 template <class Of>
 Eigen::Vector3d meanOverHeld(const Grip& grip, const Of& of) {
   assert(!grip.held.empty());
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const HeldOffset& held : grip.held) sum += of(held);
-  return sum / static_cast<double>(grip.held.size());
+  for (const HeldOffset& held : grip.held) sum += held.share * of(held);
+  return sum;
 }
 
 }  // namespace medulla

@@ -151,12 +151,11 @@ static void handOverContacts(const BlendedSurface& surface, double alpha, double
   if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.lastContact, {.across = pull}, out);
 }
 
-// Every held node pulled to where the tool wants it, by an equal share of the tool's stiffness: pulling is as stiff as
-// pushing. An equal share of forceMax, too: in the ratio of the late surface's forces, the limits would be springs that
+// Every held node pulled to where the tool wants it, by its share of the tool's stiffness: pulling is as stiff as
+// pushing. That share of forceMax, too: in the ratio of the late surface's forces, the limits would be springs that
 // answer a frame late, and let a patch held by a stiff tool ring.
 static void handOverGrip(const BlendedSurface& surface, const ServoTool& tool, const Path& path, double frameDuration,
                          Loads& out) {
-  const double share = 1.0 / double(tool.grip.held.size());
   const int body = surface.bodyOfNode[tool.grip.held.front().node];
   ToolSample end = tool.device, start = tool.deviceAtFrameStart;
   end.position = path.end;
@@ -169,9 +168,9 @@ static void handOverGrip(const BlendedSurface& surface, const ServoTool& tool, c
     node.node = held.node - surface.firstNode[body];
     node.anchor = target;
     node.anchorVelocity = (target - heldTarget(start, held)) / frameDuration;
-    node.stiffness = tool.settings.stiffness * share;
-    node.damping = tool.settings.damping * share;
-    node.forceMax = tool.settings.forceMax * share;
+    node.stiffness = tool.settings.stiffness * held.share;
+    node.damping = tool.settings.damping * held.share;
+    node.forceMax = tool.settings.forceMax * held.share;
   }
 }
 

@@ -138,7 +138,7 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
                     tool.settings.staticFriction * proxy.wedging);
 }
 
-// N, of the springs of what is held, which share the tool's stiffness equally, and of its motion; each limited to its
+// N, of the springs of what is held, which share the tool's stiffness, and of its motion; each limited to its
 // share of `most`, as in the dynamics.
 static Vector3d heldForce(const BlendedSurface& surface, double alpha, const TissueMotion& tissue,
                           const ServoTool& tool, double most = std::numeric_limits<double>::infinity()) {
@@ -225,7 +225,7 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
                      double tickDuration, ServoTool& tool) {
   Grip& grip = tool.grip;
   const bool wasHolding = !grip.held.empty();
-  updateGrip(surface, alpha, contactToHold(tool, felt), tool.device, tool.settings.gripRadius, grip);
+  updateGrip(surface, alpha, contactToHold(tool, felt), tool.device, tool.settings, grip);
   if (grip.held.empty()) {
     if (wasHolding) tool.isLeaving = false;
     return;

@@ -68,6 +68,7 @@ static Pull pullBall(double stiffness, double give, int dynamicsRate) {
   const int ticks = 1200 / dynamicsRate;
   FreeBall ball{plate(10, 0.03, 0.01, 5), kMass, give};
   ToolSettings tool;
+  tool.gripRadius = 0.005;
   tool.stiffness = stiffness;
   tool.forceMax = tool.gripForceMax = 100;
   DynamicsFrame last = ball.frame(), now = last;

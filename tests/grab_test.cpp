@@ -93,6 +93,39 @@ TEST(Grab, TissueIsFeltWhereItIsByNowWhileItAccelerates) {
   }
 }
 
+// Of each node, with a contact `aside` (m) of the middle.
+static std::vector<double> sharesHeld(double gripRadius, double aside) {
+  ToolRun run = grabbing();
+  run.tool.gripRadius = gripRadius;
+  run.device = [=](double t) { return deviceAt(approach(t) + aside * Vector3d::UnitX(), t > 0.5 ? 1 : 0); };
+  run.run(0.55);
+  std::vector<double> shares(run.body.shape->restNodes.size(), 0);
+  for (const HeldNode& held : run.loads.heldNodes) shares[held.node] = held.stiffness / run.tool.stiffness;
+  return shares;
+}
+
+static double farthestApart(const std::vector<double>& a, const std::vector<double>& b) {
+  double most = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) most = std::max(most, std::abs(a[k] - b[k]));
+  return most;
+}
+
+// A node that comes within the grip takes its share by and by: what is felt is no matter of micrometres.
+TEST(Grab, NodesAtTheRimAreHeldByDegrees) {
+  std::vector<double> before = sharesHeld(0.008, 0);
+  for (int k = 1; k <= 40; ++k) {
+    const std::vector<double> shares = sharesHeld(0.008 + 1e-4 * k, 0);
+    EXPECT_LT(farthestApart(shares, before), 0.02) << k;
+    before = shares;
+  }
+  before = sharesHeld(0.009, 0);
+  for (int k = 1; k <= 40; ++k) {
+    const std::vector<double> shares = sharesHeld(0.009, 1e-4 * k);  // over edges, too
+    EXPECT_LT(farthestApart(shares, before), 0.04) << k;
+    before = shares;
+  }
+}
+
 TEST(Grab, ATinyGripStillHoldsTheTouchedTriangle) {
   ToolRun run = grabbing();
   run.tool.gripRadius = 1e-6;

@@ -73,7 +73,7 @@ TEST(TissueMotion, AtASteadySpeedTheStepsAreTheWholeLead) {
   contact.weights = {0.2, 0.3, 0.5};
   contact.share = 1;
   Grip grip;
-  grip.held = {{0, Vector3d::Zero()}, {1, Vector3d::Zero()}};
+  grip.held = {{0, Vector3d::Zero(), 0.5}, {1, Vector3d::Zero(), 0.5}};
   for (const double alpha : {0.25, 0.5, 1.0}) {
     device.way[0] = alpha * device.way[1];
     for (const TissueMotion& motion : {contactMotion(surface, alpha, {&contact, 1}, Vector3d::UnitY(), device),
