@@ -58,6 +58,44 @@ TEST_F(RunNotes, AToolThatPressesASkinFeelsItTooHard) {
   EXPECT_EQ(notesOf("contact"), Notes{});
 }
 
+TEST_F(RunNotes, ACameraThatSeesNoBody) {
+  const auto notesOf = [&](double target) {
+    write({.cameraTarget = target});
+    return complaints(run({"render", "own/organ.xml", "--still", "0.04", "--size", "64x48", "-o", "still.png"}));
+  };
+  EXPECT_EQ(notesOf(-0.05), Notes{});
+  EXPECT_EQ(notesOf(0.3), Notes{"note: no body is in sight of the camera in any picture"});
+}
+
+TEST_F(RunNotes, StaticShapesThatBodiesPassThroughOrThatAreOfAnotherUnit) {
+  const std::string text = read("own/organ.xml");
+  const auto notesOf = [&](const std::string& shape, const std::string& contact) {
+    std::string changed = text;
+    changed.insert(changed.find("<tool "), shape);
+    changed.insert(changed.find("gravity="), "contact=\"" + contact + "\" ");
+    folder.write("own/organ.xml", changed);
+    return complaints(run({"check", "own/organ.xml"}));
+  };
+  const std::string plane = R"(<static shape="plane" position="0 -5 0" normal="0 1 0" look="matte" )";
+  const Notes passed{
+      "note: bodies pass through static shapes: <dynamics contact=\"balls\"> lets them lie on these, "
+      "contact=\"false\" of the shapes ends this note"};
+  EXPECT_EQ(notesOf(plane + "/>", "balls"), Notes{});
+  EXPECT_EQ(notesOf(plane + "/>", "none"), passed);
+  EXPECT_EQ(notesOf(plane + "contact=\"false\"/>", "none"), Notes{});
+  const std::string liver = std::string(MEDULLA_SOURCE_DIR) + "/assets/liver/liver.obj";
+  const auto mesh = [&](const std::string& unit) {
+    return notesOf("<static shape=\"mesh\" mesh=\"" + liver + "\" unit=\"" + unit +
+                       "\" position=\"0 -9 0\" look=\"liver\" contact=\"false\"/>",
+                   "balls");
+  };
+  EXPECT_EQ(mesh("m"), Notes{});
+  const Notes small = mesh("mm");
+  ASSERT_EQ(small.size(), 1);
+  EXPECT_TRUE(small[0].starts_with("note: " + liver)) << small[0];
+  EXPECT_TRUE(small[0].ends_with(" m in all; is its unit right?")) << small[0];
+}
+
 TEST_F(RunNotes, AMotionThatDoesNotFitTheScene) {
   const auto notesOf = [&](const std::string& verb, double from, double to, const std::string& more = "") {
     folder.write("own/organ.csv", fmt::format("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n{},0,0,0.5,1,0,0,0,0\n"

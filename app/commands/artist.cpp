@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <utility>
 
 #include "app/interrupt.h"
@@ -10,6 +12,7 @@
 #include "app/standard_streams.h"
 #include "physics/content_hash.h"
 #include "render/caption.h"
+#include "render/viewpoint.h"
 
 namespace medulla {
 
@@ -32,6 +35,25 @@ std::string captionAt(const Scene& scene, double time) {
   for (const SceneCaption& caption : scene.captions)
     if (caption.from <= time && time < caption.to) text += "   " + caption.text;
   return text;
+}
+
+// False only where all of the surface lies beyond one side of the picture, or behind the camera: then nobody sees it.
+bool isInSight(const std::vector<glm::vec3>& surface, const Viewpoint& viewpoint) {
+  std::array<bool, 5> beyond{true, true, true, true, true};
+  for (const glm::vec3 p : surface) {
+    const glm::vec3 d = p - viewpoint.position;
+    const float depth = -glm::dot(viewpoint.back, d), high = depth * viewpoint.tangent, wide = high * viewpoint.aspect;
+    const float x = glm::dot(viewpoint.right, d), y = glm::dot(viewpoint.up, d);
+    const std::array<bool, 5> outside{depth < 0, x<-wide, x> wide, y<-high, y> high};
+    for (int k = 0; k < 5; ++k) beyond[k] = beyond[k] && outside[k];
+  }
+  return std::none_of(beyond.begin(), beyond.end(), [](bool b) { return b; });
+}
+
+bool isAnyInSight(const Picture& picture, std::size_t bodies, float aspect) {
+  const Viewpoint viewpoint = makeViewpoint(picture.camera, aspect, picture.endoscopeMask);
+  return std::any_of(picture.surfaces.begin(), picture.surfaces.begin() + std::ptrdiff_t(bodies),
+                     [&](const SurfaceState& surface) { return isInSight(surface.positions, viewpoint); });
 }
 
 PictureOutputs::Settings outputSettings(const LoadedScene& loaded, const RenderOptions& options, int first, int count,
@@ -208,6 +230,9 @@ void Artist::draw(int number, const PictureState& state, ForceView* forces, Stag
     desk_->view.compose(state, options_->view.panels[k], options_->view.shown, sheet->panels[k]);
     if (forces != nullptr) forces->addArrows(state, sheet->panels[k]);
   }
+  if (sheet->needed && !sawBody_)
+    sawBody_ =
+        isAnyInSight(sheet->panels[0], loaded_->scene.bodies.size(), float(panelWidth_) / float(loaded_->scene.height));
   {
     const std::lock_guard lock(mutex_);
     waiting_.push_back(std::move(sheet));
@@ -224,6 +249,8 @@ void Artist::finish() {
   changed_.notify_all();
   thread_.join();
   rethrow();
+  if (drawn_ > 0 && !sawBody_ && !loaded_->scene.bodies.empty())
+    tell("note: no body is in sight of the camera in any picture\n");
   for (const std::string& note : notes_) tell("note: {}\n", note);  // now that no bar is in the way
 }
 

@@ -66,6 +66,7 @@ class Artist {
   int drawn_ = 0;
   StageTimes::Stage encoding_;
   std::vector<std::string> notes_;
+  bool sawBody_ = false;
   StageTimes times_;
   std::thread thread_;
 };
