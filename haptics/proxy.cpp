@@ -1,6 +1,5 @@
 #include "haptics/proxy.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -12,6 +11,7 @@
 
 #include "haptics/force_bounds.h"
 #include "haptics/force_shading.h"
+#include "haptics/half_spaces.h"
 #include "physics/model/mesh_topology.h"
 
 namespace medulla {
@@ -26,50 +26,6 @@ static constexpr double kArrived = 1e-9;
 // Enough for every groove and corner met in a tick; what is left is done in the next.
 static constexpr int kMaxSweeps = 10, kMaxPushes = 10, kMaxPasses = 4;
 
-// ---- Nearest point in half-spaces ----------------------------------------------------------------------
-
-// Point of the intersection of the chosen planes that is nearest to the goal: goal + N^T p with N N^T p = b - N goal.
-static bool nearestOnPlanes(const Vector3d& goal, const HalfSpace* halfSpaces, const int* chosen, int count,
-                            Vector3d& result, std::array<double, 3>& pressure) {
-  Eigen::Matrix3d gram = Eigen::Matrix3d::Identity();
-  Vector3d depth = Vector3d::Zero();
-  for (int i = 0; i < count; ++i) {
-    const HalfSpace& h = halfSpaces[chosen[i]];
-    depth[i] = h.offset - h.normal.dot(goal);
-    for (int j = 0; j < i; ++j) gram(i, j) = gram(j, i) = h.normal.dot(halfSpaces[chosen[j]].normal);
-  }
-  const double determinant = gram.determinant();
-  if (std::abs(determinant) < 1e-12) return false;  // parallel planes: fewer of them do
-  const Vector3d p = gram.inverse() * depth;
-  result = goal;
-  pressure = {};
-  for (int i = 0; i < count; ++i) {
-    if (p[i] < -1e-12) return false;
-    pressure[chosen[i]] = std::max(0.0, p[i]);
-    result += p[i] * halfSpaces[chosen[i]].normal;
-  }
-  return true;
-}
-
-bool nearestInHalfSpaces(const Vector3d& goal, const HalfSpace* halfSpaces, int count, Vector3d& result,
-                         std::array<double, 3>& pressure) {
-  static constexpr int subsets[8][4] = {{0}, {1, 0}, {1, 1}, {1, 2}, {2, 0, 1}, {2, 0, 2}, {2, 1, 2}, {3, 0, 1, 2}};
-  double best = std::numeric_limits<double>::infinity();
-  for (const auto& subset : subsets) {
-    if (std::any_of(subset + 1, subset + 1 + subset[0], [&](int k) { return k >= count; })) continue;
-    Vector3d x;
-    std::array<double, 3> p;
-    if (!nearestOnPlanes(goal, halfSpaces, subset + 1, subset[0], x, p)) continue;
-    const bool allowed = std::all_of(halfSpaces, halfSpaces + count,
-                                     [&](const HalfSpace& h) { return h.normal.dot(x) >= h.offset - 1e-11; });
-    if (!allowed || (x - goal).squaredNorm() >= best) continue;
-    best = (x - goal).squaredNorm();
-    result = x;
-    pressure = p;
-  }
-  return best < std::numeric_limits<double>::infinity();
-}
-
 // ---- Half-spaces collected on the way ------------------------------------------------------------------
 
 namespace {
@@ -81,7 +37,9 @@ struct TouchedPlanes {
 };
 }  // namespace
 
-// A fourth plane replaces the one that holds the proxy back least. Nearly parallel ones count as one.
+// A fourth plane replaces the one that holds the proxy back least, by what is known: the one added last does not yet,
+// and goes first. (Kept instead, it let the force of slides over fine meshes turn half as much again.) Nearly parallel
+// ones count as one.
 static void addPlane(TouchedPlanes& touched, const HalfSpace& plane, int triangle) {
   for (int k = 0; k < touched.count; ++k)
     if (touched.planes[k].normal.dot(plane.normal) > 1 - 1e-9) {
@@ -257,6 +215,17 @@ static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& free, dou
   return device - (proxy.slipping ? Vector3d(trail * along) : slide);
 }
 
+// Friction as it is felt on a shaded surface: `now` (m, from the device to the goal), come to no faster than the tool
+// goes against the surface (`way`, m), as a coupling across that is stretched by what passes it alone. Where three
+// walls of a dent hold the proxy it cannot slide, and friction seems to be none; a tick later, one of them left, it is
+// there in full. A slide over triangles of 2.5 mm, 3 mm deep in tissue of 10 kPa, felt its force turn by 20 degrees in
+// a tick.
+static void feelDrag(const Vector3d& now, double way, Proxy& proxy) {
+  const Vector3d change = now - proxy.drag;
+  const double length = change.norm();
+  proxy.drag += length > way ? Vector3d(way / length * change) : change;
+}
+
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Vector3d& device,
                   Proxy& proxy) {
   const Vector3d start = proxy.centre, advance = device - proxy.device - proxy.surfaceMotion;
@@ -276,7 +245,12 @@ void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool
     proxy.wedging = std::max(1.0, pressed / (free - device).norm());
     touched = slideTo(buckets, alpha, goal, proxy);
   }
-  proxy.shading = proxy.felt.isZero(0) ? Vector3d::Zero() : Vector3d(proxy.felt - (proxy.centre - goal));
+  const bool isShaded = !proxy.felt.isZero(0);
+  if (isShaded)
+    feelDrag(goal - device, advance.norm(), proxy);
+  else
+    proxy.drag = goal - device;
+  proxy.shading = isShaded ? Vector3d(proxy.felt + proxy.drag - (proxy.centre - device)) : Vector3d::Zero();
   keepPressingContacts(buckets, alpha, touched, proxy);
   if (proxy.inContact()) return;
   proxy.slipping = true;

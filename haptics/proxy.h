@@ -27,6 +27,7 @@ struct Proxy {
   // m; as if by the smooth surface that the mesh stands for (force_shading.h), the proxy is felt at centre + shading.
   Eigen::Vector3d shading = Eigen::Vector3d::Zero();
   Eigen::Vector3d felt = Eigen::Vector3d::Zero();  // m, from the device to there, without friction; zero: not shaded
+  Eigen::Vector3d drag = Eigen::Vector3d::Zero();  // m, what friction adds to that
   Eigen::Vector3d device = Eigen::Vector3d::Zero(), surfaceMotion = Eigen::Vector3d::Zero();  // m, of the last tick
   bool lookNext = false;  // whether it is outside, if the next tick finds it without a contact
   int lastBucket = -1;    // where the last sweep ended: the next is likely to end there, too
@@ -52,16 +53,5 @@ void followSurface(const Buckets& buckets, double alphaBefore, double alpha, dou
 // Coulomb friction. Afterwards its contacts are those that press.
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Eigen::Vector3d& device,
                   Proxy& proxy);
-
-struct HalfSpace {
-  Eigen::Vector3d normal;  // unit; allowed are points x with normal.x >= offset
-  double offset = 0;
-};
-
-// The point nearest to `goal` in up to three half-spaces, by enumeration of which of them are active. `pressure[k]` is
-// the Kuhn-Tucker multiplier: result = goal + sum pressure[k] normal[k], all >= 0. Returns false, with result
-// untouched, when no point satisfies all (within 1e-11 m), as between opposite walls.
-bool nearestInHalfSpaces(const Eigen::Vector3d& goal, const HalfSpace* halfSpaces, int count, Eigen::Vector3d& result,
-                         std::array<double, 3>& pressure);
 
 }  // namespace medulla

@@ -204,6 +204,31 @@ TEST(ProxyFigures, BothWallsOfAGrooveHoldBack) {
   }
 }
 
+// Over a fine mesh, deep in a dent that goes along with it: three of its walls and more hold the proxy by turns.
+TEST(ProxyFigures, SlidesOverFineMeshesAreFeltWithoutSteps) {
+  ProxyRun r;
+  r.shape = plate(24, 0.03, 0.01, 5);
+  r.tool.radius = 0.003;
+  r.tool.staticFriction = 0.3;
+  r.tool.dynamicFriction = 0.2;
+  const auto place = [](double t) { return 0.007 * (std::max(0.0, t - 0.2) - 1); };
+  const auto pressed = [](double t) { return std::min(1.0, t / 0.1); };
+  r.motion = [=](const Vector3d& x, double t) {
+    const double away = std::hypot(x.x() - place(t), x.z() - 0.3 * place(t)) / 0.004;
+    return Vector3d(x.x(), x.y() - (x.y() > 0 ? 0.0025 * pressed(t) * std::exp(-away * away / 2) : 0), x.z());
+  };
+  r.device = [=](double t) { return Vector3d(place(t), 0.008 - 0.003 * pressed(t), 0.3 * place(t)); };
+  r.duration = 2.2;
+  double step = 0, most = 0;
+  Vector3d last = Vector3d::Zero();
+  r.run([&](double t, const ToolState& tool, const BlendedSurface&, double) {
+    if (t > 0.5) step = std::max(step, (tool.force - last).norm());
+    last = tool.force;
+    most = std::max(most, last.norm());
+  });
+  expectReached("slide in a dent of fine triangles, force step of the force", step / most, 0.02);
+}
+
 // In a dent that goes along with it, over a line of the mesh: the tool comes off one of the dent's walls by micrometres
 // each tick, and both hold it back.
 TEST(ProxyFigures, BothWallsOfADentThatMovesHoldBack) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "haptics/half_spaces.h"
 #include "tests/proxy_run.h"
 
 namespace medulla {

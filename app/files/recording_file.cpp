@@ -240,7 +240,7 @@ Trajectory parseRecording(std::string_view text, const std::string& name, const 
     ToolSample sample = whole.samples[k];
     if (sample.time < map.from - slack || sample.time > map.to + slack) continue;
     sample.time += map.delay - map.from;
-    trajectory.samples.push_back(sample);
+    addSample(trajectory, sample, name, rows[k].line);
     if (hasForce)
       trajectory.measuredForces.push_back(map.worldFromRecording.linear() * map.mirror.cwiseProduct(rows[k].force));
   }
