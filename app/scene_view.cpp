@@ -57,19 +57,17 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   constexpr double kOpenJaw = 0.38, kHoldingJaw = 0.11, kClosedJaw = 0.012;  // rad
   const double closed = std::min(input.grip / kGripCloses, 1.0);
   instrument.jawAngle = float(kOpenJaw + (kHoldingJaw - kOpenJaw) * closed + (kClosedJaw - kHoldingJaw) * firm);
-  instrument.hold = state.holding ? float(firm * firm * (3 - 2 * firm)) : 0.f;
+  instrument.hold = float(state.grasp * firm * firm * (3 - 2 * firm));
   // A dent as deep as Hertz's contact has it for a tip of 3 mm in tissue of some 10 kPa, up to what stays a dent.
   constexpr double kDeepest = 4e-3, kSoft = 0.15;  // m, at scale 1; N
-  const double force = state.force.norm();
-  if (state.inContact && force > 0)
-    instrument.press = toGlm(-kDeepest * instrument.scale * (1 - std::exp(-force / kSoft)) / force * state.force);
-  // What a grip pulls at does not give way.
-  const bool pulls = state.holding && glm::dot(instrument.press, instrument.worldFromTool * glm::vec3(0, 0, 1)) > 0;
-  if (pulls) instrument.press = glm::vec3(0);
+  // What a grip holds does not give way.
+  const double force = state.steadyForce.norm();
+  const double deep = kDeepest * instrument.scale * (1 - std::exp(-force / kSoft)) * (1 - state.grasp);
+  if (force > 0) instrument.press = toGlm(-deep / force * state.steadyForce);
   // The picture shows the proxy: an instrument never enters the tissue, its device may. What holds is drawn where the
   // hand is: its proxy hangs on the tissue, and the instrument would jump when it lets go. The proxy is a sphere, the
   // jaws reach to its far side along the shaft.
-  const Eigen::Vector3d& centre = state.holding ? state.device : state.proxy;
+  const Eigen::Vector3d centre = state.proxy + state.grasp * (state.device - state.proxy);
   instrument.tip =
       toGlm(centre - tool.settings.radius * (input.worldFromTool * Eigen::Vector3d::UnitZ())) + instrument.press;
   picture.instruments.push_back(instrument);

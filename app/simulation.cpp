@@ -170,6 +170,8 @@ static ToolState blendTool(const ToolState& a, const ToolState& b, double u) {
   s.device = blendPoint(a.device, b.device, u);
   s.proxy = blendPoint(a.proxy, b.proxy, u);
   s.force = blendPoint(a.force, b.force, u);
+  s.steadyForce = blendPoint(a.steadyForce, b.steadyForce, u);
+  s.grasp = (1 - u) * a.grasp + u * b.grasp;
   return s;
 }
 

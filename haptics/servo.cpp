@@ -261,8 +261,17 @@ static bool feelGrip(const BlendedSurface& surface, double alpha, ServoTool& too
   }
   record(force, tool, state);
   tool.proxy.felt.setZero();  // what is felt after the release does not begin where this grip began
+  tool.proxy.drag.setZero();
   tool.proxy.device = tool.device.position;
   return true;
+}
+
+// First-order lags, exact for any duration of a tick.
+static void steady(double tickDuration, ToolState& state) {
+  constexpr double kLag = 0.02;  // s
+  const double share = 1 - std::exp(-tickDuration / kLag);
+  state.steadyForce += share * (state.force - state.steadyForce);
+  state.grasp += share * ((state.holding ? 1 : 0) - state.grasp);
 }
 
 static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, double tickDuration,
@@ -294,9 +303,11 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
 void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
   assert(inputs.size() == data_->tools.size() && alpha > 0 && alpha <= 1 && alpha >= data_->alpha);
   for (std::size_t k = 0; k < inputs.size(); ++k) checkSample(inputs[k], k);
-  for (std::size_t k = 0; k < inputs.size(); ++k)
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
     tickTool(data_->surfaces.reading(), data_->alpha, alpha, data_->tickDuration, inputs[k], data_->tools[k],
              data_->states[k]);
+    steady(data_->tickDuration, data_->states[k]);
+  }
   data_->alpha = alpha;
 }
 

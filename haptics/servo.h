@@ -33,6 +33,10 @@ struct ToolState {
   // Surfaces on all sides leave its proxy less than half of its radius. Tissue that closes around a tool does so, where
   // it is pressed deeper than its model can follow.
   bool squeezed = false;
+  // For pictures, in which nothing of a tool jumps: the force as it was over the last hundredths of a second, N, and how
+  // far a grip has taken hold, 0 to 1.
+  Eigen::Vector3d steadyForce = Eigen::Vector3d::Zero();
+  double grasp = 0;
   // J, handed to the user since the start: the force of each tick over the device's way to the next. What a grip turns
   // does work, too, but the hand gets no moment.
   double energy = 0;

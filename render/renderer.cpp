@@ -122,7 +122,8 @@ struct Renderer::Data {
 
   SceneMesh mesh;   // surfaces at their place in this picture, then instruments
   SceneMesh rest;   // surfaces at rest, baked
-  SceneMesh finer;  // `mesh` for a larger picture than it was made for
+  SceneMesh finer;  // `mesh` for a picture that is too large or too near for it
+  bool isFiner = false;
   bool baked = true;
   std::optional<HazeField> haze;
   LightView lightView;
@@ -152,8 +153,7 @@ struct Renderer::Data {
   }
   ~Data() { context->makeCurrent(); }
 
-  bool tessellates() const { return fineHeight >= kLinesOfMeshes; }
-  const SceneMesh& drawn() const { return tessellates() ? finer : mesh; }
+  const SceneMesh& drawn() const { return isFiner ? finer : mesh; }
   const ShadowMap* shadowIfOn() const { return settings.shadows ? &shadow : nullptr; }
 
   void bake();
@@ -167,7 +167,8 @@ struct Renderer::Data {
 
 void Renderer::Data::bake() {
   if (baked) return;
-  for (const MeshPart& part : rest.parts) {
+  for (MeshPart& part : rest.parts) {
+    part.longestEdge = longestEdge(rest, part);
     computeNormals(rest, part);
     bakeTextureCoordinates(rest, part);
     computeTangents(rest, part);
@@ -216,7 +217,8 @@ void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view)
   // The model view has a backdrop of its own.
   haze.reset();
   if (picture.light.haze && picture.view != ViewKind::model) haze.emplace(picture.light, picture.camera, picture.time);
-  if (tessellates()) tessellate(mesh, view, settings.height, finer);
+  const Halved halved = fineHeight >= kLinesOfMeshes ? Halved::outlines : Halved::largest;
+  isFiner = tessellate(mesh, view, settings.height, halved, finer);
   lightView = makeLightView(picture.light, view, picture.camera, drawn());
   if (settings.shadows) renderShadowMap(drawn(), lightView, shadow);
   findVisibleTriangles(drawn(), view, picture.view == ViewKind::tissue, seen);

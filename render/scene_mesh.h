@@ -15,6 +15,7 @@ struct MeshPart {
   bool moving = false;   // drawn from given positions in this picture
   bool travels = false;  // SurfaceShape
   bool instrument = false;
+  float longestEdge = 0;  // m, at rest
 };
 
 // Everything that is drawn with tissue shading, in one set of arrays: surfaces in the order they were added, then the

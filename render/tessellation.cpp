@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -12,12 +14,14 @@ namespace {
 using glm::vec3;
 
 constexpr std::uint32_t kWhole = ~0u;  // of an edge: no midpoint
+constexpr float kLongest = 0.25f;      // picture heights
 constexpr int kMostHalvings = 16;      // a cut through a triangle may be nearly as long as the edge that it halves
 
 // The mesh as it grows, and where its vertices are in the picture.
 struct Work {
   const Viewpoint& view;
   float height;  // px
+  Halved halved;
   SceneMesh& mesh;
   std::vector<vec3> picture;                                   // pictureFromWorld
   std::unordered_map<std::uint64_t, std::uint32_t> midpoints;  // of halved edges, by their ends, the smaller first
@@ -58,6 +62,7 @@ std::uint32_t appendMidpoint(Work& work, std::uint32_t a, std::uint32_t b) {
 // interpolated over kFarthest.
 bool isShown(const Work& work, std::uint32_t a, std::uint32_t b) {
   constexpr float kOff = 0.2f, kFarthest = 80;  // px
+  const float farthest = work.halved == Halved::outlines ? kFarthest : kLongest * work.height;
   const Viewpoint& v = work.view;
   const vec3 p = work.picture[a], q = work.picture[b];
   if (std::max(p.z, q.z) < v.nearPlane) return false;
@@ -65,7 +70,8 @@ bool isShown(const Work& work, std::uint32_t a, std::uint32_t b) {
   if (std::max(p.x, q.x) < -halfWidth || std::min(p.x, q.x) > halfWidth) return false;
   if (std::max(p.y, q.y) < -0.5f || std::min(p.y, q.y) > 0.5f) return false;
   const vec3 d = (q - p) * work.height;
-  if (d.x * d.x + d.y * d.y > kFarthest * kFarthest) return true;
+  if (d.x * d.x + d.y * d.y > farthest * farthest) return true;
+  if (work.halved == Halved::largest) return false;
   const vec3 off = bulge(work.mesh, a, b);
   // Most edges pass here: across the view a metre is so many pixels, along it, at the picture's border, the one more.
   const float most = work.height * (0.5f / v.tangent + 1) / std::max(std::min(p.z, q.z), v.nearPlane);
@@ -121,13 +127,38 @@ void halveEdges(Work& work, std::vector<std::uint32_t>& index, std::vector<std::
   index.swap(pieces);
 }
 
+// Could the picture show one of the part's edges longer than kLongest? Tissue stretches, hardly to more than twice its
+// length.
+bool mayBeLong(const SceneMesh& mesh, const MeshPart& part, const Viewpoint& v) {
+  if (part.instrument) return false;
+  float nearest = std::numeric_limits<float>::infinity();
+  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
+    nearest = std::min(nearest, -glm::dot(v.back, mesh.position[i] - v.position));
+  const float length = (part.moving ? 2 : 1) * part.longestEdge;
+  return length * (0.5f / v.tangent + 1) > kLongest * std::max(nearest, v.nearPlane);
+}
+
 }  // namespace
 
-void tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight, SceneMesh& out) {
+float longestEdge(const SceneMesh& mesh, const MeshPart& part) {
+  float most = 0;
+  for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3)
+    for (int e = 0; e < 3; ++e) {
+      const vec3 d = mesh.position[mesh.index[k + e]] - mesh.position[mesh.index[k + (e + 1) % 3]];
+      most = std::max(most, glm::dot(d, d));
+    }
+  return std::sqrt(most);
+}
+
+bool tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight, Halved halved, SceneMesh& out) {
+  const auto isHalved = [&](const MeshPart& part) {
+    return halved == Halved::outlines ? !part.instrument : mayBeLong(mesh, part, view);
+  };
+  if (std::none_of(mesh.parts.begin(), mesh.parts.end(), isHalved)) return false;
   out.resizeVertices(0);
   out.index.clear();
   out.parts.clear();
-  Work work{view, float(pictureHeight), out, {}, {}};
+  Work work{view, float(pictureHeight), halved, out, {}, {}};
   std::vector<std::uint32_t> index;
   for (MeshPart part : mesh.parts) {
     const auto first = std::uint32_t(out.position.size()), firstIndex = std::uint32_t(out.index.size());
@@ -137,7 +168,8 @@ void tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight,
     appendVertices(mesh, part, out);
     for (std::size_t i = first; i < out.position.size(); ++i)
       work.picture.push_back(pictureFromWorld(view, out.position[i]));
-    for (int k = 0; k < kMostHalvings && !part.instrument && !index.empty(); ++k) halveEdges(work, index, out.index);
+    const int halvings = isHalved(part) ? kMostHalvings : 0;  // asked of the part as it is in `mesh`
+    for (int k = 0; k < halvings && !index.empty(); ++k) halveEdges(work, index, out.index);
     out.index.insert(out.index.end(), index.begin(), index.end());
     part.firstVertex = first;
     part.vertexCount = std::uint32_t(out.position.size()) - first;
@@ -145,6 +177,7 @@ void tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight,
     part.indexCount = std::uint32_t(out.index.size()) - firstIndex;
     out.parts.push_back(part);
   }
+  return true;
 }
 
 }  // namespace medulla

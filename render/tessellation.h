@@ -10,8 +10,17 @@ namespace medulla {
 // light of a film does: below so many lines drawn, those of 720 in the best quality, meshes are taken as they are.
 constexpr int kLinesOfMeshes = 1440;
 
-// `out` is `mesh` with edges halved where the picture, so many pixels high, shows them. An edge is judged by its own
-// ends, so that both its triangles agree and no crack opens. Instruments are taken as they are.
-void tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight, SceneMesh& out);
+// m; what tessellate() asks of a part.
+float longestEdge(const SceneMesh& mesh, const MeshPart& part);
+
+// outlines: edges that would be seen to be straight, or along which light would. largest: only those so long, a quarter
+// of the picture and more, that texture and light, without perspective over a triangle, would break along them, and
+// Mesa clip them wrongly (Viewpoint::overscan): floors of two triangles, a mesh right before the lens.
+enum class Halved { outlines, largest };
+
+// `out` is `mesh` with such edges halved where the picture, so many pixels high, shows them. An edge is judged by its
+// own ends, so that both its triangles agree and no crack opens. Instruments are taken as they are. Returns false, and
+// leaves `out` alone, where no edge can be so long.
+bool tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight, Halved halved, SceneMesh& out);
 
 }  // namespace medulla

@@ -74,10 +74,11 @@ Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
 
 // A smooth surface stays behind the held nodes that it hangs on, up to kReach; the jaws bite kBite of it, and between
 // them stands a fold, as thick as they are apart there and wider than they are: so far beyond the tip of a tool that
-// stands upright. Along the surface it would be a slit.
+// stands upright. Jaws that lie along the surface have it stand up beside them, as far as they close across it, not
+// from above and below.
 static void riseBetweenJaws(const Instrument& instrument, float blanched, SceneMesh& mesh) {
   constexpr float kWidth = 0.0055f, kReach = 0.014f, kBite = 0.0035f;  // m, at scale 1, as all here
-  constexpr float kFold = 0.0090f, kFoldThickness = 0.0013f, kFoldWidth = 0.0040f;
+  constexpr float kFold = 0.0090f, kRidge = 0.0062f, kFoldThickness = 0.0013f, kFoldWidth = 0.0040f;
   const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, instrument.scale);
   const Nearest held = nearestMoving(mesh, instrument.tip, instrument.scale * kReach);
   if (!held.part) return;
@@ -90,9 +91,11 @@ static void riseBetweenJaws(const Instrument& instrument, float blanched, SceneM
   const glm::vec3 narrow(1 / wide, 1 / thickness, 1 / wide);
   glm::mat3 across = glm::mat3_cast(instrument.worldFromTool);  // a column per axis of the tool
   for (int k = 0; k < 3; ++k) across[k] *= narrow[k] / instrument.scale;
-  const float upright = instrument.hold * std::max(glm::dot(held.normal, axis) / instrument.scale, 0.f);
-  displace(*held.part, {instrument.tip + kBite * axis, kFold * upright * axis, glm::transpose(across), blanched, 0},
-           mesh);
+  const glm::vec3 aside = instrument.worldFromTool * glm::vec3(instrument.scale, 0, 0);
+  const float upright = std::max(glm::dot(held.normal, axis) / instrument.scale, 0.f),
+              flat = (1 - upright) * glm::dot(held.normal, aside) / instrument.scale;
+  const glm::vec3 fold = instrument.hold * (kFold * upright * axis + kRidge * flat * aside);
+  displace(*held.part, {instrument.tip + kBite * axis, fold, glm::transpose(across), blanched, 0}, mesh);
 }
 
 // The simulation moves nodes a centimetre apart; this is what happens between them.

@@ -114,5 +114,39 @@ TEST(Renderer, BackgroundsHaveNoStepsThatTheEyeSees) {
   }
 }
 
+// px, of a floor of so many quads, seen from near with the camera over it.
+Image floorOf(std::uint32_t cells) {
+  RendererSettings settings;
+  settings.width = 320;
+  settings.height = 180;
+  Renderer renderer(settings);
+  renderer.addSurface(sheet(0.5f, cells, 0, 0, 0));
+  Picture picture;
+  picture.endoscopeMask = false;
+  picture.camera.position = {0.1f, -0.45f, 0.12f};
+  picture.camera.target = {0, 0, 0.03f};
+  picture.camera.up = {0, 0, 1};
+  picture.camera.fovDegrees = 55;
+  picture.light.position = vec3(-0.6f, -0.6f, 1.2f);
+  picture.light.referenceDistance = 1.4f;
+  picture.light.haze = Haze{{0.3f, 0.31f, 0.33f}, 100};
+  picture.surfaces.resize(1);
+  Image out;
+  renderer.render(picture, out);
+  return out;
+}
+
+// Of two triangles that reach behind the camera, Mesa clips one into a black wedge, and light would not fall off.
+TEST(LargePicture, AFloorOfTwoTrianglesLooksLikeAFineOne) {
+  const Image coarse = floorOf(1), fine = floorOf(64);
+  int most = 0, darkest = 255;
+  for (std::size_t k = 0; k < coarse.pixels.size(); ++k) {
+    most = std::max(most, std::abs(int(coarse.pixels[k]) - int(fine.pixels[k])));
+    darkest = std::min(darkest, int(coarse.pixels[k]));
+  }
+  EXPECT_LE(most, 12);
+  EXPECT_GT(darkest, 40);
+}
+
 }  // namespace
 }  // namespace medulla

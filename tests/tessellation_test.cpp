@@ -61,7 +61,7 @@ float worstOutline(const SceneMesh& mesh, int height) {
 TEST(Tessellation, OutlinesAreRoundInLargePictures) {
   const SceneMesh mesh = torus(48, 24);
   SceneMesh finer;
-  tessellate(mesh, fromAbove(), 2160, finer);
+  tessellate(mesh, fromAbove(), 2160, Halved::outlines, finer);
   EXPECT_GT(worstOutline(mesh, 2160), 2);
   EXPECT_LT(worstOutline(finer, 2160), 0.4f);
   for (std::size_t i = 0; i < finer.position.size(); ++i) {
@@ -73,7 +73,7 @@ TEST(Tessellation, OutlinesAreRoundInLargePictures) {
 
 TEST(Tessellation, LeavesNoCracks) {
   SceneMesh finer;
-  tessellate(torus(48, 24), fromAbove(), 2160, finer);
+  tessellate(torus(48, 24), fromAbove(), 2160, Halved::outlines, finer);
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
   for (std::size_t k = 0; k < finer.index.size(); ++k)
     ++edges[{finer.index[k], finer.index[k % 3 == 2 ? k - 2 : k + 1]}];
@@ -86,7 +86,7 @@ TEST(Tessellation, LeavesNoCracks) {
 TEST(Tessellation, WhatASmallPictureShowsStaysAsItIs) {
   const SceneMesh mesh = torus(96, 48);
   SceneMesh same;
-  tessellate(mesh, fromAbove(), 240, same);
+  tessellate(mesh, fromAbove(), 240, Halved::outlines, same);
   EXPECT_EQ(same.index, mesh.index);
   EXPECT_EQ(same.position, mesh.position);
 }
@@ -102,7 +102,7 @@ TEST(Tessellation, PlaneCloseToTheLensIsCutFinely) {
   mesh.parts.push_back({&looks()[0], 0, 4, 0, 6});
   const Viewpoint view = makeViewpoint({.position = {0, 0, 1.5f}, .fovDegrees = 40}, 1, false);
   SceneMesh finer;
-  tessellate(mesh, view, 2160, finer);
+  tessellate(mesh, view, 2160, Halved::outlines, finer);
   for (const vec3& p : finer.position) EXPECT_EQ(p.z, 0);
   float longest = 0;
   for (std::size_t k = 0; k < finer.index.size(); k += 3) {

@@ -7,6 +7,7 @@
 #include "app/files/log_table.h"
 #include "app/files/state_cache.h"
 #include "app/standard_streams.h"
+#include "app/tool_fields.h"
 
 namespace medulla {
 
@@ -58,13 +59,19 @@ std::vector<std::string> fieldsOf(const CacheLayout& layout) {
     }
     for (int i = 0; i < body.nodes; ++i) appendNames(out, fmt::format("{}.node.{}", body.name, i), "xyz");
   }
-  for (const std::string& tool : layout.tools) {
-    appendNames(out, tool + ".trajectory.position", "xyz");
-    appendNames(out, tool + ".trajectory.orientation", "wxyz");
-    out.push_back(tool + ".trajectory.grip");
-    for (const char* what : {".device", ".proxy", ".force"}) appendNames(out, tool + what, "xyz");
-    for (const char* what : {".contact", ".held", ".clamped"}) out.push_back(tool + what);
-  }
+  const ToolSample input;
+  const ToolState state;
+  for (const std::string& tool : layout.tools)
+    visitToolFields(input, state, [&](const char* what, const auto& value) {
+      using Value = std::remove_cvref_t<decltype(value)>;
+      const std::string name = fmt::format("{}.{}", tool, what);
+      if constexpr (std::is_same_v<Value, Eigen::Vector3d>)
+        appendNames(out, name, "xyz");
+      else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>)
+        appendNames(out, name, "wxyz");
+      else
+        out.push_back(name);
+    });
   return out;
 }
 
@@ -80,15 +87,16 @@ void valuesOf(const PictureState& state, std::vector<double>& out) {
     }
     for (const Eigen::Vector3d& node : body.nodes) add(node);
   }
-  for (std::size_t k = 0; k < state.tools.size(); ++k) {
-    const ToolSample& input = state.inputs[k];
-    const ToolState& tool = state.tools[k];
-    add(input.position);
-    turn(input.worldFromTool);
-    out.push_back(input.grip);
-    for (const Eigen::Vector3d* v : {&tool.device, &tool.proxy, &tool.force}) add(*v);
-    for (const bool flag : {tool.inContact, tool.holding, tool.clamped}) out.push_back(flag ? 1 : 0);
-  }
+  for (std::size_t k = 0; k < state.tools.size(); ++k)
+    visitToolFields(state.inputs[k], state.tools[k], [&](const char*, const auto& value) {
+      using Value = std::remove_cvref_t<decltype(value)>;
+      if constexpr (std::is_same_v<Value, Eigen::Vector3d>)
+        add(value);
+      else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>)
+        turn(value);
+      else
+        out.push_back(value);
+    });
 }
 
 // Components of one vector share a scale: one that stays near zero has no meaning of its own.

@@ -12,6 +12,7 @@
 #include "app/files/text.h"
 #include "app/interrupt.h"
 #include "app/standard_streams.h"
+#include "app/tool_fields.h"
 #include "physics/content_hash.h"
 #include "render/flip.h"
 
@@ -38,16 +39,16 @@ struct Moment {
 // Of all that a picture shows of its tools: the dynamics' hash sees of these only what they did to the bodies.
 std::string toolsHash(const PictureState& state) {
   NumberHash hash;
-  const auto add = [&](const auto& numbers) {
-    for (const double x : numbers) hash.add(x);
-  };
-  for (std::size_t k = 0; k < state.tools.size(); ++k) {
-    const ToolState& tool = state.tools[k];
-    add(state.inputs[k].worldFromTool.coeffs());
-    hash.add(state.inputs[k].grip);
-    for (const Eigen::Vector3d& v : {tool.device, tool.proxy, tool.force}) add(v);
-    for (const bool flag : {tool.inContact, tool.holding}) hash.add(std::uint64_t{flag});
-  }
+  for (std::size_t k = 0; k < state.tools.size(); ++k)
+    visitToolFields(state.inputs[k], state.tools[k], [&hash](const char*, const auto& value) {
+      using Value = std::remove_cvref_t<decltype(value)>;
+      if constexpr (std::is_same_v<Value, Eigen::Vector3d>)
+        for (const double x : value) hash.add(x);
+      else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>)
+        for (const double x : value.coeffs()) hash.add(x);
+      else
+        hash.add(double(value));
+    });
   return fmt::format("{:016x}", hash.value());
 }
 

@@ -13,6 +13,7 @@
 #include <type_traits>
 
 #include "app/files/input_error.h"
+#include "app/tool_fields.h"
 #include "physics/content_hash.h"
 
 namespace medulla {
@@ -20,7 +21,7 @@ namespace medulla {
 namespace {
 
 constexpr std::string_view kMagic = "medulla cache";
-constexpr std::uint32_t kFormat = 1;
+constexpr std::uint32_t kFormat = 2;
 constexpr std::size_t kTailSize = 3 * sizeof(std::uint64_t);
 constexpr std::uint32_t kNamesMost = 100000, kNameLongest = 4096;  // bodies, tools; bytes
 static_assert(std::endian::native == std::endian::little);
@@ -98,16 +99,26 @@ void exchangeFlag(Bytes& bytes, Flag& flag) {
 
 template <typename Bytes, typename Input, typename Tool>
 void exchangeTool(Bytes& bytes, Input& input, Tool& tool) {
-  bytes.raw(input.time);
-  exchangeVector(bytes, input.position);
-  exchangeQuaternion(bytes, input.worldFromTool);
-  bytes.raw(input.grip);
-  exchangeVector(bytes, tool.device);
-  exchangeVector(bytes, tool.proxy);
-  exchangeVector(bytes, tool.force);
-  exchangeFlag(bytes, tool.inContact);
-  exchangeFlag(bytes, tool.holding);
-  exchangeFlag(bytes, tool.clamped);
+  visitToolFields(input, tool, [&bytes](const char*, auto& value) {
+    using Value = std::remove_cvref_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, double>)
+      bytes.raw(value);
+    else if constexpr (std::is_same_v<Value, bool>)
+      exchangeFlag(bytes, value);
+    else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>)
+      exchangeQuaternion(bytes, value);
+    else
+      exchangeVector(bytes, value);
+  });
+}
+
+std::size_t sizeOfTool() {
+  std::string bytes;
+  Appender to(bytes);
+  const ToolSample input;
+  const ToolState tool;
+  exchangeTool(to, input, tool);
+  return bytes.size();
 }
 
 // `state` has the layout's sizes.
@@ -137,8 +148,8 @@ void resize(const CacheLayout& layout, PictureState& state) {
 
 // Bytes of a record with its checksum; as double, since counts in a broken file may be anything.
 double recordSizeOf(const CacheLayout& layout) {
-  constexpr double d = sizeof(double), f = sizeof(float), pose = 7 * d, tool = (1 + 3 + 4 + 1 + 9) * d + 3;
-  double size = 3 * d + tool * static_cast<double>(layout.tools.size());
+  constexpr double d = sizeof(double), f = sizeof(float), pose = 7 * d;
+  double size = 3 * d + double(sizeOfTool()) * double(layout.tools.size());
   for (const CacheLayout::Body& body : layout.bodies) size += pose * body.spheres + 3 * f * body.nodes;
   return size;
 }
