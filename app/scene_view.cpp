@@ -48,7 +48,7 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   // proportion.
   constexpr double kThinnest = 1.5e-3, kThickest = 7e-3;  // m
   instrument.scale = float(tool.settings.radius / std::clamp(tool.settings.radius, kThinnest, kThickest));
-  instrument.touching = state.inContact || state.holding;
+
   // Where a grip closes the jaws meet tissue and hold it. Over the grip's last part, a few pictures long, they close
   // on it and it rises between them: it would jump into and out of the jaws else. Firm jaws stand half a millimetre
   // apart at their tips: what lies between is thinner than that farther in, and would seem to be nothing.
@@ -64,6 +64,8 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   const double force = state.steadyForce.norm();
   const double deep = kDeepest * instrument.scale * (1 - std::exp(-force / kSoft)) * (1 - state.grasp);
   if (force > 0) instrument.press = toGlm(-deep / force * state.steadyForce);
+  constexpr double kShown = 1e-6;  // m
+  instrument.touching = deep > kShown || instrument.hold > 0;
   // The picture shows the proxy: an instrument never enters the tissue, its device may. What holds is drawn where the
   // hand is: its proxy hangs on the tissue, and the instrument would jump when it lets go. The proxy is a sphere, the
   // jaws reach to its far side along the shaft.

@@ -34,7 +34,8 @@ HazeField::HazeField(const Light& light, const Camera& camera, float time)
       distance_(light.haze->distance),
       shafts_(light.caustics),
       time_(time) {
-  if (light.position) lamp_ = glm::normalize(*light.position - camera.target);
+  const vec3 toLamp = light.position ? *light.position - camera.target : lamp_;
+  if (const float length = glm::length(toLamp); length > 0) lamp_ = toLamp / length;
   const vec3 any = std::abs(lamp_.x) < 0.7f ? vec3(1, 0, 0) : vec3(0, 0, 1);
   aside_ = glm::normalize(glm::cross(any, lamp_));
   across_ = glm::cross(lamp_, aside_);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "render/stroke_text.h"
 
@@ -72,6 +73,15 @@ void drawCurve(const StripChart& chart, const StripCurve& curve, const Layout& l
   ink.apply(glm::vec3(curve.colour), 1);
 }
 
+// In the order of their labels: as they stand in the chart or, where not all of these fit, the largest forces first.
+std::vector<const StripCurve*> inOrder(const StripChart& chart, bool allFit) {
+  std::vector<const StripCurve*> out;
+  for (const StripCurve& curve : chart.curves) out.push_back(&curve);
+  const auto larger = [](const StripCurve* a, const StripCurve* b) { return a->values.back() > b->values.back(); };
+  if (!allFit) std::stable_sort(out.begin(), out.end(), larger);
+  return out;
+}
+
 // Of many tools smaller letters, and then none that do not fit; the window's length only where there is room for it.
 void writeLabels(const StripChart& chart, const Layout& layout, Ink& ink) {
   const float header = layout.low.y + 0.75f * layout.text, small = layout.small;
@@ -80,11 +90,12 @@ void writeLabels(const StripChart& chart, const Layout& layout, Ink& ink) {
   for (const StripCurve& curve : chart.curves) wide += textWidth(curve.label + "   ", layout.text);
   const float text = std::max(layout.text * std::min(1.f, (windowAt - layout.plotLow.x) / wide), kLegible);
   vec2 corner(layout.plotLow.x, header + layout.text - text);
-  for (const StripCurve& curve : chart.curves) {
-    if (corner.x + textWidth(curve.label, text) > layout.plotHigh.x) break;
-    writeText(curve.label, corner, text, ink);
-    ink.apply(glm::vec3(curve.colour), 1);
-    corner.x += textWidth(curve.label + "   ", text);
+  const bool allFit = wide * text <= (layout.plotHigh.x - corner.x) * layout.text;
+  for (const StripCurve* curve : inOrder(chart, allFit)) {
+    if (corner.x + textWidth(curve->label, text) > layout.plotHigh.x) break;
+    writeText(curve->label, corner, text, ink);
+    ink.apply(glm::vec3(curve->colour), 1);
+    corner.x += textWidth(curve->label + "   ", text);
   }
   if (corner.x <= windowAt) writeText(chart.windowLabel, {windowAt, header + layout.text - small}, small, ink);
   writeText(chart.rangeLabel, rangeCorner(layout), small, ink);

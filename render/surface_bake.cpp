@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "render/depth_map.h"
@@ -211,6 +212,16 @@ void bakeDetail(SceneMesh& mesh, const MeshPart& part) {
 
 }  // namespace
 
+// Textures repeat, and rasterisers count texels in fixed point: of bodies hundreds of metres away they ran out of it.
+static void keepNearZero(SceneMesh& mesh, const MeshPart& part) {
+  constexpr float kFar = 256;  // tiles
+  const auto first = mesh.uv.begin() + std::ptrdiff_t(part.firstVertex),
+             last = first + std::ptrdiff_t(part.vertexCount);
+  const glm::vec2 sum = std::accumulate(first, last, glm::vec2(0)), tile = glm::floor(sum / float(part.vertexCount));
+  if (!(glm::length(tile) > kFar)) return;
+  for (auto uv = first; uv != last; ++uv) *uv -= tile;
+}
+
 void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
   const float c = std::cos(part.look->unrollTilt), s = std::sin(part.look->unrollTilt);
   const float radius = part.look->unrollRadius > 0 ? part.look->unrollRadius : meanRadius(mesh, part);
@@ -226,6 +237,7 @@ void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
   };
   for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
     mesh.uv[i] = unroll(tilted(mesh.position[i]), tilted(glm::normalize(normal[i])), radius) * part.look->detailScale;
+  keepNearZero(mesh, part);
   if (occludes(part)) bakeDetail(mesh, part);
 }
 

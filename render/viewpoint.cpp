@@ -71,8 +71,11 @@ Viewpoint makeViewpoint(const Camera& camera, float aspect, bool round, float mo
   Viewpoint v;
   v.position = camera.position;
   v.back = -direction(camera.position, camera.target);
-  const glm::vec3 side = glm::cross(camera.up, v.back);
-  v.right = glm::length(side) > 1e-6f ? glm::normalize(side) : anyPerpendicular(v.back);
+  // Straight up or down, as a camera that looks along -z is tilted there.
+  const glm::vec3 across = glm::cross(camera.up, v.back), side = glm::cross(camera.up, glm::vec3(0, 0, 1));
+  v.right = glm::length(across) > 1e-6f ? glm::normalize(across)
+            : glm::length(side) > 1e-6f ? glm::normalize(side)
+                                        : anyPerpendicular(v.back);
   v.up = glm::cross(v.back, v.right);
   v.tangent = std::tan(glm::radians(camera.fovDegrees) / 2);
   v.aspect = aspect;
