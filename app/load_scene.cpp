@@ -223,8 +223,7 @@ static void requireNearby(const Scene& scene, const SceneStatic& item, const Tri
                                item.meshPath, most, kAnyPlace.most));
 }
 
-// m: the diagonal of the box around all bodies at rest.
-static double sizeOfBodies(const Scene& scene) {
+double sizeOfBodies(const Scene& scene) {
   Eigen::AlignedBox3d box;
   for (const SceneBody& body : scene.bodies)
     for (const Eigen::Vector3d& x : body.model->restNodes) box.extend(body.worldFromModel * x);

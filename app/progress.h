@@ -6,7 +6,7 @@
 namespace medulla {
 
 // Progress of long work on standard error: a bar with the time left on a terminal, a line every few seconds elsewhere,
-// nothing for work that ends within two seconds.
+// nothing for work that ends within half a second there, within two elsewhere.
 class Progress {
  public:
   Progress(std::string what, double total, std::string unit);

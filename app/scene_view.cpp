@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "app/files/input_error.h"
 #include "app/model_drawing.h"
 #include "haptics/monotone_cubic.h"
 
@@ -134,25 +133,18 @@ float heightAtTarget(const Camera& camera) {
 SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Renderer& renderer)
     : loaded_(&loaded), widening_(widening(renderer.aspect())) {
   const Scene& scene = loaded.scene;
-  const auto add = [&](int line, SurfaceShape shape) {
-    try {
-      renderer.addSurface(std::move(shape));
-    } catch (const std::runtime_error& error) {
-      throw inputError(scene.path, line, error.what());
-    }
-  };
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const SceneBody& body = scene.bodies[b];
     smoothings_.push_back(body.links == LinkModel::identified ? SurfaceSmoothing{} : makeSurfaceSmoothing(*body.model));
     SurfaceShape shape = shapeOf(body.model->renderSurface.triangles, body.look);
     drawnPositions(body, smoothings_[b], rest.bodies[b].nodes, shape.restPositions);
     shape.travels = body.fixed.empty() && body.fixedNodes.empty();
-    add(body.line, std::move(shape));
+    renderer.addSurface(std::move(shape));
   }
   for (std::size_t s = 0; s < scene.statics.size(); ++s) {
     const SceneStatic& item = scene.statics[s];
     if (item.look.empty()) continue;
-    add(item.line, shapeOf(loaded.statics[s], item.shape.worldFromShape, item.look));
+    renderer.addSurface(shapeOf(loaded.statics[s], item.shape.worldFromShape, item.look));
     ++drawnStatics_;
   }
 }

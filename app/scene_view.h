@@ -20,8 +20,7 @@ struct ViewOptions {
 
 class SceneView {
  public:
-  // Hands every surface of the scene to the renderer, at rest. Throws std::runtime_error naming scene and line on an
-  // unknown look.
+  // Hands every surface of the scene to the renderer, at rest.
   SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Renderer& renderer);
 
   // Fills `picture` (reused) from a state.

@@ -25,6 +25,8 @@ struct LoadedScene {
 // file that is missing is reported at the scene's line that names it.
 LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& trajectories = {});
 
+double sizeOfBodies(const Scene& scene);  // m: the diagonal of the box around all of them at rest
+
 // The scene's bodies before they settle, ahead of time 0. Throws std::runtime_error naming the body that cannot be
 // simulated.
 World makeWorld(const LoadedScene& loaded);

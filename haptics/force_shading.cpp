@@ -8,10 +8,6 @@ using Eigen::Vector3d;
 
 constexpr double kCosineOfCrease = 0.7316888688738209;  // cos 0.75
 
-static Vector3d doubleArea(const Triangle& t) {
-  return (t.b - t.a).cross(t.c - t.a);
-}
-
 std::vector<char> nodesOnCreases(const TriangleMesh& rest) {
   constexpr double cosineOfEdge = 0.36;  // 69 degrees: a tube of six sides is still round, a box is not, by far
   std::vector<char> isCrease(rest.vertices.size(), 0);

@@ -270,7 +270,7 @@ struct Surroundings {
 // Over the triangle's point of these weights, a hundredth nearer to its middle: over an edge that has folded in, it
 // could be below the other triangle.
 static Vector3d justOutside(const Triangle& t, const Vector3d& weights) {
-  const Vector3d outward = (t.b - t.a).cross(t.c - t.a).normalized();
+  const Vector3d outward = doubleArea(t).normalized();
   return pointAt(t, 0.99 * weights + Vector3d::Constant(0.01 / 3)) + kStandOff * outward;
 }
 
@@ -283,7 +283,7 @@ static Surroundings lookAround(const BlendedSurface& surface, double alpha, cons
     const TrianglePoint q = closestPoint(triangle, p);
     const double distance = (q.point - p).norm();
     out.distance = std::min(out.distance, distance);
-    if (distance >= wayOut || (triangle.b - triangle.a).cross(triangle.c - triangle.a).dot(p - q.point) > 0) continue;
+    if (distance >= wayOut || doubleArea(triangle).dot(p - q.point) > 0) continue;
     wayOut = distance;
     out.exit = justOutside(triangle, q.weights);
   }
@@ -328,7 +328,7 @@ static bool liesBehind(const Buckets& buckets, double alpha, const Vector3d& p) 
     if (d < (1 - kSame) * distance) normal.setZero();
     distance = d;
     nearest = q.point;
-    const Vector3d area = (triangle.b - triangle.a).cross(triangle.c - triangle.a);
+    const Vector3d area = doubleArea(triangle);
     normal += angleAround(triangle, q.weights) * area.normalized();
   }
   return normal.dot(p - nearest) < 0;

@@ -33,8 +33,8 @@ struct ToolState {
   // Surfaces on all sides leave its proxy less than half of its radius. Tissue that closes around a tool does so, where
   // it is pressed deeper than its model can follow.
   bool squeezed = false;
-  // For pictures, in which nothing of a tool jumps: the force as it was over the last hundredths of a second, N, and how
-  // far a grip has taken hold, 0 to 1.
+  // For pictures, in which nothing of a tool jumps: the force as it was over the last hundredths of a second, N, and
+  // how far a grip has taken hold, 0 to 1.
   Eigen::Vector3d steadyForce = Eigen::Vector3d::Zero();
   double grasp = 0;
   // J, handed to the user since the start: the force of each tick over the device's way to the next. What a grip turns
@@ -67,7 +67,8 @@ class Servo {
   bool beginFrame();
 
   // One servo tick at the blend alpha (0..1], not falling within a frame, for one sample per tool. Throws
-  // std::runtime_error naming the tool whose device is not finite or beyond kToolReach.
+  // std::runtime_error naming the tool whose device is not finite or beyond kToolReach, whose quaternion is not unit
+  // within 1e-3 or whose grip is not finite, and where a surface carries a tool beyond kToolReach.
   void tick(double alpha, const std::vector<ToolSample>& inputs);
 
   const std::vector<ToolState>& tools() const;

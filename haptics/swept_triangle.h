@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 // Exact tests between a proxy sphere and a triangle, in double. The sweep of a sphere against a triangle is that of its
 // centre against the rounded triangle: the triangle's two offset faces, a cylinder around each edge, a sphere around
@@ -15,6 +15,11 @@ struct TrianglePoint {
   Eigen::Vector3d point;    // m
   Eigen::Vector3d weights;  // barycentric: point = weights.x a + weights.y b + weights.z c, each in 0..1, sum 1
 };
+
+// m2, along the normal.
+inline Eigen::Vector3d doubleArea(const Triangle& t) {
+  return (t.b - t.a).cross(t.c - t.a);
+}
 
 inline Eigen::Vector3d pointAt(const Triangle& t, const Eigen::Vector3d& weights) {
   return weights.x() * t.a + weights.y() * t.b + weights.z() * t.c;

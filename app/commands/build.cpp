@@ -266,7 +266,7 @@ std::vector<Result> resultsOf(const std::vector<BuildJob>& jobs) {
   std::vector<Result> results;
   std::vector<BuildReport> reports;
   for (const BuildJob& job : jobs) {
-    for (Result& r : buildResults(job.report)) results.push_back({job.name + "." + r.name, r.value, r.unit});
+    for (Result& r : buildResults(job.report)) results.push_back({plainName(job.name) + "." + r.name, r.value, r.unit});
     reports.push_back(job.report);
   }
   for (Result& r : totalResults(reports)) results.push_back({"total." + r.name, r.value, r.unit});

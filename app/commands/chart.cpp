@@ -13,6 +13,7 @@
 #include "app/files/gnuplot.h"
 #include "app/files/output_file.h"
 #include "app/files/sphere_chart.h"
+#include "app/files/text.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
 #include "app/standard_streams.h"
@@ -164,7 +165,8 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
       if (models.size() > 1) run.curve += fmt::format("_{}_spheres", run.spheres);
       const auto isAlike = [&](const ChartRun& r) { return r.curve == run.curve && r.model != k; };
       if (std::any_of(runs.begin(), runs.end(), isAlike))
-        run.curve += "_" + fs::path(modelPathOf(options.models[k])).stem().string();
+        run.curve += "_" + plainName(fs::path(modelPathOf(options.models[k])).stem().string());
+      if (std::any_of(runs.begin(), runs.end(), isAlike)) run.curve += fmt::format("_{}", k + 1);
       if (name == options.methods[0] && run.spheres > reference.spheres) reference = run;
       std::set<int> substeps;
       for (const double step : options.steps)

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
 #include <filesystem>
 
 #include "app/commands/commands.h"
@@ -17,15 +15,6 @@ namespace medulla {
 
 namespace fs = std::filesystem;
 
-// Names of bodies and scenes are letters, digits, _ and -; those of mesh files may be anything.
-static std::string nameFrom(const std::string& meshPath) {
-  std::string name = fs::path(meshPath).stem().string();
-  std::replace_if(
-      name.begin(), name.end(), [](unsigned char c) { return !((c < 128 && std::isalnum(c)) || c == '_' || c == '-'); },
-      '_');
-  return name;
-}
-
 // A tool starts outside of the body, not farther away than the body is large.
 static void requireWithinReach(const std::string& mesh, double metresPerUnit) {
   const double reach = kToolReach / 3;
@@ -38,7 +27,7 @@ static void requireWithinReach(const std::string& mesh, double metresPerUnit) {
 }
 
 int runNew(const NewOptions& options) {
-  const std::string name = nameFrom(options.build.meshes[0]);
+  const std::string name = plainName(fs::path(options.build.meshes[0]).stem().string());
   const fs::path folder = options.folder;
   const auto file = [&](const char* ending) { return (folder / (name + ending)).string(); };
   const std::string scenePath = file(".xml"), trajectoryPath = file(".csv"), modelPath = file(".model.xml");

@@ -54,17 +54,17 @@ bool RestWatch::atRest() const {
                      [&](const Body& body) { return time_ - body.movedAt >= body.period - 1e-9; });
 }
 
-void RestWatch::fail(double time, bool hasFiles) const {
+void RestWatch::fail(bool hasFiles) const {
   const char* files = hasFiles ? "; no file is written, without --until-rest they all are" : "";
-  if (busyUntil_ > time)
-    throw NotAtRest(fmt::format("not at rest: loads or tools act up to the end at {:.6g} s{}", time, files));
+  if (busyUntil_ > time_)
+    throw NotAtRest(fmt::format("not at rest: loads or tools act up to the end at {:.6g} s{}", time_, files));
   const auto latest = std::min_element(bodies_.begin(), bodies_.end(), [](const Body& a, const Body& b) {
     return a.movedAt + a.period > b.movedAt + b.period;
   });
   throw NotAtRest(fmt::format(
       "not at rest: body '{}' moved up to {:.6g} s, expected {:.3g} s of rest, its slowest swing, before the "
       "end at {:.6g} s{}",
-      latest->name, latest->movedAt, latest->period, time, files));
+      latest->name, latest->movedAt, latest->period, time_, files));
 }
 
 }  // namespace medulla

@@ -23,7 +23,7 @@ class RestWatch {
   void afterFrame(const Simulation& simulation);
   bool atRest() const;
   // Throws NotAtRest, which says so where the run had files to write.
-  [[noreturn]] void fail(double time, bool hasFiles) const;
+  [[noreturn]] void fail(bool hasFiles) const;
 
  private:
   struct Body {

@@ -82,7 +82,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
       simulation.advanceFrame();
     if (rest) rest->afterFrame(simulation);
     const bool isAtRest = rest && rest->atRest();
-    if (rest && !isAtRest && simulation.finished()) rest->fail(simulation.time(), !outputFiles(options).empty());
+    if (rest && !isAtRest && simulation.finished()) rest->fail(!outputFiles(options).empty());
     last = simulation.finished() || isAtRest;
     recorders.afterFrame(simulation, last);
     afterFrame();

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <set>
 
@@ -123,10 +122,7 @@ static void printUnits(const LoadedScene& loaded) {
       ask(fmt::format("the density of body '{}'", body.name), body.tissue.density, "kg/m3");
   }
   if (const double g = scene.dynamics.gravity.norm(); g > 200) ask("gravity", g, "m/s2");
-  Eigen::AlignedBox3d bodies;
-  for (const SceneBody& body : scene.bodies)
-    for (const Eigen::Vector3d& x : body.model->restNodes) bodies.extend(body.worldFromModel * x);
-  const double around = bodies.diagonal().norm();
+  const double around = sizeOfBodies(scene);
   for (std::size_t k = 0; k < scene.statics.size(); ++k) {
     const double size = boundsDiagonal(loaded.statics[k]);
     if (!scene.statics[k].meshPath.empty() && (size > 50 * around || size < 0.01 * around))

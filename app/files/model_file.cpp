@@ -100,10 +100,16 @@ void readSurface(const std::string& path, const XmlElement& root, SoftBodyModel&
   const std::size_t count = model.restNodes.size();
   Rows inputs(path, root, "input_vertices");
   inputs.forEach([&] { model.nodeOfInputVertex.push_back(inputs.index(count, -1)); });
+  const std::vector<int>& given = model.nodeOfInputVertex;
+  inputs.require(given.empty() || *std::max_element(given.begin(), given.end()) >= 0, "none of them is a node");
 
   Rows triangles(path, root, "triangles");
   triangles.forEach([&] { model.triangles.push_back(triangles.indices<3>(count)); });
   triangles.require(isClosed(model.triangles), "the surface is not closed and wound one way");
+  std::vector<char> isUsed(count, 0);
+  for (const std::array<int, 3>& t : model.triangles)
+    for (const int node : t) isUsed[node] = 1;
+  triangles.require(std::count(isUsed.begin(), isUsed.end(), 0) == 0, "a node is in none of them");
   Rows edges(path, root, "edges");
   edges.forEach([&] { model.edges.push_back(edges.indices<2>(count)); });
   edges.require(model.edges == uniqueEdges({model.restNodes, model.triangles}),

@@ -64,7 +64,7 @@ std::string keyLabels() {
 }  // namespace
 
 std::string stabilityRow(const StabilityPoint& p) {
-  return fmt::format("{},{},{:.6g},{:.6g},{:d},{},{:.4g}\n", p.method, p.trial, p.young, p.step, p.survived,
+  return fmt::format("{},{},{:.12g},{:.12g},{:d},{},{:.4g}\n", p.method, p.trial, p.young, p.step, p.survived,
                      p.recoveredAt ? fmt::format("{:.4g}", *p.recoveredAt) : "", p.energyRatio);
 }
 

@@ -29,6 +29,16 @@ std::string shellWord(std::string_view word) {
   return out + "'";
 }
 
+std::string plainName(std::string_view text) {
+  const auto isPlain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  };
+  std::string out(text);
+  for (char& c : out)
+    if (!isPlain(c)) c = '_';
+  return out;
+}
+
 std::string escapedXml(std::string_view text) {
   std::string out;
   for (const char c : text)

@@ -13,6 +13,9 @@ std::string inQuotes(std::string_view word, char mark = '\'');
 // Quoted where a shell would take it for several words or more: for commands that are printed to be pasted.
 std::string shellWord(std::string_view word);
 
+// A name for results, curves, bodies and scenes, of what may be any: letters, digits, _ and - of it, _ for the rest.
+std::string plainName(std::string_view text);
+
 // As an attribute's value, or between tags.
 std::string escapedXml(std::string_view text);
 

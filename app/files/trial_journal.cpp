@@ -16,7 +16,7 @@ namespace {
 
 // What tells a trial from the others, as the tables write it.
 std::string trialKey(const StabilityPoint& p) {
-  return fmt::format("{},{},{:.6g},{:.6g}", p.method, p.trial, p.young, p.step);
+  return fmt::format("{},{},{:.12g},{:.12g}", p.method, p.trial, p.young, p.step);
 }
 
 StabilityPoint pointOf(const CsvRows& row) {

@@ -6,6 +6,7 @@
 #include "physics/dynamics/block_cholesky.h"
 #include "physics/dynamics/whole_motion.h"
 #include "physics/dynamics/world_data.h"
+#include "physics/model/disjoint_sets.h"
 
 // What an implicit step works on, laid out once. A motion has one velocity for every freedom: two quads per sphere,
 // linear and angular, then one per dynamic node. Everything is in impulses: matrices in kg, right sides in N s.
@@ -130,6 +131,7 @@ struct ImplicitData {
   std::vector<double> turning;  // J^1/2, per free body: root of twice its energy of turning, times the angle; 0: slow
   std::vector<double> workOfPaths, workOfLoads;  // J, per body, in this stage
   std::vector<EnergyBalance> bodies, islands;    // per body
+  DisjointSets joined;                           // bodies that touch
   std::vector<int> island;                       // per body: the first one of its island
   std::vector<Verdict> verdicts;                 // per body: of its island
   std::vector<double> sums;                      // J, per body, while energies are summed up

@@ -56,21 +56,11 @@ void setGiven(const WorldData& d, ImplicitData& s) {
     s.bodies[b].given = d.substep / s.duration * (sums[b] + s.workOfLoads[b]);
 }
 
-int firstOf(const ImplicitData& s, int body) {
-  while (s.island[body] != body) body = s.island[body];
-  return body;
-}
-
 void joinIslands(ImplicitData& s) {
-  std::iota(s.island.begin(), s.island.end(), 0);
-  for (const LoadRow& row : s.rows) {
-    if (row.impulse == 0) continue;
-    for (int k = row.first; k < row.end; ++k) {
-      const int a = firstOf(s, bodyOf(s, row)), b = firstOf(s, s.bodyOf[s.rowQuad[k]]);
-      s.island[std::max(a, b)] = std::min(a, b);
-    }
-  }
-  for (int& first : s.island) first = s.island[first];  // in rising order: that of an earlier body is final
+  s.joined.separate();
+  for (const LoadRow& row : s.rows)
+    for (int k = row.first; row.impulse != 0 && k < row.end; ++k) s.joined.join(bodyOf(s, row), s.bodyOf[s.rowQuad[k]]);
+  for (std::size_t b = 0; b < s.island.size(); ++b) s.island[b] = s.joined.of(int(b));
 }
 
 void add(const EnergyBalance& own, EnergyBalance& to) {

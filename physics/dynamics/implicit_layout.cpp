@@ -76,6 +76,7 @@ void layOutImplicit(const WorldData& d, double duration, ImplicitData& s) {
   for (int i = 0; i < d.nodes.dynamicEnd; ++i) s.bodyOf.push_back(d.nodes.groupHosts[i / 4].body);
   for (std::vector<double>* of : {&s.workOfPaths, &s.workOfLoads, &s.sums}) of->resize(d.ranges.size());
   for (std::vector<EnergyBalance>* of : {&s.bodies, &s.islands}) of->resize(d.ranges.size());
+  s.joined = DisjointSets(d.ranges.size());
   s.island.resize(d.ranges.size());
   s.verdicts.resize(d.ranges.size());
   for (int k = 0; k < d.links.count; ++k) {

@@ -24,8 +24,8 @@ using Eigen::Vector3d;
 // A carried part starts to move when its edges would shift a node by more than this share of the body's mean radius,
 // plus the node's sag under its weight.
 constexpr double kUnrest = 0.002;
-constexpr double kQuiet = 0.5;    // of that: nodes nearer are at rest
-constexpr int kQuietFrames = 10;  // a third of a second at 30 Hz: several periods of a node on its attachment
+constexpr double kQuiet = 0.5;     // of that: nodes nearer are at rest
+constexpr double kQuietFor = 0.2;  // s: several periods of a node on its attachment
 
 const HostRange& rangeOf(const WorldData& d, std::size_t part) {
   const std::size_t onLinks = d.nodes.onLinks.size();
@@ -335,6 +335,7 @@ void chooseSurfaceParts(WorldData& d, const Loads& loads) {
     if (part.isBeside && balanceShifts(d, k) > part.unrest) part.isWanted = true;
   }
   bool changed = false;
+  const long enough = std::lround(kQuietFor / d.settings.frameDuration);
   for (std::size_t k = 0; k < parts.size(); ++k) {
     SurfacePart& part = parts[k];
     if (part.always || isAsleep(d, k)) continue;
@@ -342,7 +343,7 @@ void chooseSurfaceParts(WorldData& d, const Loads& loads) {
     part.quietFrames = quiet ? part.quietFrames + 1 : 0;
     if (!part.moves && part.isWanted) {
       part.moves = changed = true;
-    } else if (part.moves && part.quietFrames > kQuietFrames) {
+    } else if (part.moves && part.quietFrames > enough) {
       carry(d, k);
       changed = true;
     }

@@ -118,7 +118,7 @@ struct WorldData;  // arrays laid out for the step; physics/dynamics/world_data.
 class World {
  public:
   // Throws std::runtime_error naming the body where a description cannot be simulated (range of a tissue value, a fixed
-  // sphere that does not exist, a body without spheres).
+  // sphere that does not exist, a body without spheres), or where settings or a static shape are out of range.
   World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
         const std::vector<StaticShape>& statics = {});
   ~World();

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "physics/model/greedy_cover.h"
+#include "physics/model/medial_balls.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/power_cells.h"
 
@@ -55,11 +56,7 @@ std::vector<Ball> chooseBalls(const BodyShape& shape, int count, CoverGoal goal,
 
 double largestGap(const BodyShape& shape, const std::vector<Ball>& balls) {
   double largest = 0;
-  for (const Eigen::Vector3d& p : gapPoints(shape.mesh)) {
-    double gap = std::numeric_limits<double>::infinity();
-    for (const Ball& ball : balls) gap = std::min(gap, (p - ball.centre).norm() - ball.radius);
-    largest = std::max(largest, gap);
-  }
+  for (const Eigen::Vector3d& p : gapPoints(shape.mesh)) largest = std::max(largest, distanceToBalls(p, balls));
   return 100 * largest / shape.diagonal;
 }
 

@@ -24,10 +24,11 @@ enum class CoverGoal { gap, gapAndVolume };
 // Chooses `count` of the candidate balls, then lets them leave the candidates: greedy set cover under a bisected
 // tolerance, filling up to `count`, swaps with any better candidate, small random moves. The balls stay inscribed but
 // for the overshoot.
-// Cost: mean over the surface of (gap / scale)^6 and, for both goals, twice the open share of the volume; the scale is
-// the largest gap that the gap alone has led to. A hundredth of the surface at 1.3 times that gap then weighs as much
-// as 2.5 % of the volume. Less weight for the volume leaves bulky bodies bare, more gives up fins and ducts. 1 <= count
-// <= candidates. `progress`, if given, is called with 0..1. The same input gives the same bytes.
+// Cost: mean over the surface of (gap / scale)^6 and, for both goals, the open share of the volume; the scale is the
+// largest gap that the gap alone has led to. A hundredth of the surface at 1.3 times that gap then weighs as much as 5
+// % of the volume. Less weight for the volume leaves bulky bodies bare, more gives up fins and ducts. What the gap
+// alone has led to is kept where the largest gap grew, in shares of it, by more than twice the share of the volume that
+// was won. 1 <= count <= candidates. `progress`, if given, is called with 0..1. The same input gives the same bytes.
 std::vector<Ball> coverWithBalls(const SurfaceTree& tree, const std::vector<Ball>& candidates,
                                  const CoverTargets& targets, int count, CoverGoal goal,
                                  const std::function<void(double)>& progress = {});

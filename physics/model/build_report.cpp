@@ -35,12 +35,6 @@ std::vector<Ball> ballsOf(const SoftBodyModel& model) {
   return balls;
 }
 
-double distanceToBalls(const Vector3d& p, const std::vector<Ball>& balls) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const Ball& ball : balls) least = std::min(least, (p - ball.centre).norm() - ball.radius);
-  return least;
-}
-
 double distanceToCones(const Vector3d& p, const std::vector<Ball>& balls, const std::vector<ElasticLink>& links) {
   double least = std::numeric_limits<double>::infinity();
   for (const ElasticLink& link : links)

@@ -11,7 +11,9 @@ namespace medulla {
 // of the pairs.
 class DisjointSets {
  public:
-  explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
+  explicit DisjointSets(std::size_t count = 0) : parent_(count) { separate(); }
+
+  void separate() { std::iota(parent_.begin(), parent_.end(), 0); }
 
   int of(int i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "physics/model/mesh_topology.h"
 #include "physics/model/plane_section.h"
 
 namespace medulla {
@@ -39,17 +40,13 @@ void placeLinkEnds(const TriangleMesh& mesh, const SurfaceTree& tree, const Powe
     ++degree[link.sphere0];
     ++degree[link.sphere1];
   }
-  Vector3d low = mesh.vertices.front(), high = low;
-  for (const Vector3d& v : mesh.vertices) {
-    low = low.cwiseMin(v);
-    high = high.cwiseMax(v);
-  }
+  const double diagonal = boundsDiagonal(mesh);
   for (std::size_t i = 0; i < spheres.size(); ++i) {
     spheres[i].restLinkEnd = spheres[i].restFrame;
     if (degree[i] != 1) continue;
     const Vector3d way = (spheres[i].restFrame - spheres[neighbour[i]].restFrame).normalized();
     const PowerSites around = sitesAround(sites, {static_cast<int>(i), neighbour[i]});
-    spheres[i].restLinkEnd += reachOf(mesh, tree, around, spheres[i].restFrame, way, (high - low).norm()) * way;
+    spheres[i].restLinkEnd += reachOf(mesh, tree, around, spheres[i].restFrame, way, diagonal) * way;
   }
 }
 

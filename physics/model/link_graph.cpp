@@ -14,10 +14,10 @@ struct Candidate {
   std::array<int, 2> spheres;
 };
 
+// Asked of the surface, not of points on the way: those would miss a slit.
 bool staysInside(const SurfaceTree& tree, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  for (int k = 1; k < 8; ++k)
-    if (!isInside(tree, a + k / 8. * (b - a))) return false;
-  return true;
+  constexpr int kNoVertex = -1;
+  return isInside(tree, 0.5 * (a + b)) && !segmentCrosses(tree, a, b, kNoVertex);
 }
 
 std::vector<Candidate> candidatesOf(const SurfaceTree& tree, const PowerCells& cells) {
@@ -36,7 +36,8 @@ std::vector<Candidate> candidatesOf(const SurfaceTree& tree, const PowerCells& c
 
 }  // namespace
 
-SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const std::vector<Ball>& balls, int degreeMax) {
+SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const std::vector<Ball>& balls) {
+  constexpr int degreeMax = 12;
   constexpr double contactRatioMin = 0.15;  // cells that only share a corner or an edge fall below
   const std::vector<Candidate> candidates = candidatesOf(tree, cells);
   SphereLinks links;

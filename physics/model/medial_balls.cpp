@@ -1,8 +1,15 @@
 #include "physics/model/medial_balls.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace medulla {
+
+double distanceToBalls(const Eigen::Vector3d& p, const std::vector<Ball>& balls) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Ball& ball : balls) least = std::min(least, (p - ball.centre).norm() - ball.radius);
+  return least;
+}
 
 Ball shrinkBall(const SurfaceTree& tree, const Eigen::Vector3d& p, const Eigen::Vector3d& inward, double startRadius) {
   constexpr int iterations = 40;  // a handful suffices; a cusp converges slowly and may stop early

@@ -13,6 +13,9 @@ struct Ball {
   double radius = 0;                                 // m
 };
 
+// m, from the surface of the nearest of them; below 0 inside.
+double distanceToBalls(const Eigen::Vector3d& p, const std::vector<Ball>& balls);
+
 // The medial ball that touches the surface at p: a ball through p with its centre along `inward` (unit) shrinks until
 // nothing of the surface is inside it (Ma, Bae and Choi 2012), with the exact closest point in place of their point
 // cloud. Inscribed wherever its centre is inside.
