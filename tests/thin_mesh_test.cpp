@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "physics/model/identify/slits.h"
 #include "physics/model/identify/thin_parts.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
@@ -107,6 +108,25 @@ TEST(IdentifiedBuild, SaysWhereItIsFarOff) {
 
 TEST(ThinMesh, PlacesAreSaidWithoutNegativeZeros) {
   EXPECT_EQ(placeText({-1e-7, 0.05994, -0.12}), "(0.0000, 0.0599, -0.1200)");
+}
+
+// Two blocks side by side, so far apart (m).
+TriangleMesh blocks(double gap) {
+  TriangleMesh both = boxMesh({0.05, 0.01, 0.02});
+  const TriangleMesh one = both;
+  const int first = int(one.vertices.size());
+  for (const Vector3d& x : one.vertices) both.vertices.push_back(x + (0.01 + gap) * Vector3d::UnitY());
+  for (const auto& [a, b, c] : one.triangles) both.triangles.push_back({a + first, b + first, c + first});
+  return both;
+}
+
+TEST(ThinMesh, SlitsThinnerThanACellAreFoundAndCreasesAreNone) {
+  const std::optional<Slit> slit = narrowestSlit(blocks(0.001), 0.004);
+  ASSERT_TRUE(slit);
+  EXPECT_NEAR(slit->width, 0.001, 1e-6);
+  EXPECT_FALSE(narrowestSlit(blocks(0.005), 0.004));
+  for (const char* organ : {"liver/liver.obj", "stomach/stomach.obj"})
+    EXPECT_FALSE(narrowestSlit(assetMesh(organ), 0.008)) << organ;
 }
 
 }  // namespace

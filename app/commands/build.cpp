@@ -22,6 +22,8 @@
 #include "physics/dynamics/rest_modes.h"
 #include "physics/model/ball_choice.h"
 #include "physics/model/identify/check_loads.h"
+#include "physics/model/identify/slits.h"
+#include "physics/model/identify/thin_parts.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
 #include "physics/model/render_surface.h"
@@ -114,6 +116,21 @@ void warnOfErrors(const BuildJob& job) {
         "{}: note: the links are off by {:.2g} % RMS, finite elements by {:.2g}; {} fit better, or more that "
         "is held?\n",
         job.meshPath, links, n.ofFiniteElements.rms, job.report.longEdges ? "does a finer mesh" : "do more spheres");
+  constexpr double kPokes = 15, kAtMost = 100;  // %, RMS and of the farthest node
+  if (n.poke.rms > kPokes || n.poke.maximum > kAtMost)
+    tell("{}: note: dents where something pokes are off by {:.2g} % RMS, {:.2g} at most, by the builder's own loads\n",
+         job.meshPath, n.poke.rms, n.poke.maximum);
+}
+
+// Finite elements know nothing of what is thinner than they are.
+void warnOfSlits(const BuildJob& job) {
+  if (!job.model.identified) return;
+  const double voxel = job.model.identified->voxel;
+  if (const auto slit = narrowestSlit({job.model.restNodes, job.model.triangles}, voxel))
+    tell(
+        "{}: note: gaps down to {:.2g} mm, as near {} m, are bridged by finite elements of {:.2g} mm, which tie "
+        "their walls together: more spheres make smaller ones, links=\"beam\" of a scene knows of the gap\n",
+        job.meshPath, 1e3 * slit->width, placeText(slit->place), 1e3 * voxel);
 }
 
 std::vector<BuildJob> jobsOf(const BuildOptions& options) {
@@ -292,7 +309,10 @@ int runBuild(const BuildOptions& options) {
   for (const BuildJob& job : jobs) warnOfCover(job);
   for (const BuildJob& job : jobs) warnOfShape(job);
   for (const BuildJob& job : jobs) warnOfDrawnSurface(job);
-  for (const BuildJob& job : jobs) warnOfErrors(job);
+  for (const BuildJob& job : jobs) {
+    warnOfErrors(job);
+    warnOfSlits(job);
+  }
   if (!options.reportPath.empty()) writeReport(options.reportPath, results);
   printResults(results);
   return 0;
