@@ -19,13 +19,18 @@ namespace {
   throw std::runtime_error(fmt::format("--fix {}: expected {}", text, expected));
 }
 
-// Numbers between commas; none at all where one of them is no number.
+std::string_view trimmed(std::string_view text) {
+  const std::size_t first = text.find_first_not_of(' '), last = text.find_last_not_of(' ');
+  return first == text.npos ? std::string_view() : text.substr(first, last - first + 1);
+}
+
+// Numbers between commas, blanks around them or not; none at all where one of them is no number.
 std::vector<double> numbersOf(std::string_view list) {
   std::vector<double> out;
   for (bool more = true; more;) {
     const std::size_t comma = list.find(',');
     more = comma != std::string_view::npos;
-    const std::optional<double> value = parseNumber<double>(list.substr(0, comma));
+    const std::optional<double> value = parseNumber<double>(trimmed(list.substr(0, comma)));
     if (!value) return {};
     out.push_back(*value);
     if (more) list.remove_prefix(comma + 1);

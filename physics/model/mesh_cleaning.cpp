@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
+#include <limits>
 #include <numeric>
 #include <set>
 #include <stdexcept>
@@ -14,19 +16,23 @@ namespace medulla {
 
 namespace {
 
-// Vertices closer than this fraction of the median edge are one. Relative to an edge and not to the bounding box, which
-// a single stray vertex can blow up until the whole mesh is "close".
+// Vertices closer than this fraction of the usual shortest edge are one. Relative to an edge and not to the bounding
+// box, which a single stray vertex can blow up until the whole mesh is "close".
 constexpr double kWeld = 1e-3;
 // Open flaps of at most this share of the surface are fins; more would be a guess about which part is the body.
 constexpr double kFinArea = 0.25;
 // A triangle lower than this fraction of its longest edge has no area.
 constexpr double kNoHeight = 1e-6;
 
-double medianEdge(const TriangleMesh& mesh) {
+// m, median over triangles: a fan's diagonals are long, and a tolerance by these would weld its rim to a point.
+double medianShortestEdge(const TriangleMesh& mesh) {
   std::vector<double> lengths;
-  for (const auto& [a, b] : uniqueEdges(mesh)) {
-    const double length = (mesh.vertices[a] - mesh.vertices[b]).norm();
-    if (length > 0) lengths.push_back(length);
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    double shortest = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < 3; ++k)
+      if (const double length = (mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm(); length > 0)
+        shortest = std::min(shortest, length);
+    if (std::isfinite(shortest)) lengths.push_back(shortest);
   }
   if (lengths.empty()) throw std::runtime_error("all triangles are points: the mesh encloses no volume");
   const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
@@ -101,7 +107,7 @@ std::vector<Patch> patchesOf(const TriangleMesh& mesh) {
 }  // namespace
 
 MeshUnderRepair weldVertices(const TriangleMesh& input) {
-  const std::vector<int> lowest = lowestCoincident(input.vertices, kWeld * medianEdge(input));
+  const std::vector<int> lowest = lowestCoincident(input.vertices, kWeld * medianShortestEdge(input));
   MeshUnderRepair repair;
   repair.vertexOfInput.resize(input.vertices.size());
   for (int v = 0; v < static_cast<int>(input.vertices.size()); ++v) {
