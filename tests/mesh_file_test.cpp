@@ -48,7 +48,7 @@ TEST(ObjReader, EveryFormOfFace) {
   const std::string vertices = kTetrahedron + "vt 0 0\nvn 0 0 1\n";
   const std::vector<std::array<int, 3>> expected{{0, 2, 1}};
   for (const std::string face : {"f 1 3 2", "f 1/1 3/1 2/1", "f 1//1 3//1 2//1", "f 1/1/1 3/1/1 2/1/1", "f -4 -2 -3",
-                                 "f -4/-1/-1 -2/-1/-1 -3/-1/-1", "  f\t1  3 \\\n 2", "f 1 3 2 # end"}) {
+                                 "f -4/-1/-1 -2/-1/-1 -3/-1/-1", "  f\t1  3 \\\n 2", "f 1 3 2 # end", "fo 1 3 2"}) {
     EXPECT_EQ(parseObj(vertices + face, "a.obj").triangles, expected) << face;
   }
   // A face may come before its vertices, but counting back starts where it stands.
@@ -126,8 +126,9 @@ TEST(ObjReader, IndicesOutOfRangeAreRefusedWithTheirLine) {
 
 TEST(OffReader, HeaderVariants) {
   const std::string body = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
-  for (const std::string header : {"OFF\n4 4 6\n", "OFF 4 4 6\n", "OFF4 4 6\n", "# c\nOFF # d\n\n4 4\n",
-                                   "OFF\r\n4 4 0\r\n", "COFF\n4 4 0\n", "NOFF 4 4 0\n", "STCNOFF 4 4 0\n"}) {
+  for (const std::string header :
+       {"OFF\n4 4 6\n", "OFF 4 4 6\n", "OFF4 4 6\n", "# c\nOFF # d\n\n4 4\n", "OFF\r\n4 4 0\r\n", "off\n4 4 0\n",
+        "COFF\n4 4 0\n", "NOFF 4 4 0\n", "STCNOFF 4 4 0\n"}) {
     const TriangleMesh mesh = parseOff(header + body, "a.off");
     ASSERT_EQ(mesh.vertices.size(), 4u) << header;
     EXPECT_EQ(mesh.vertices[3], Vector3d(0, 0, 1));

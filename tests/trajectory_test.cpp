@@ -40,6 +40,17 @@ TEST(TrajectoryFile, AMarkBeforeTheFirstLineIsNoPartOfIt) {
   EXPECT_EQ(readTrajectory(folder / "marked.csv").samples.size(), 1U);
 }
 
+TEST(TrajectoryFile, AnotherEncodingIsNamed) {
+  const TemporaryFolder folder;
+  folder.write("wide.csv", std::string("\xff\xfet\0[\0", 6));
+  try {
+    readTrajectory(folder / "wide.csv");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(error.what(), folder / "wide.csv" + ": is written in UTF-16, expected UTF-8 or ASCII");
+  }
+}
+
 TEST(TrajectoryFile, ReadsMeasuredForces) {
   const Trajectory trajectory = parseTrajectory(
       "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip,fx[N],fy[N],fz[N]\n"

@@ -45,7 +45,7 @@ TriangleMesh parseObj(std::string_view text, const std::string& name) {
   while (lines.next()) {
     const auto& words = lines.words();
     if (words[0] == "v") mesh.vertices.push_back(vertex(lines));
-    if (words[0] != "f") continue;
+    if (words[0] != "f" && words[0] != "fo") continue;  // the latter in files of before 1995
     if (words.size() < 4) lines.fail("expected a face of at least 3 corners");
     polygon.clear();
     for (std::size_t i = 1; i < words.size(); ++i) {

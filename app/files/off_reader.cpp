@@ -18,7 +18,7 @@ struct Counts {
 // Every header ends in "OFF"; what may stand before it says what follows x y z on a vertex line. 4OFF and nOFF have
 // other than three coordinates. Some programs write the counts right behind the keyword ("OFF8 6 0").
 std::string_view afterKeyword(const TextLines& lines, std::string_view word) {
-  const std::size_t off = word.find("OFF");
+  const std::size_t off = lowered(word).find("off");
   const std::string_view prefix = word.substr(0, off == std::string_view::npos ? 0 : off);
   const std::string_view suffix = off == std::string_view::npos ? word : word.substr(off + 3);
   const bool known = off != std::string_view::npos && prefix.find_first_not_of("STCN") == std::string_view::npos &&

@@ -97,6 +97,8 @@ std::string readTextFile(const std::string& path) {
   std::string text = readAll(file, pipe.has_value(), path);
   constexpr std::string_view mark = "\xef\xbb\xbf";  // before UTF-8, as spreadsheets write it
   if (text.starts_with(mark)) text.erase(0, mark.size());
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
+    throw inputError(path, 0, "is written in UTF-16, expected UTF-8 or ASCII");
   if (pipe) remember(*pipe, text);
   return text;
 }
