@@ -25,7 +25,7 @@ using Eigen::Vector3d;
 // plus the node's sag under its weight.
 constexpr double kUnrest = 0.002;
 constexpr double kQuiet = 0.5;     // of that: nodes nearer are at rest
-constexpr double kQuietFor = 0.2;  // s: several periods of a node on its attachment
+constexpr double kQuietFor = 1. / 3;  // s: several periods of a node on its attachment
 
 const HostRange& rangeOf(const WorldData& d, std::size_t part) {
   const std::size_t onLinks = d.nodes.onLinks.size();
