@@ -43,6 +43,7 @@ std::map<std::string, std::string> filesByTool(const std::string& option, const 
     const std::size_t equals = word.find('=');
     const bool named = equals != std::string::npos;
     if (equals == word.size() - 1) usageError(option, word, "a file behind the =");
+    if (equals == 0) usageError(option, word, "a tool's name before the =");
     const bool isFirst =
         out.try_emplace(named ? word.substr(0, equals) : "", named ? word.substr(equals + 1) : word).second;
     if (!isFirst) usageError(option, word, "one file per tool");
