@@ -31,6 +31,19 @@ TEST(BuildReport, CountsLinksAcrossWhichTheBodyIsHollow) {
   EXPECT_GT(report.hollowLinks, report.links / 2);
 }
 
+TEST(BuildReport, CountsLinksThatArePartsOfASheet) {
+  const auto sheetLinks = [](const Vector3d& size, int spheres) {
+    BuildSettings settings;
+    settings.spheres = spheres;
+    BuildReport report;
+    buildModel(asRepaired(boxMesh(size)), nullptr, settings, report);
+    return double(report.sheetLinks) / report.links;
+  };
+  EXPECT_GT(sheetLinks({0.2, 0.2, 0.008}, 16), 0.5);
+  EXPECT_EQ(sheetLinks({0.2, 0.02, 0.004}, 8), 0);  // a strip, whose links stand in a row
+  EXPECT_LT(sheetLinks({0.1, 0.1, 0.1}, 16), 0.2);
+}
+
 TEST(BuildReport, TellsOfEdgesLongerThanTheBodyIsThick) {
   const auto edges = [](const TriangleMesh& mesh) { return longEdges(mesh, makeSurfaceTree(mesh)); };
   const std::optional<LongEdges> of = edges(cylinderMesh(0.2, 0.02, 64, 1));

@@ -92,6 +92,12 @@ void warnOfShape(const BuildJob& job) {
   if (!job.model.identified && job.report.hollowLinks > kManyLinks * job.report.links)
     tell("{}: note: {} of {} links lie in a hollow or beside the body: beams may be far too soft; use --identify\n",
          job.meshPath, job.report.hollowLinks, job.report.links);
+  constexpr double kMostLinks = 0.5;
+  if (!job.model.identified && job.report.sheetLinks > kMostLinks * job.report.links)
+    tell(
+        "{}: note: {} of {} links lie in a sheet: beams resist its bending by a third to a half too much; use "
+        "--identify\n",
+        job.meshPath, job.report.sheetLinks, job.report.links);
 }
 
 // Loop subdivision draws a coarse mesh much rounder than it is.

@@ -201,6 +201,7 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
   model.renderSurface = makeRenderSurface(shape.mesh, settings.renderLevels, fine);
   done(0.9);
   report = measureModel(model);
+  report.sheetLinks = countSheetLinks(model.spheres, model.links);
   report.hollowLinks = countHollowLinks(shape.mesh, shape.tree, s.cells.sites, model.spheres, model.links);
   report.longEdges = longEdges(shape.mesh, shape.tree);
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -43,6 +43,7 @@ struct BuildReport {
   int degreeMax = 0;
   double drawnInsideMax = 0;           // drawn surface, inside the mesh: so far a tool presses before it is seen to
   int hollowLinks = 0;                 // across which the body is hollow: countHollowLinks()
+  int sheetLinks = 0;                  // countSheetLinks()
   std::optional<LongEdges> longEdges;  // where the mesh is too coarse for the body's thickness
   double volume = 0, diagonal = 0;     // m3 of the mesh, m of its bounding box
   double seconds = 0;

@@ -24,4 +24,9 @@ void measureLinks(const TriangleMesh& mesh, const PowerSites& sites, const std::
 int countHollowLinks(const TriangleMesh& mesh, const SurfaceTree& tree, const PowerSites& sites,
                      const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links);
 
+// How many links are parts of a sheet: wide and flat, in a network that goes on to all sides. Beams side by side resist
+// a sheet's bending by a third to a half too much (a cantilevered plate of 200 x 200 x 10 mm and 25 spheres swings at
+// 1.69 Hz instead of 1.32, of 4 mm at 0.74 instead of 0.53).
+int countSheetLinks(const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links);
+
 }  // namespace medulla
