@@ -24,7 +24,7 @@ using Eigen::Vector3d;
 // A carried part starts to move when its edges would shift a node by more than this share of the body's mean radius,
 // plus the node's sag under its weight.
 constexpr double kUnrest = 0.002;
-constexpr double kQuiet = 0.5;     // of that: nodes nearer are at rest
+constexpr double kQuiet = 0.5;        // of that: nodes nearer are at rest
 constexpr double kQuietFor = 1. / 3;  // s: several periods of a node on its attachment
 
 const HostRange& rangeOf(const WorldData& d, std::size_t part) {
