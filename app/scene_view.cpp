@@ -64,7 +64,7 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   const double deep = kDeepest * instrument.scale * (1 - std::exp(-force / kSoft)) * (1 - state.grasp);
   if (force > 0) instrument.press = toGlm(-deep / force * state.steadyForce);
   constexpr double kShown = 1e-6;  // m
-  instrument.touching = deep > kShown || instrument.hold > 0;
+  instrument.touching = deep > kShown || instrument.hold > 1e-3f;
   // The picture shows the proxy: an instrument never enters the tissue, its device may. What holds is drawn where the
   // hand is: its proxy hangs on the tissue, and the instrument would jump when it lets go. The proxy is a sphere, the
   // jaws reach to its far side along the shaft.

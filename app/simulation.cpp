@@ -124,7 +124,7 @@ void Simulation::accountTicks() {
       totals_.forceMax = std::max(totals_.forceMax, tool.force.norm());
       totals_.clampedTicks += tool.clamped;
       if (tool.inContact || tool.holding) totals_.touched[k] = true;
-      if (tool.holding) totals_.held[k] = true;
+      if (tool.holding || tool.slipped) totals_.held[k] = true;
       totals_.squeezedTicks[k] += tool.squeezed;
       totals_.closings[k] +=
           record_.inputs[tick][k].grip > kGripCloses && record_.inputs[tick - 1][k].grip <= kGripCloses;

@@ -22,9 +22,9 @@ struct Grip {
 };
 
 // Opens or closes by the sample's grip (closed above kGripCloses). Closing on `contact`, also at a run's first tick,
-// holds the nodes of the touched body within gripRadius of the contact point, less firmly towards its rim, and at least
-// those of the touched triangle, where they are: the springs are slack then. Null: nothing is touched. `grip.held` must
-// have room for every node of the surface: nothing is allocated here.
+// holds the nodes of the touched body within 5/4 of gripRadius of the contact point, less and less firmly from 3/4 on,
+// and those of the touched triangle by the contact's weights, where they are: the springs are slack then. Null: nothing
+// is touched. `grip.held` must have room for every node of the surface: nothing is allocated here.
 void updateGrip(const BlendedSurface& surface, double alpha, const ProxyContact* contact, const ToolSample& device,
                 const ToolSettings& tool, Grip& grip);
 

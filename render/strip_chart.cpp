@@ -73,11 +73,13 @@ void drawCurve(const StripChart& chart, const StripCurve& curve, const Layout& l
   ink.apply(glm::vec3(curve.colour), 1);
 }
 
-// In the order of their labels: as they stand in the chart or, where not all of these fit, the largest forces first.
+// In the order of their labels: as they stand in the chart or, where not all of these fit, by the largest force that
+// the window shows, which seldom changes.
 std::vector<const StripCurve*> inOrder(const StripChart& chart, bool allFit) {
   std::vector<const StripCurve*> out;
   for (const StripCurve& curve : chart.curves) out.push_back(&curve);
-  const auto larger = [](const StripCurve* a, const StripCurve* b) { return a->values.back() > b->values.back(); };
+  const auto most = [](const StripCurve* c) { return *std::max_element(c->values.begin(), c->values.end()); };
+  const auto larger = [&](const StripCurve* a, const StripCurve* b) { return most(a) > most(b); };
   if (!allFit) std::stable_sort(out.begin(), out.end(), larger);
   return out;
 }
@@ -90,7 +92,8 @@ void writeLabels(const StripChart& chart, const Layout& layout, Ink& ink) {
   for (const StripCurve& curve : chart.curves) wide += textWidth(curve.label + "   ", layout.text);
   const float text = std::max(layout.text * std::min(1.f, (windowAt - layout.plotLow.x) / wide), kLegible);
   vec2 corner(layout.plotLow.x, header + layout.text - text);
-  const bool allFit = wide * text <= (layout.plotHigh.x - corner.x) * layout.text;
+  const float room = layout.plotHigh.x - corner.x + textWidth("   ", text);
+  const bool allFit = wide * text <= room * layout.text;
   for (const StripCurve* curve : inOrder(chart, allFit)) {
     if (corner.x + textWidth(curve->label, text) > layout.plotHigh.x) break;
     writeText(curve->label, corner, text, ink);

@@ -24,6 +24,7 @@ struct Work {
   Halved halved;
   SceneMesh& mesh;
   std::vector<vec3> picture;                                   // pictureFromWorld
+  std::vector<char> isSharp;                                   // vertices: their triangles' normals lie far apart
   std::unordered_map<std::uint64_t, std::uint32_t> midpoints;  // of halved edges, by their ends, the smaller first
 };
 
@@ -38,7 +39,10 @@ void appendVertices(const SceneMesh& from, const MeshPart& part, SceneMesh& to) 
 // normals at the ends of a chord c of a sphere of radius R have the components -c / 2R and c / 2R along it, half a
 // chord times them is c^2 / 4R, and a quarter of both normals times that c^2 / 8R, the arc's height over the chord. The
 // usual factor 3/4 would swell the sphere.
-vec3 bulge(const SceneMesh& mesh, std::uint32_t a, std::uint32_t b) {
+// None at creases: the normals of a box's corners would make a dome of each of its sides.
+vec3 bulge(const Work& work, std::uint32_t a, std::uint32_t b) {
+  if (work.isSharp[a] || work.isSharp[b]) return vec3(0);
+  const SceneMesh& mesh = work.mesh;
   const vec3 half = 0.5f * (mesh.position[b] - mesh.position[a]);
   return 0.25f * (glm::dot(half, mesh.normal[b]) * mesh.normal[b] - glm::dot(half, mesh.normal[a]) * mesh.normal[a]);
 }
@@ -46,7 +50,7 @@ vec3 bulge(const SceneMesh& mesh, std::uint32_t a, std::uint32_t b) {
 std::uint32_t appendMidpoint(Work& work, std::uint32_t a, std::uint32_t b) {
   SceneMesh& mesh = work.mesh;
   const auto i = std::uint32_t(mesh.position.size());
-  const vec3 offset = bulge(mesh, a, b);
+  const vec3 offset = bulge(work, a, b);
   visitVertexArrays(
       [&mesh, a, b](auto array) { (mesh.*array).push_back(0.5f * ((mesh.*array)[a] + (mesh.*array)[b])); });
   mesh.position[i] += offset;
@@ -55,6 +59,7 @@ std::uint32_t appendMidpoint(Work& work, std::uint32_t a, std::uint32_t b) {
   const vec3 along = t - n * glm::dot(n, t);
   t = glm::normalize(glm::length(along) > 0.1f ? along : mesh.tangent[a] - n * glm::dot(n, mesh.tangent[a]));
   work.picture.push_back(pictureFromWorld(work.view, mesh.position[i]));
+  work.isSharp.push_back(work.isSharp[a] || work.isSharp[b]);
   return i;
 }
 
@@ -72,7 +77,7 @@ bool isShown(const Work& work, std::uint32_t a, std::uint32_t b) {
   const vec3 d = (q - p) * work.height;
   if (d.x * d.x + d.y * d.y > farthest * farthest) return true;
   if (work.halved == Halved::largest) return false;
-  const vec3 off = bulge(work.mesh, a, b);
+  const vec3 off = bulge(work, a, b);
   // Most edges pass here: across the view a metre is so many pixels, along it, at the picture's border, the one more.
   const float most = work.height * (0.5f / v.tangent + 1) / std::max(std::min(p.z, q.z), v.nearPlane);
   if (glm::dot(off, off) * most * most < kOff * kOff) return false;
@@ -127,15 +132,32 @@ void halveEdges(Work& work, std::vector<std::uint32_t>& index, std::vector<std::
   index.swap(pieces);
 }
 
-// Could the picture show one of the part's edges longer than kLongest? Tissue stretches, hardly to more than twice its
-// length.
+// Could the picture show one of the part's edges longer than kLongest? What is seen of an edge lies no farther from its
+// vertices than it is long. Tissue stretches, hardly to more than twice its length.
 bool mayBeLong(const SceneMesh& mesh, const MeshPart& part, const Viewpoint& v) {
   if (part.instrument) return false;
   float nearest = std::numeric_limits<float>::infinity();
   for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
-    nearest = std::min(nearest, -glm::dot(v.back, mesh.position[i] - v.position));
+    nearest = std::min(nearest, glm::length(mesh.position[i] - v.position));
   const float length = (part.moving ? 2 : 1) * part.longestEdge;
-  return length * (0.5f / v.tangent + 1) > kLongest * std::max(nearest, v.nearPlane);
+  const float corner = v.tangent * std::sqrt(1 + v.aspect * v.aspect),
+              depth = (nearest - length) / std::hypot(1.f, corner);
+  return length * (0.5f / v.tangent + 1) > kLongest * std::max(depth, v.nearPlane);
+}
+
+// Those of the last part of work.mesh, whose vertices begin at `first`. What only large triangles are halved for keeps
+// its place everywhere.
+void markSharp(Work& work, std::uint32_t first, const std::vector<std::uint32_t>& index) {
+  constexpr float kSharp = 0.64f;  // cos 50 degrees, from the vertex's normal
+  const SceneMesh& mesh = work.mesh;
+  work.isSharp.resize(mesh.position.size(), 0);
+  if (work.halved == Halved::largest) std::fill(work.isSharp.begin() + first, work.isSharp.end(), char(1));
+  for (std::size_t k = 0; work.halved == Halved::outlines && k < index.size(); k += 3) {
+    const vec3 a = mesh.position[index[k]];
+    const vec3 n = glm::cross(mesh.position[index[k + 1]] - a, mesh.position[index[k + 2]] - a);
+    for (int c = 0; c < 3; ++c)
+      if (glm::dot(n, mesh.normal[index[k + c]]) < kSharp * glm::length(n)) work.isSharp[index[k + c]] = 1;
+  }
 }
 
 }  // namespace
@@ -158,7 +180,7 @@ bool tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight,
   out.resizeVertices(0);
   out.index.clear();
   out.parts.clear();
-  Work work{view, float(pictureHeight), halved, out, {}, {}};
+  Work work{view, float(pictureHeight), halved, out, {}, {}, {}};
   std::vector<std::uint32_t> index;
   for (MeshPart part : mesh.parts) {
     const auto first = std::uint32_t(out.position.size()), firstIndex = std::uint32_t(out.index.size());
@@ -168,6 +190,7 @@ bool tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight,
     appendVertices(mesh, part, out);
     for (std::size_t i = first; i < out.position.size(); ++i)
       work.picture.push_back(pictureFromWorld(view, out.position[i]));
+    markSharp(work, first, index);
     const int halvings = isHalved(part) ? kMostHalvings : 0;  // asked of the part as it is in `mesh`
     for (int k = 0; k < halvings && !index.empty(); ++k) halveEdges(work, index, out.index);
     out.index.insert(out.index.end(), index.begin(), index.end());

@@ -148,5 +148,37 @@ TEST(LargePicture, AFloorOfTwoTrianglesLooksLikeAFineOne) {
   EXPECT_GT(darkest, 40);
 }
 
+// A table of 12 triangles, in the middle of its edges as flat as it is, however near the camera and however large the
+// picture: a ball that lies on it is seen.
+TEST(LargePicture, ATableOfTwelveTrianglesIsNoDome) {
+  for (const int height : {180, 1440}) {
+    RendererSettings settings;
+    settings.width = height;
+    settings.height = height;
+    Renderer renderer(settings);
+    const auto box = [](vec3 low, vec3 high, const char* look) {
+      SurfaceShape s;
+      s.look = look;
+      for (int k = 0; k < 8; ++k)
+        s.restPositions.push_back({k & 1 ? high.x : low.x, k & 2 ? high.y : low.y, k & 4 ? high.z : low.z});
+      s.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                     {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+      return s;
+    };
+    renderer.addSurface(box({-0.3f, -0.2f, -0.1f}, {0.3f, 0.2f, 0}, "wood"));
+    renderer.addSurface(box({-0.02f, -0.02f, 0}, {0.02f, 0.02f, 0.002f}, "candy_blue"));
+    Picture p;
+    p.endoscopeMask = false;
+    p.camera.position = {0.02f, -0.25f, 0.25f};
+    p.camera.up = {0, 0, 1};
+    p.light.haze = Haze{{0.3f, 0.31f, 0.33f}, 100};
+    p.surfaces.resize(2);
+    Image image;
+    renderer.render(p, image);
+    const std::uint8_t* middle = &image.pixels[4ul * (std::size_t(height / 2) * height + height / 2)];
+    EXPECT_GT(middle[2], middle[0] + 30) << height;  // blue
+  }
+}
+
 }  // namespace
 }  // namespace medulla

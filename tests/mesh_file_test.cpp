@@ -128,7 +128,7 @@ TEST(OffReader, HeaderVariants) {
   const std::string body = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
   for (const std::string header :
        {"OFF\n4 4 6\n", "OFF 4 4 6\n", "OFF4 4 6\n", "# c\nOFF # d\n\n4 4\n", "OFF\r\n4 4 0\r\n", "off\n4 4 0\n",
-        "COFF\n4 4 0\n", "NOFF 4 4 0\n", "STCNOFF 4 4 0\n"}) {
+        "coff\n4 4 0\n", "COFF\n4 4 0\n", "NOFF 4 4 0\n", "STCNOFF 4 4 0\n"}) {
     const TriangleMesh mesh = parseOff(header + body, "a.off");
     ASSERT_EQ(mesh.vertices.size(), 4u) << header;
     EXPECT_EQ(mesh.vertices[3], Vector3d(0, 0, 1));

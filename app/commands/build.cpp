@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 #include <optional>
+#include <set>
 
 #include "app/commands/commands.h"
 #include "app/commands/mesh_notes.h"
@@ -288,8 +289,11 @@ std::vector<Result> resultsOf(const std::vector<BuildJob>& jobs) {
   }
   std::vector<Result> results;
   std::vector<BuildReport> reports;
+  std::set<std::string> names;
   for (const BuildJob& job : jobs) {
-    for (Result& r : buildResults(job.report)) results.push_back({plainName(job.name) + "." + r.name, r.value, r.unit});
+    std::string name = plainName(job.name);
+    if (!names.insert(name).second) name += fmt::format("_{}", &job - jobs.data() + 1);
+    for (Result& r : buildResults(job.report)) results.push_back({name + "." + r.name, r.value, r.unit});
     reports.push_back(job.report);
   }
   for (Result& r : totalResults(reports)) results.push_back({"total." + r.name, r.value, r.unit});

@@ -81,8 +81,8 @@ int runPlot(const PlotOptions& options);
 
 struct ChartOptions {
   RunOptions run;  // scene, overrides and trajectories
-  std::string
-      folder;  // for chart.csv, chart.gnuplot and chart.svg, and of several models spheres.*; made where missing
+  // For chart.csv, chart.gnuplot and chart.svg, and of several models spheres.*; made where missing.
+  std::string folder;
   // s; substeps are whole shares of a dynamics frame, the nearest to these. 0: what a run's stability estimate allows.
   std::vector<double> steps;
   std::vector<std::string> methods;  // of chartMethodNames(), at least one; the first is the reference's

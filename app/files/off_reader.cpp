@@ -18,10 +18,11 @@ struct Counts {
 // Every header ends in "OFF"; what may stand before it says what follows x y z on a vertex line. 4OFF and nOFF have
 // other than three coordinates. Some programs write the counts right behind the keyword ("OFF8 6 0").
 std::string_view afterKeyword(const TextLines& lines, std::string_view word) {
-  const std::size_t off = lowered(word).find("off");
-  const std::string_view prefix = word.substr(0, off == std::string_view::npos ? 0 : off);
+  const std::string small = lowered(word);
+  const std::size_t off = small.find("off");
+  const std::string prefix = small.substr(0, off == std::string_view::npos ? 0 : off);
   const std::string_view suffix = off == std::string_view::npos ? word : word.substr(off + 3);
-  const bool known = off != std::string_view::npos && prefix.find_first_not_of("STCN") == std::string_view::npos &&
+  const bool known = off != std::string_view::npos && prefix.find_first_not_of("stcn") == std::string::npos &&
                      (suffix.empty() || std::isdigit(static_cast<unsigned char>(suffix[0])));
   if (!known) lines.fail("expected an OFF header, found " + inQuotes(word));
   return suffix;

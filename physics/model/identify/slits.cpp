@@ -50,14 +50,15 @@ bool isNearAlong(const Surface& surface, const std::array<int, 3>& from, const V
   return false;
 }
 
-// m, outwards from a triangle's middle to a wall that faces it; infinity where there is none within `widest`.
-double gapBefore(const Surface& surface, const std::array<int, 3>& triangle, double widest) {
+// m, outwards from a triangle's middle to a wall that faces it; infinity where there is none within `most`. `widest`
+// says how far away along the surface a wall has to be.
+double gapBefore(const Surface& surface, const std::array<int, 3>& triangle, double widest, double most) {
   constexpr double kNone = std::numeric_limits<double>::infinity(), kFaces = 0.5, kFar = 6, kOff = 1e-6;
   const std::vector<Vector3d>& x = surface.mesh.vertices;
   const Vector3d middle = (x[triangle[0]] + x[triangle[1]] + x[triangle[2]]) / 3;
   const Vector3d normal = areaVector(surface.mesh, triangle).stableNormalized();
-  const double gap = firstHit(surface.tree, middle + kOff * widest * normal, normal, widest);
-  if (!(gap < widest)) return kNone;
+  const double gap = firstHit(surface.tree, middle + kOff * widest * normal, normal, most);
+  if (!(gap < most)) return kNone;
   std::vector<TriangleDistance> walls;
   trianglesWithin(surface.tree, middle + (gap + kOff * widest) * normal, kOff * widest, walls);
   if (walls.empty()) return kNone;
@@ -70,16 +71,18 @@ double gapBefore(const Surface& surface, const std::array<int, 3>& triangle, dou
 
 std::optional<Slit> narrowestSlit(const TriangleMesh& mesh, double widest) {
   constexpr double kLeast = 0.005;  // of the surface
+  const double enough = kLeast * surfaceArea(mesh);
   const Surface surface{mesh, makeSurfaceTree(mesh), trianglesOfVertices(mesh)};
   Slit slit{widest, {}};
   double walls = 0;
   for (const std::array<int, 3>& triangle : mesh.triangles) {
-    const double gap = gapBefore(surface, triangle, widest);
-    if (!(gap < widest)) continue;
+    // Once it is told at all, only what is narrower matters.
+    const double most = walls < enough ? widest : slit.width, gap = gapBefore(surface, triangle, widest, most);
+    if (!(gap < most)) continue;
     walls += areaVector(mesh, triangle).norm();
     if (gap < slit.width) slit = {gap, mesh.vertices[triangle[0]]};
   }
-  if (walls < kLeast * surfaceArea(mesh)) return std::nullopt;
+  if (walls < enough) return std::nullopt;
   return slit;
 }
 
