@@ -173,10 +173,10 @@ float longestEdge(const SceneMesh& mesh, const MeshPart& part) {
 }
 
 bool tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight, Halved halved, SceneMesh& out) {
-  const auto isHalved = [&](const MeshPart& part) {
-    return halved == Halved::outlines ? !part.instrument : mayBeLong(mesh, part, view);
-  };
-  if (std::none_of(mesh.parts.begin(), mesh.parts.end(), isHalved)) return false;
+  std::vector<char> isHalved;
+  for (const MeshPart& part : mesh.parts)
+    isHalved.push_back(halved == Halved::outlines ? !part.instrument : mayBeLong(mesh, part, view));
+  if (std::count(isHalved.begin(), isHalved.end(), 1) == 0) return false;
   out.resizeVertices(0);
   out.index.clear();
   out.parts.clear();
@@ -191,7 +191,7 @@ bool tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight,
     for (std::size_t i = first; i < out.position.size(); ++i)
       work.picture.push_back(pictureFromWorld(view, out.position[i]));
     markSharp(work, first, index);
-    const int halvings = isHalved(part) ? kMostHalvings : 0;  // asked of the part as it is in `mesh`
+    const int halvings = isHalved[out.parts.size()] ? kMostHalvings : 0;
     for (int k = 0; k < halvings && !index.empty(); ++k) halveEdges(work, index, out.index);
     out.index.insert(out.index.end(), index.begin(), index.end());
     part.firstVertex = first;

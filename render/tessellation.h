@@ -7,7 +7,8 @@ namespace medulla {
 
 // Meshes are made for films of 720 and 1080 lines. In larger pictures their outlines would be polygons, and light,
 // which is interpolated over triangles without perspective, would run in zigzags. Mending that takes as long as all the
-// light of a film does: below so many lines drawn, those of 720 in the best quality, meshes are taken as they are.
+// light of a film does: below so many lines drawn, those of 720 in the best quality, meshes are taken as they are, but
+// for their largest triangles.
 constexpr int kLinesOfMeshes = 1440;
 
 // m; what tessellate() asks of a part.

@@ -44,7 +44,7 @@ bool isInSight(const std::vector<glm::vec3>& surface, const Viewpoint& viewpoint
     const glm::vec3 d = p - viewpoint.position;
     const float depth = -glm::dot(viewpoint.back, d), high = depth * viewpoint.tangent, wide = high * viewpoint.aspect;
     const float x = glm::dot(viewpoint.right, d), y = glm::dot(viewpoint.up, d);
-    const std::array<bool, 5> outside{depth < 0, x<-wide, x> wide, y<-high, y> high};
+    const std::array<bool, 5> outside{depth<0, -x> wide, x > wide, -y > high, y > high};
     for (int k = 0; k < 5; ++k) beyond[k] = beyond[k] && outside[k];
   }
   return std::none_of(beyond.begin(), beyond.end(), [](bool b) { return b; });
