@@ -15,16 +15,12 @@ using Eigen::Vector3d;
 
 using std::numbers::pi;
 
-static double torsionConstant(const SectionMoments& s) {
-  const double squared = s.area * s.area;
-  return squared * squared / (4 * pi * pi * s.secondMoment.trace());
-}
-
 static SectionMoments disc(double radius) {
   SectionMoments s;
   const double squared = radius * radius;
   s.area = pi * squared;
   s.secondMoment = pi * squared * squared / 4 * Eigen::Matrix2d::Identity();
+  s.torsionConstant = s.secondMoment.trace();
   return s;
 }
 
@@ -95,7 +91,7 @@ static void measureLink(const TriangleMesh& mesh, const PowerSites& sites, const
     const Eigen::Matrix2d compliance = sections[k].secondMoment.inverse();
     const double two = taper[k] * taper[k], four = two * two;
     link.sections[k] = {two * sections[k].area, four / v.dot(compliance * v), four / u.dot(compliance * u),
-                        torsionConstant(sections[k])};
+                        sections[k].torsionConstant};
   }
 }
 

@@ -13,8 +13,7 @@ namespace medulla {
 // Areas and second moments are those of the equivalent cylinder where the body widens along the link: smaller by the
 // square and the fourth power of the slope's cosine. The principal axes are those of its mean compliance; a section
 // whose own axes are turned against them counts with its compliance about them. Stations where the plane misses both
-// cells, as in a sharp bend, have their neighbour's section. Torsion constant after Saint-Venant: J = A^4 / (4 pi^2
-// Ip), exact for ellipses and within some 10 % for compact solid sections (Timoshenko and Goodier 1970, section 109).
+// cells, as in a sharp bend, have their neighbour's section.
 // Never zero: with no station left, the section is that of the smaller ball.
 void measureLinks(const TriangleMesh& mesh, const PowerSites& sites, const std::vector<FillingSphere>& spheres,
                   std::vector<ElasticLink>& links);

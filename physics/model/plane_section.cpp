@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "physics/model/disjoint_sets.h"
+#include "physics/model/torsion_constant.h"
 
 namespace medulla {
 
@@ -15,7 +16,7 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr int kScanLines = 48;  // second moments of a disc to 0.1 %
+constexpr int kScanLines = 64;  // second moments of a disc to 0.1 %
 
 struct Span {
   double low, high;
@@ -69,22 +70,24 @@ Span cellSpan(const PowerSites& sites, int site, const Vector3d& start, const Ve
   return part;
 }
 
-// Running integrals of 1, (a, b) and (a, b)(a, b)^T over strips of height `step` about the line b.
-struct Integrals {
-  double area = 0;
+// Area, centroid and second moments of the region that the spans make up.
+SectionMoments momentsOf(const std::vector<SectionSpan>& spans) {
+  SectionMoments out;
   Vector2d first = Vector2d::Zero();
   Eigen::Matrix2d second = Eigen::Matrix2d::Zero();
-
-  void add(double low, double high, double b, double step) {
-    if (high <= low) return;
-    const double length = high - low, middle = (low + high) / 2;
-    area += step * length;
-    first += step * length * Vector2d(middle, b);
-    second(0, 0) += step * length * (middle * middle + length * length / 12);
-    second(0, 1) += step * length * middle * b;
-    second(1, 1) += step * length * (b * b + step * step / 12);
+  for (const SectionSpan& s : spans) {
+    const double length = s.high - s.low, area = s.step * length;
+    const Vector2d middle((s.low + s.high) / 2, s.across);
+    out.area += area;
+    first += area * middle;
+    second += area * (middle * middle.transpose());
+    second.diagonal() += area / 12 * Vector2d(length * length, s.step * s.step);
   }
-};
+  if (out.area <= 0) return out;
+  out.centroid = first / out.area;
+  out.secondMoment = second - out.area * out.centroid * out.centroid.transpose();
+  return out;
+}
 
 std::vector<double> crossingsOf(const Outline& outline, double b) {
   std::vector<double> crossings;
@@ -117,8 +120,7 @@ Plane planeAcross(const Vector3d& origin, const Vector3d& normal) {
 SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const PowerSites* sites,
                             std::pair<int, int> pair) {
   const Outline outline = cut(mesh, plane);
-  SectionMoments section;
-  if (outline.empty()) return section;
+  if (outline.empty()) return {};
   const auto [low, high] = heightsOf(outline);
   const double step = (high - low) / kScanLines;
   // Of the scan line at `b`, what is inside: one span after the other.
@@ -132,17 +134,18 @@ SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const 
     for (std::size_t k = 0; k + 1 < crossings.size(); k += 2)
       for (const Span& part : parts) visit(std::max(crossings[k], part.low), std::min(crossings[k + 1], part.high));
   };
-  Integrals sum;
+  std::vector<SectionSpan> spans;
   for (int line = 0; line < kScanLines; ++line) {
-    const double b = low + (line + 0.5) * step;
-    visitSpans(b, [&](double from, double to) { sum.add(from, to, b, step); });
+    const double across = low + (line + 0.5) * step;
+    visitSpans(across, [&](double from, double to) {
+      if (from < to) spans.push_back({from, to, across, step});
+    });
   }
-  if (sum.area <= 0) return section;
-  section.area = sum.area;
+  SectionMoments section = momentsOf(spans);
+  if (section.area <= 0) return section;
   visitSpans(0, [&](double from, double to) { section.holdsOrigin |= from <= 0 && 0 <= to; });
-  section.centroid = sum.first / sum.area;
-  sum.second(1, 0) = sum.second(0, 1);
-  section.secondMoment = sum.second - sum.area * section.centroid * section.centroid.transpose();
+  section.torsionConstant =
+      torsionConstant(spans, section.centroid, std::sqrt(section.secondMoment.trace() / section.area));
   return section;
 }
 

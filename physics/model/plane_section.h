@@ -13,11 +13,12 @@ struct Plane {
   Eigen::Vector3d origin, u, v;  // u, v unit and perpendicular
 };
 
-// Plane region: area, centroid and second moments, with the plane's u and v as axes.
+// Plane region: area, centroid, second moments and torsion constant, with the plane's u and v as axes.
 struct SectionMoments {
   double area = 0;                                         // m2
   Eigen::Vector2d centroid = Eigen::Vector2d::Zero();      // m
   Eigen::Matrix2d secondMoment = Eigen::Matrix2d::Zero();  // m4, integral of r r^T about the centroid
+  double torsionConstant = 0;                              // m4, Saint-Venant (torsion_constant.h)
   bool holdsOrigin = false;                                // the plane's own origin is in it
 };
 
