@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "physics/model/plane_section.h"
-#include "test_shapes.h"
+#include "tests/test_shapes.h"
 
 namespace medulla {
 namespace {
