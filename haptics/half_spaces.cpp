@@ -9,6 +9,11 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
+// m, of rounding, in what lies `depth` away from the goal.
+static double roundingOf(const Vector3d& goal, double depth) {
+  return 1e-9 * depth + 1e-14 * goal.lpNorm<Eigen::Infinity>();
+}
+
 // Point of the intersection of the chosen planes that is nearest to the goal: goal + N^T p with N N^T p = b - N goal.
 static bool nearestOnPlanes(const Vector3d& goal, const HalfSpace* halfSpaces, const int* chosen, int count,
                             Vector3d& result, std::array<double, 3>& pressure) {
@@ -25,7 +30,7 @@ static bool nearestOnPlanes(const Vector3d& goal, const HalfSpace* halfSpaces, c
   result = goal;
   pressure = {};
   for (int i = 0; i < count; ++i) {
-    if (p[i] < -1e-12) return false;
+    if (p[i] < -roundingOf(goal, depth.norm())) return false;
     pressure[chosen[i]] = std::max(0.0, p[i]);
     result += p[i] * halfSpaces[chosen[i]].normal;
   }
@@ -41,8 +46,9 @@ bool nearestInHalfSpaces(const Vector3d& goal, const HalfSpace* halfSpaces, int 
     Vector3d x;
     std::array<double, 3> p;
     if (!nearestOnPlanes(goal, halfSpaces, subset + 1, subset[0], x, p)) continue;
+    const double rounding = roundingOf(goal, (x - goal).norm());
     const bool allowed = std::all_of(halfSpaces, halfSpaces + count,
-                                     [&](const HalfSpace& h) { return h.normal.dot(x) >= h.offset - 1e-11; });
+                                     [&](const HalfSpace& h) { return h.normal.dot(x) >= h.offset - rounding; });
     if (!allowed || (x - goal).squaredNorm() >= best) continue;
     best = (x - goal).squaredNorm();
     result = x;

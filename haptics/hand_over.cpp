@@ -76,13 +76,14 @@ static void handOverContact(const BlendedSurface& surface, const ServoTool& tool
 // frame.
 static double makeUpFor(const Proxy& proxy, const Path& path, const Vector3d& deeper,
                         const std::vector<ProxyContact>& contacts) {
-  constexpr double kMost = 3, kTouching = 1e-7;  // m: the proxy stands 0.05 um off what it touches
+  constexpr double kMost = 3, kTouching = 1e-7 / 3e-3;  // of the radius: twice what the proxy stands off
   if (!proxy.inContact()) return 1;
   double wanted = 0, left = 0;
   for (const ProxyContact& contact : contacts) {
     const double depth = contact.normal.dot(proxy.centre - path.end + deeper);
     wanted += contact.share * std::max(0.0, depth);
-    left += contact.share * std::max(0.0, depth - std::max(0.0, comeOff(proxy, contact) - kTouching));
+    left +=
+        contact.share * std::max(0.0, depth - std::max(0.0, comeOff(proxy, contact) - kTouching * proxy.toolRadius));
   }
   if (wanted > kMost * left) return kMost;
   return wanted > left ? wanted / left : 1;
@@ -98,7 +99,7 @@ constexpr int kFrames = 3;
 // kSettled. With kT a tool deep in a liver came to rest within seconds, with 2 kT at once.
 static double steadying(ServoTool& tool, const Path& path, double frameDuration) {
   constexpr double kDampers = 2, kStill = 0.01;
-  constexpr double kSettled = 0.4;  // s
+  constexpr double kSettled = 0.1;  // s
   const double still = kStill * tool.push / tool.settings.stiffness, moved = path.velocity.norm() * frameDuration;
   tool.stillFor = still > moved ? tool.stillFor + frameDuration : 0;
   const double since = tool.stillFor - kFrames * frameDuration;

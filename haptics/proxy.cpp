@@ -18,11 +18,10 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-// The proxy stops this far short of a surface, so that rounding never puts it inside; farther than `kTouching` a
-// contact is over. Both in metres.
-static constexpr double kStandOff = 5e-8, kTouching = 1e-6;
-// Below this a proxy has arrived, m.
-static constexpr double kArrived = 1e-9;
+// Of the tool's radius, so that scenes of any size are felt alike: the proxy stops this far short of a surface, so that
+// rounding never puts it inside; farther than `kTouching` a contact is over; below `kArrived` it has arrived. Chosen
+// with tools of 3 mm.
+static constexpr double kStandOff = 5e-8 / 3e-3, kTouching = 1e-6 / 3e-3, kArrived = 1e-9 / 3e-3;
 // Enough for every groove and corner met in a tick; what is left is done in the next.
 static constexpr int kMaxSweeps = 10, kMaxPushes = 10, kMaxPasses = 4;
 
@@ -74,7 +73,7 @@ static bool moveTo(const Buckets& buckets, double alpha, const Vector3d& target,
   }
   proxy.lastBucket = hit.bucket;
   const double length = motion.norm(), incidence = std::max(0.02, -hit.normal.dot(motion) / length);
-  proxy.centre += std::max(0.0, hit.t - kStandOff / (incidence * length)) * motion;
+  proxy.centre += std::max(0.0, hit.t - kStandOff * proxy.toolRadius / (incidence * length)) * motion;
   return true;
 }
 
@@ -85,7 +84,7 @@ static double distanceTo(const Buckets& buckets, double alpha, int triangle, con
 // A sphere that rolled over an edge has left the plane it first met there.
 static void dropLeftPlanes(const Buckets& buckets, double alpha, const Proxy& proxy, TouchedPlanes& touched) {
   for (int k = touched.count - 1; k >= 0; --k)
-    if (distanceTo(buckets, alpha, touched.triangles[k], proxy.centre) > proxy.radius + kTouching)
+    if (distanceTo(buckets, alpha, touched.triangles[k], proxy.centre) > proxy.radius + kTouching * proxy.toolRadius)
       dropPlane(touched, k);
 }
 
@@ -94,7 +93,7 @@ static void dropLeftPlanes(const Buckets& buckets, double alpha, const Proxy& pr
 static TouchedPlanes slideTo(const Buckets& buckets, double alpha, const Vector3d& goal, Proxy& proxy) {
   TouchedPlanes touched;
   Vector3d target = goal;
-  for (int k = 0; k < kMaxSweeps && (target - proxy.centre).norm() >= kArrived; ++k) {
+  for (int k = 0; k < kMaxSweeps && (target - proxy.centre).norm() >= kArrived * proxy.toolRadius; ++k) {
     SurfaceHit hit;
     if (moveTo(buckets, alpha, target, proxy, hit))
       addPlane(touched, {hit.normal, hit.normal.dot(proxy.centre)}, hit.triangle);
@@ -118,7 +117,7 @@ static void keepPressingContacts(const Buckets& buckets, double alpha, const Tou
   proxy.contactCount = 0;
   double sum = 0;
   for (int k = 0; k < touched.count; ++k) {
-    if (!(touched.pressure[k] > kArrived)) continue;
+    if (!(touched.pressure[k] > kArrived * proxy.toolRadius)) continue;
     ProxyContact& contact = proxy.contacts[proxy.contactCount++];
     contact = contactAt(buckets, alpha, touched.triangles[k], proxy.centre);
     contact.share = touched.pressure[k];
@@ -128,14 +127,14 @@ static void keepPressingContacts(const Buckets& buckets, double alpha, const Tou
 }
 
 // What is felt comes to what is touched, from `from` to `to`, no faster than the tool passes the surface (`way`, m), by
-// half of what is missing in a tick at most, and within some ticks where it rests: which three of a dent's many walls
+// half of what is missing in a tick at most, and by `atRest` of it where it rests: which three of a dent's many walls
 // hold the proxy changes from tick to tick, and with them what a smooth surface would do.
-static Vector3d approached(const Vector3d& from, const Vector3d& to, double way) {
-  constexpr double kMost = 0.5, kAtRest = 1. / 32;
+static Vector3d approached(const Vector3d& from, const Vector3d& to, double way, double atRest) {
+  constexpr double kMost = 0.5;
   const Vector3d change = to - from;
   const double length = change.norm();
   if (!(length > 0)) return to;
-  return from + std::min(kMost, std::max(kAtRest, way / length)) * change;
+  return from + std::min(kMost, std::max(atRest, way / length)) * change;
 }
 
 // Where the smooth surface would hold the proxy by what it touches: the first pass of Ruspini, Kolarov and Khatib 1997.
@@ -145,13 +144,13 @@ static Vector3d approached(const Vector3d& from, const Vector3d& to, double way)
 // pull, lengthened by what device and surface have moved along it since: no jump is felt at once, and plain pressing is
 // not delayed.
 static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& touched, const Vector3d& device,
-                  const Vector3d& advance, Proxy& proxy) {
+                  const Vector3d& advance, double atRest, Proxy& proxy) {
   constexpr double flat = 1e-6;  // rad
   std::array<HalfSpace, 3> shaded;
   int count = 0;
   bool isFlat = true;
   for (int k = 0; k < touched.count; ++k) {
-    if (!(touched.pressure[k] > kArrived)) continue;
+    if (!(touched.pressure[k] > kArrived * proxy.toolRadius)) continue;
     const ProxyContact contact = contactAt(buckets, alpha, touched.triangles[k], proxy.centre);
     const Vector3d normal = shadedNormal(buckets.surface(), alpha, contact.triangle, contact.weights, contact.normal);
     isFlat = isFlat && (normal - contact.normal).norm() < flat;
@@ -165,7 +164,7 @@ static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& tou
     proxy.felt = nearest - device;
     if (const double length = before.norm(); length > 0) {
       const double moved = -before.dot(advance) / length;
-      proxy.felt = approached(std::max(0.0, length + moved) / length * before, proxy.felt, advance.norm());
+      proxy.felt = approached(std::max(0.0, length + moved) / length * before, proxy.felt, advance.norm(), atRest);
     }
   }
   proxy.device = device;
@@ -182,8 +181,10 @@ static double sumOf(const std::array<double, 3>& pressure, int count) {
 // where the first would let it slide count, too. Else it would seem to slide across, back and forth.
 static bool freeOfTouched(const Buckets& buckets, double alpha, Proxy proxy, const Vector3d& device, Vector3d& free,
                           double& pressed) {
-  constexpr double kNear = 2e-5;  // m: of several touched surfaces that move apart only their mean is kept up with
-  const auto step = [](const Vector3d& way) { return std::min(1.0, kNear / way.norm()) * way; };
+  constexpr double kNear = 2e-5 / 3e-3;  // of several touched surfaces that move apart only their mean is kept up with
+  const auto step = [&](const Vector3d& way) -> Vector3d {
+    return std::min(1.0, kNear * proxy.toolRadius / way.norm()) * way;
+  };
   const Vector3d start = proxy.centre, inwards = start + step(device - start);
   TouchedPlanes touched = slideTo(buckets, alpha, inwards, proxy);
   std::array<double, 3> pressure;
@@ -194,7 +195,7 @@ static bool freeOfTouched(const Buckets& buckets, double alpha, Proxy proxy, con
   for (int k = 0; k < ahead.count; ++k) addPlane(touched, ahead.planes[k], ahead.triangles[k]);
   if (!nearestInHalfSpaces(device, touched.planes.data(), touched.count, free, pressure)) return false;
   pressed = sumOf(pressure, touched.count);
-  return (free - device).norm() > kArrived;
+  return (free - device).norm() > kArrived * proxy.toolRadius;
 }
 
 // Coulomb friction as a change of the goal. Without friction the proxy would slide from where it is to `free`, pressed
@@ -208,11 +209,12 @@ static bool freeOfTouched(const Buckets& buckets, double alpha, Proxy proxy, con
 // crease of the mesh, however slight.
 static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& free, double pressed, const Vector3d& device,
                              const Vector3d& advance, Proxy& proxy) {
-  constexpr double kStill = 1e-8;  // m per tick, 12 um/s: what slips no farther sticks, else it would slip at rest
+  // m per tick, 12 um/s of a tool of 3 mm: what slips no farther sticks, else it would slip at rest.
+  const double still = 1e-8 / 3e-3 * proxy.toolRadius;
   const double least = tool.dynamicFriction * pressed;
   const Vector3d slide = tangential(free - proxy.centre, (free - device).normalized());
   const double length = slide.norm();
-  if (length > (proxy.slipping ? least + kStill : tool.staticFriction * pressed)) {
+  if (length > (proxy.slipping ? least + still : tool.staticFriction * pressed)) {
     proxy.slipping = true;
     proxy.slideDirection = slide / length;
     return device - least * proxy.slideDirection;
@@ -222,23 +224,25 @@ static Vector3d frictionGoal(const ToolSettings& tool, const Vector3d& free, dou
   // triangle to the other at once. A tenth less is the depth's change from one triangle to the other.
   const Vector3d& along = proxy.slideDirection;
   const double trail = std::min(least, along.dot(device - proxy.centre));
-  proxy.slipping = proxy.slipping && trail > 0.9 * least && along.dot(advance) > kStill;
+  proxy.slipping = proxy.slipping && trail > 0.9 * least && along.dot(advance) > still;
   return device - (proxy.slipping ? Vector3d(trail * along) : slide);
 }
 
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Vector3d& device,
-                  Proxy& proxy) {
+                  double tickDuration, Proxy& proxy) {
+  constexpr double kRest = 0.026;  // s
+  const double atRest = 1 - std::exp(-tickDuration / kRest);
   const Vector3d start = proxy.centre, advance = device - proxy.device - proxy.surfaceMotion;
   Vector3d free, goal = device;
   double pressed = 0;
   const bool isHeld = tool.staticFriction > 0 && freeOfTouched(buckets, alpha, proxy, device, free, pressed);
   TouchedPlanes touched = slideTo(buckets, alpha, device, proxy);
-  shade(buckets, alpha, touched, device, advance, proxy);
+  shade(buckets, alpha, touched, device, advance, atRest, proxy);
   if (!isHeld) {
     free = proxy.centre;
     pressed = sumOf(touched.pressure, touched.count);
   }
-  const bool isPressed = touched.count > 0 && (proxy.centre - device).norm() > kArrived;
+  const bool isPressed = touched.count > 0 && (proxy.centre - device).norm() > kArrived * proxy.toolRadius;
   if (isPressed && tool.staticFriction > 0) {
     proxy.centre = start;
     goal = frictionGoal(tool, free, pressed, device, advance, proxy);
@@ -249,7 +253,7 @@ void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool
   // of them left, it is there in full. A slide over triangles of 2.5 mm, 3 mm deep in tissue of 10 kPa, felt its force
   // turn by 20 degrees in a tick.
   const bool isShaded = !proxy.felt.isZero(0);
-  proxy.drag = isShaded ? approached(proxy.drag, goal - device, advance.norm()) : Vector3d(goal - device);
+  proxy.drag = isShaded ? approached(proxy.drag, goal - device, advance.norm(), atRest) : Vector3d(goal - device);
   proxy.shading = isShaded ? Vector3d(proxy.felt + proxy.drag - (proxy.centre - device)) : Vector3d::Zero();
   keepPressingContacts(buckets, alpha, touched, proxy);
   if (proxy.inContact()) return;
@@ -269,12 +273,12 @@ struct Surroundings {
 
 // Over the triangle's point of these weights, a hundredth nearer to its middle: over an edge that has folded in, it
 // could be below the other triangle.
-static Vector3d justOutside(const Triangle& t, const Vector3d& weights) {
+static Vector3d justOutside(const Triangle& t, const Vector3d& weights, double toolRadius) {
   const Vector3d outward = doubleArea(t).normalized();
-  return pointAt(t, 0.99 * weights + Vector3d::Constant(0.01 / 3)) + kStandOff * outward;
+  return pointAt(t, 0.99 * weights + Vector3d::Constant(0.01 / 3)) + kStandOff * toolRadius * outward;
 }
 
-static Surroundings lookAround(const BlendedSurface& surface, double alpha, const Vector3d& p) {
+static Surroundings lookAround(const BlendedSurface& surface, double alpha, double toolRadius, const Vector3d& p) {
   Surroundings out;
   double wayOut = out.distance;
   for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
@@ -285,17 +289,17 @@ static Surroundings lookAround(const BlendedSurface& surface, double alpha, cons
     out.distance = std::min(out.distance, distance);
     if (distance >= wayOut || doubleArea(triangle).dot(p - q.point) > 0) continue;
     wayOut = distance;
-    out.exit = justOutside(triangle, q.weights);
+    out.exit = justOutside(triangle, q.weights, toolRadius);
   }
   return out;
 }
 
 // Out through the nearest triangle that it is behind, as often as needed: bodies may overlap, and parts of a surface
 // that trembles be turned inside out.
-static Vector3d outOfBodies(const BlendedSurface& surface, double alpha, Vector3d p) {
+static Vector3d outOfBodies(const BlendedSurface& surface, double alpha, double toolRadius, Vector3d p) {
   const std::size_t passes = surface.firstNode.size() + 4;
   for (std::size_t pass = 0; pass < passes; ++pass) {
-    const Surroundings around = lookAround(surface, alpha, p);
+    const Surroundings around = lookAround(surface, alpha, toolRadius, p);
     if (around.winding < 0.5) break;
     p = around.exit;
   }
@@ -347,21 +351,23 @@ static Vector3d carriedBy(const Buckets& buckets, double alpha, const Proxy& pro
   return motion;
 }
 
-// The path of the proxy from `start` to `end` as seen from each moving triangle (Ruspini and Khatib 2000, "adjusted
+// The path of the proxy from where it is to `end` as seen from each moving triangle (Ruspini and Khatib 2000, "adjusted
 // segment"): the start is shifted by the triangle's own motion near it. Where a triangle would pass the proxy, the end
 // is moved back to the touched side. Repeated, because moving back from one triangle may meet another.
-static Vector3d notPassedOver(const Buckets& buckets, double alphaBefore, double alpha, double radius,
-                              const Vector3d& start, Vector3d end) {
+static Vector3d notPassedOver(const Buckets& buckets, double alphaBefore, double alpha, const Proxy& proxy,
+                              Vector3d end) {
+  const Vector3d& start = proxy.centre;
+  const double standOff = kStandOff * proxy.toolRadius;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     Vector3d corrected = end;
     double largest = 0;
-    for (const int t : buckets.near(0.5 * (start + end), 0.5 * (end - start).norm() + kStandOff)) {
+    for (const int t : buckets.near(0.5 * (start + end), 0.5 * (end - start).norm() + standOff)) {
       const Triangle before = buckets.surface().triangle(t, alphaBefore), now = buckets.surface().triangle(t, alpha);
       const TrianglePoint closest = closestPoint(before, start);
       const Vector3d adjusted = start + pointAt(now, closest.weights) - closest.point;
       SweepHit hit;
-      if (!sweepSphere(adjusted, end - adjusted, radius, now, 1, hit)) continue;
-      const Vector3d outside = adjusted + hit.t * (end - adjusted) + kStandOff * hit.normal;
+      if (!sweepSphere(adjusted, end - adjusted, proxy.radius, now, 1, hit)) continue;
+      const Vector3d outside = adjusted + hit.t * (end - adjusted) + standOff * hit.normal;
       if ((outside - end).norm() <= largest) continue;
       largest = (outside - end).norm();
       corrected = outside;
@@ -392,54 +398,63 @@ static void keepOutside(const Buckets& buckets, double alphaBefore, double alpha
   const bool lost = proxy.lookNext && !proxy.inContact();
   proxy.lookNext = proxy.inContact();
   if (!lost && !liesBehind(buckets, alpha, proxy.centre)) return;
-  if (lookAround(buckets.surface(), alpha, proxy.centre).winding < 0.5) return;
+  const double toolRadius = proxy.toolRadius;
+  if (lookAround(buckets.surface(), alpha, toolRadius, proxy.centre).winding < 0.5) return;
   double distance = std::numeric_limits<double>::infinity();
   const int t = nearestTriangle(buckets, alphaBefore, start, distance);
   if (t >= 0) {
     const Vector3d weights = closestPoint(buckets.surface().triangle(t, alphaBefore), start).weights;
-    proxy.centre = justOutside(buckets.surface().triangle(t, alpha), weights);
+    proxy.centre = justOutside(buckets.surface().triangle(t, alpha), weights, toolRadius);
   }
-  proxy.centre = outOfBodies(buckets.surface(), alpha, proxy.centre);
+  proxy.centre = outOfBodies(buckets.surface(), alpha, toolRadius, proxy.centre);
   proxy.lookNext = true;
 }
 
 // The half-space in which the whole tool is clear of a triangle, seen from where the proxy is.
-static void addClearance(const Buckets& buckets, double alpha, int triangle, double toolRadius, const Vector3d& centre,
+static void addClearance(const Buckets& buckets, double alpha, int triangle, const Proxy& proxy,
                          TouchedPlanes& touched) {
-  const Vector3d q = closestPoint(buckets.surface().triangle(triangle, alpha), centre).point;
-  const Vector3d normal = (centre - q).normalized();
-  addPlane(touched, {normal, normal.dot(q) + toolRadius + kStandOff}, triangle);
+  const Vector3d q = closestPoint(buckets.surface().triangle(triangle, alpha), proxy.centre).point;
+  const Vector3d normal = (proxy.centre - q).normalized();
+  addPlane(touched, {normal, normal.dot(q) + (1 + kStandOff) * proxy.toolRadius}, triangle);
+}
+
+// m: by how much the half-spaces are missed at most.
+static double missingFrom(const Vector3d& p, const TouchedPlanes& touched) {
+  double missing = 0;
+  for (int k = 0; k < touched.count; ++k)
+    missing = std::max(missing, touched.planes[k].offset - touched.planes[k].normal.dot(p));
+  return missing;
 }
 
 // Moves the proxy out to kStandOff beyond the tool's radius from every triangle, by the shortest way that the planes
 // found so far allow. Each move is swept with the clearance there is, so that pushing out of one surface never leads
-// through another; where no room is found the proxy keeps the clearance it has.
-static void pushOut(const Buckets& buckets, double alpha, double toolRadius, Proxy& proxy) {
+// through another; where no room is found the proxy keeps the clearance it has. None is found in the wedge of two faces
+// all but parallel, whose mouth may be metres away.
+static void pushOut(const Buckets& buckets, double alpha, Proxy& proxy) {
+  constexpr double kSteepest = 100;  // of what is missing: a wedge of 1 degree
   TouchedPlanes touched;
   const Vector3d start = proxy.centre;
   for (int k = 0; k <= kMaxPushes; ++k) {
-    proxy.radius = toolRadius;
+    proxy.radius = proxy.toolRadius;
     const int nearest = nearestTriangle(buckets, alpha, proxy.centre, proxy.radius);
     if (nearest < 0 || k == kMaxPushes) return;
-    addClearance(buckets, alpha, nearest, toolRadius, proxy.centre, touched);
+    addClearance(buckets, alpha, nearest, proxy, touched);
     Vector3d target;
     if (!nearestInHalfSpaces(start, touched.planes.data(), touched.count, target, touched.pressure)) return;
-    if ((target - start).norm() > 2 * toolRadius)
-      return;  // two faces all but parallel: their wedge's mouth, metres away
+    if ((target - start).norm() > std::min(2 * proxy.toolRadius, kSteepest * missingFrom(start, touched))) return;
     SurfaceHit hit;
-    if (moveTo(buckets, alpha, target, proxy, hit))
-      addClearance(buckets, alpha, hit.triangle, toolRadius, proxy.centre, touched);
+    if (moveTo(buckets, alpha, target, proxy, hit)) addClearance(buckets, alpha, hit.triangle, proxy, touched);
   }
 }
 
-void followSurface(const Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy) {
+void followSurface(const Buckets& buckets, double alphaBefore, double alpha, Proxy& proxy) {
   const Vector3d start = proxy.centre, carried = start + carriedBy(buckets, alpha, proxy);
   if (!(carried.lpNorm<Eigen::Infinity>() <= kToolReach))
     throw std::runtime_error("a touched surface carried the tool beyond " + std::to_string(int(kToolReach)) +
                              " m: the state of its body is not finite any more in effect; use more substeps");
-  proxy.centre = notPassedOver(buckets, alphaBefore, alpha, proxy.radius, start, carried);
+  proxy.centre = notPassedOver(buckets, alphaBefore, alpha, proxy, carried);
   keepOutside(buckets, alphaBefore, alpha, start, proxy);
-  pushOut(buckets, alpha, toolRadius, proxy);
+  pushOut(buckets, alpha, proxy);
   proxy.surfaceMotion = proxy.centre - start;
   for (int k = 0; k < proxy.contactCount; ++k) {
     ProxyContact& contact = proxy.contacts[k];
@@ -465,8 +480,9 @@ Vector3d Proxy::feltNormal() const {
 
 Proxy placeProxy(const Buckets& buckets, const Vector3d& device, double toolRadius) {
   Proxy proxy;
-  proxy.centre = outOfBodies(buckets.surface(), 1, device);
-  proxy.radius = std::min(toolRadius, lookAround(buckets.surface(), 1, proxy.centre).distance);
+  proxy.toolRadius = toolRadius;
+  proxy.centre = outOfBodies(buckets.surface(), 1, toolRadius, device);
+  proxy.radius = std::min(toolRadius, lookAround(buckets.surface(), 1, toolRadius, proxy.centre).distance);
   return proxy;
 }
 

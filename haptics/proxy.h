@@ -19,8 +19,8 @@ struct ProxyContact {
 
 struct Proxy {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  // The tool's radius; less while surfaces leave no room for it: a squeezed proxy shrinks rather than tunnels.
-  double radius = 0;
+  double toolRadius = 0;
+  double radius = 0;  // the tool's; less while surfaces leave no room for it: a squeezed proxy shrinks, never tunnels
   bool slipping = true;
   double wedging = 1;  // what presses on what it touches, summed, over their common push: more than 1 in a groove
   Eigen::Vector3d slideDirection = Eigen::Vector3d::Zero();  // unit, in which it slipped last in this contact, or zero
@@ -48,11 +48,11 @@ Proxy placeProxy(const Buckets& buckets, const Eigen::Vector3d& device, double t
 // The surface moves from alphaBefore to alpha (of the same two frames) and takes the proxy along: carried by what it
 // touches, never passed over, pushed out of what came too near. Throws std::runtime_error where it would be carried
 // beyond kToolReach.
-void followSurface(const Buckets& buckets, double alphaBefore, double alpha, double toolRadius, Proxy& proxy);
+void followSurface(const Buckets& buckets, double alphaBefore, double alpha, Proxy& proxy);
 
 // The device moves while the surface stands at alpha: the proxy goes to the nearest reachable point, held back by
-// Coulomb friction. Afterwards its contacts are those that press.
+// Coulomb friction. Afterwards its contacts are those that press. `tickDuration`, s, since the last call.
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Eigen::Vector3d& device,
-                  Proxy& proxy);
+                  double tickDuration, Proxy& proxy);
 
 }  // namespace medulla

@@ -282,16 +282,17 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
   state.energy += state.force.dot(way);  // the device holds a tick's force until the next (Hannaford and Ryu 2002)
   tool.device = input;
   tool.motion.velocity = way / tickDuration;
-  followSurface(buckets, alphaBefore, alpha, tool.settings.radius, tool.proxy);
+  followSurface(buckets, alphaBefore, alpha, tool.proxy);
   // Jaws that close, or are closed when a run begins, hold what the tool meets in this very tick, too. Later they hold
   // nothing: closed jaws that come upon tissue push it.
   const bool closes = !tool.grip.closed && input.grip > kGripCloses;
-  if (closes && !tool.proxy.inContact()) followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
+  if (closes && !tool.proxy.inContact())
+    followDevice(buckets, alpha, tool.settings, tool.device.position, tickDuration, tool.proxy);
   tickGrip(surface, alpha, state.force, before, tickDuration, tool);
   if (feelGrip(surface, alpha, tool, state)) return;
   tool.motion.velocity = way / tickDuration;  // of what has slipped out it was another
   const Vector3d carried = tool.proxy.centre;
-  followDevice(buckets, alpha, tool.settings, tool.device.position, tool.proxy);
+  followDevice(buckets, alpha, tool.settings, tool.device.position, tickDuration, tool.proxy);
   followLeaving(surface, alphaBefore, alpha, tool);
   record(contactForce(surface, alpha, way, tool), tool, state);
   const double push = (tool.proxy.centre - tool.device.position).norm();
@@ -395,6 +396,8 @@ static ServoTool makeTool(const Buckets& buckets, const ToolSettings& settings, 
   tool.settings = settings;
   tool.device = start;
   tool.proxy = placeProxy(buckets, start.position, settings.radius);
+  constexpr double kStandsStill = 1e-6 / 3e-3;  // of the tool's radius
+  tool.motion.least = kStandsStill * settings.radius * kStandsStill * settings.radius;
   tool.grip.held.reserve(buckets.surface().from.size());
   tool.patch.entries.reserve(kContactPatchCapacity);
   startFrame(buckets.surface(), 0, tool);

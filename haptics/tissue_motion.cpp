@@ -116,13 +116,12 @@ double leastPart(const DeviceMotion& device) {
   return device.frames <= kUnsure ? part : part / (part + kStiffer * (1 - part));
 }
 
-constexpr double kLeast = 1e-12;  // m2, of 1 um: less is as if it stood still
-
 double partSeen(const DeviceMotion& device) {
   constexpr double kSafe = 1.5;  // forces follow the ways late; at 1, strokes of a live run give 4 mJ
   const auto& seen = device.seen;
-  const double bySteps = (seen.stepChange + kLeast * device.followsAtOnce) / (seen.wayChange + kLeast);
-  const double byForce = 1 - kSafe * (seen.forceLength + kLeast * (1 - device.followsAtOnce)) / (seen.length + kLeast);
+  const double bySteps = (seen.stepChange + device.least * device.followsAtOnce) / (seen.wayChange + device.least);
+  const double byForce =
+      1 - kSafe * (seen.forceLength + device.least * (1 - device.followsAtOnce)) / (seen.length + device.least);
   return std::clamp(std::max(bySteps, byForce), leastPart(device), 1.0);
 }
 
@@ -148,8 +147,8 @@ void seeSwing(const std::array<Vector3d, 3>& last, DeviceMotion& device) {
   sums.both += both;
   const double square = std::max(0.0, sums.square - sums.last.squaredNorm() / sums.frames),
                product = sums.product - sums.last.dot(sums.both) / sums.frames,
-               turn = std::clamp((product + 2 * kLeast) / (square + kLeast), -2.0, 2.0);
-  const double known = square / (square + kUnknown * device.seen.wayChange + kLeast);
+               turn = std::clamp((product + 2 * device.least) / (square + device.least), -2.0, 2.0);
+  const double known = square / (square + kUnknown * device.seen.wayChange + device.least);
   const Vector3d drift = known / sums.frames * (sums.both - turn * sums.last);
   device.swing = {{{2 + known * (turn - 2), drift}, device.swing[0]}};
 }
@@ -174,7 +173,8 @@ double wayOver(double frames, double alpha, const std::array<Vector3d, 4>& ways,
 
 void beginContact(const BlendedSurface& surface, double alpha, const ProxyContact& contact, const Vector3d& normal,
                   double stiffness, DeviceMotion& device) {
-  device = {.velocity = device.velocity,
+  device = {.least = device.least,
+            .velocity = device.velocity,
             .since = alpha,
             .followsAtOnce = followedPart(stiffness, contactGive(surface, {&contact, 1})),
             .seen = device.seen};
@@ -188,7 +188,7 @@ void beginContact(const BlendedSurface& surface, double alpha, const ProxyContac
 
 void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, double stiffness, DeviceMotion& device) {
   const double part = followedPart(stiffness, grip.give);
-  device = {.velocity = device.velocity, .followsAtOnce = part, .follows = {part, part}};
+  device = {.least = device.least, .velocity = device.velocity, .followsAtOnce = part, .follows = {part, part}};
   if (!(part > 0)) return;
   for (int k = 0; k < 3; ++k) device.way[k + 1] = heldStep(surface, grip, k) / part;
   device.way[0] = wayOfLead(device, alpha) - (1 - alpha) * device.way[1];

@@ -17,6 +17,7 @@ namespace medulla {
 
 // Of one device while it touches; while it holds, of the mean of where it wants what it holds, which turns with it.
 struct DeviceMotion {
+  double least = 1e-12;                                // m2: ways whose squares come to less are as if it stood still
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // m/s, over the last tick
   // m: the way that counts, in this dynamics frame so far and in the three before; from where the path that the
   // dynamics was given ended to where it ended next, of a contact along its normal.
