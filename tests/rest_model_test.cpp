@@ -103,13 +103,13 @@ TEST(RestModel, FrequenciesKnowNodesThatAreHeldOnSpheresThatAreNot) {
   }
 }
 
-// Of the energy after it is let go, over four swings; an implicit step damps attachments as it does links.
+// Of the energy after it is let go, over four swings, along z as its lowest mode does. Edges have no dampers.
 TEST(RestModel, DampingKnowsNodesThatAreHeldOnSpheresThatAreNot) {
   const auto ratioOf = [](Integrator integrator) {
     BodyDescription body = heldByNodes(false);
     body.tissue.damping = 0.05;
     constexpr int kSettle = 100;
-    World world({.gravity = {0, -0.05, 0},
+    World world({.gravity = {0, 0, -0.05},
                  .frameDuration = 0.005,
                  .integrator = integrator,
                  .order = 2,
@@ -128,8 +128,8 @@ TEST(RestModel, DampingKnowsNodesThatAreHeldOnSpheresThatAreNot) {
   };
   const double explicitly = ratioOf(Integrator::explicitEuler), implicitly = ratioOf(Integrator::implicit);
   std::printf("[  reached ] ratios of %.4f and %.4f where 0.05 is asked\n", explicitly, implicitly);
-  EXPECT_NEAR(implicitly, 0.05, 0.005);
-  EXPECT_NEAR(explicitly, implicitly, 0.002) << "without what held attachments lack it is 0.006 less";
+  EXPECT_NEAR(implicitly, 0.05, 0.002) << "0.007 less with edges taken for damped";
+  EXPECT_NEAR(explicitly, 0.05, 0.002);
 }
 
 TEST(RotaryInertia, OfACellThatTurnsFastIsRaisedUntilTurningCostsNoStep) {

@@ -1,6 +1,7 @@
 #include "physics/dynamics/rest_modes.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/IterativeLinearSolvers>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <cmath>
@@ -117,9 +118,47 @@ RestRates heldRates(const BodyDescription& body, const BodyMechanics& mechanics)
   return RestRates(0, 6 * static_cast<Eigen::Index>(body.model->spheres.size()));
 }
 
+// N m times two, of attachments and of all.
+struct LayerEnergy {
+  double attached = 0, all = 0;
+};
+
+// Of the layer at rest while the spheres move by `motion` (6 each) and held nodes stay. Edges, which have no dampers,
+// carry what one node is held by to the next.
+LayerEnergy layerEnergy(const BodyDescription& body, const BodyMechanics& mechanics, const VectorXd& motion) {
+  const RestRates stiffness = layerStiffness(*body.model, mechanics);
+  std::vector<int> moving(stiffness.rows(), 0);
+  VectorXd u = VectorXd::Zero(stiffness.rows());  // off the anchors
+  for (const int n : body.fixedNodes) {
+    u.segment<3>(3 * n).setZero();
+    for (const HostRate& rate : anchorRates(body, mechanics, n))
+      u.segment<3>(3 * n) -=
+          rate.linear * motion.segment<3>(6 * rate.sphere) + rate.angular * motion.segment<3>(6 * rate.sphere + 3);
+    for (int k = 0; k < 3; ++k) moving[3 * n + k] = -1;
+  }
+  int count = 0;
+  for (int& m : moving) m = m < 0 ? -1 : count++;
+  const RestRates toMoving = freeOnly(moving, count);
+  const Eigen::SparseMatrix<double> free = toMoving.transpose() * stiffness * toMoving;
+  const Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper> solver(free);
+  u += toMoving * solver.solve(-(toMoving.transpose() * (stiffness * u)));
+  LayerEnergy out;
+  out.all = u.dot(stiffness * u);
+  for (Eigen::Index n = 0; n < u.size() / 3; ++n) {
+    const Vector3d x = u.segment<3>(3 * n);
+    out.attached += mechanics.attachmentStiffness[n] * x.squaredNorm();
+    if (!mechanics.normalExcess.empty())
+      out.attached += mechanics.normalExcess[n] * mechanics.normal[n].dot(x) * mechanics.normal[n].dot(x);
+  }
+  return out;
+}
+
 struct LowestMode {
   double frequency = 0;  // rad/s
-  double heldShare = 0;  // of its energy, what the attachments of held nodes have
+  // Of its energy: what lies in links, and in attachments where nodes are held.
+  double linkShare = 1, attachedShare = 0;
+  double ownShare =
+      1;  // of its kinetic energy, what alpha acts on: spheres without nodes, on spins by the least moment
 };
 
 LowestMode lowestMode(const BodyDescription& body, const BodyMechanics& mechanics) {
@@ -169,7 +208,20 @@ LowestMode lowestMode(const BodyDescription& body, const BodyMechanics& mechanic
     if (i + 1 < kIterations) x = factor.solve(mm * x);
   }
   const double squared = x.dot(k * x);
-  return squared > 0 ? LowestMode{std::sqrt(squared), (ofNodes * x).squaredNorm() / squared} : LowestMode{};
+  if (!(squared > 0)) return {};
+  LowestMode out{.frequency = std::sqrt(squared)};
+  const VectorXd motion = toFree * x;
+  if (ofNodes.rows() > 0) {
+    const LayerEnergy layer = layerEnergy(body, mechanics, motion);
+    const double ofLinksAlone = (ofLinks * x).squaredNorm(), all = ofLinksAlone + layer.all;
+    out.linkShare = ofLinksAlone / all;
+    out.attachedShare = layer.attached / all;
+  }
+  out.ownShare = 0;
+  for (int i = 0; i < spheres; ++i)
+    out.ownShare += mechanics.sphereMass[i] * motion.segment<3>(6 * i).squaredNorm() +
+                    symmetricEigen(mechanics.sphereInertia[i]).values[0] * motion.segment<3>(6 * i + 3).squaredNorm();
+  return out;
 }
 
 }  // namespace
@@ -243,17 +295,13 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
   const double shortest = stableStep(all, 0) / kLargestCost;
   const double largestDamping = (4 / shortest - shortest * all) / 2;
   const double bound = links > 0 ? (largestDamping - mechanics.surfaceRelaxation * surface) / links : asked;
-  // An implicit step has no limit to keep.
-  if (integrator == Integrator::implicit) mechanics.surfaceRelaxation = asked;
-  mechanics.linkRelaxation = integrator == Integrator::implicit ? asked : std::min(asked, std::max(0.0, bound));
+  mechanics.linkRelaxation = std::min(asked, std::max(0.0, bound));
+  // An implicit step has no limit to keep, and beta alone: it makes up for the edges, which are not damped.
+  if (integrator == Integrator::implicit)
+    mechanics.linkRelaxation = mechanics.surfaceRelaxation = asked / (mode.linkShare + mode.attachedShare);
   // It acts on the spheres for all that hangs on them, too.
-  double onSpheres = 0;
-  for (const double mass : mechanics.sphereMass) onSpheres += mass;
-  double whole = onSpheres;
-  for (const double mass : mechanics.nodeMass) whole += mass;
-  const double relaxes =
-      mechanics.linkRelaxation + mode.heldShare * (mechanics.surfaceRelaxation - mechanics.linkRelaxation);
-  const auto damping = [&](double relaxation) { return (relaxation - relaxes) * lowest * lowest * whole / onSpheres; };
+  const double relaxes = mode.linkShare * mechanics.linkRelaxation + mode.attachedShare * mechanics.surfaceRelaxation;
+  const auto damping = [&](double relaxation) { return (relaxation - relaxes) * lowest * lowest / mode.ownShare; };
   mechanics.massDamping = damping(asked);
   // Nobody watches bodies settle: critical damping of the lowest mode brings them to rest soonest.
   mechanics.settlingDamping = lowest > 0 ? damping(std::max(asked, 2 / lowest)) : 0;
