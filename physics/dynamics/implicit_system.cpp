@@ -96,6 +96,7 @@ void loadFactor(const WorldData& d, ImplicitData& s, const std::vector<Block6>& 
   }
   const int quads = 2 * d.spheres.count;
   for (const LoadRow& row : s.rows) {
+    if (row.weight == 0) continue;
     for (int k = row.first; k < row.end; ++k) {
       const int quad = s.rowQuad[k];
       if (quad >= quads || quad % 2 != 0) continue;  // a node; the turning half of the sphere before

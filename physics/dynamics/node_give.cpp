@@ -1,6 +1,7 @@
 #include "physics/dynamics/node_give.h"
 
 #include <Eigen/SparseCholesky>
+#include <algorithm>
 
 #include "physics/dynamics/rest_measures.h"
 #include "physics/dynamics/rigid_support.h"
@@ -51,10 +52,23 @@ void setCarried(const BodyDescription& body, const BodyMechanics& mechanics, con
   stiffness = Eigen::SparseMatrix<double>(free.asDiagonal() * stiffness * free.asDiagonal()) +
               Eigen::SparseMatrix<double>((VectorXd::Ones(free.size()) - free).asDiagonal());
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(stiffness);
+  // Of many nodes each asks for few of the same columns; these are 130 MB at most.
+  constexpr Eigen::Index kMostColumns = 4096;
+  const Eigen::Index columns = stiffness.rows();
+  Eigen::MatrixXd compliance;
+  if (columns <= std::min(kMostColumns, static_cast<Eigen::Index>(out.size())))
+    compliance = factor.solve(Eigen::MatrixXd::Identity(columns, columns));
   for (std::size_t n = 0; n < out.size(); ++n) {
     if (!mechanics.nodeMoves[n]) continue;
     const VectorXd push = onFree(mechanics, nodes.middleRows(3 * n, 3).transpose() * mechanics.normal[n]);
-    out[n].carried = push.dot(factor.solve(push));
+    if (compliance.size() == 0) {
+      out[n].carried = push.dot(factor.solve(push));
+      continue;
+    }
+    const Eigen::SparseVector<double> few = push.sparseView();
+    VectorXd way = VectorXd::Zero(columns);
+    for (Eigen::SparseVector<double>::InnerIterator i(few); i; ++i) way += i.value() * compliance.col(i.index());
+    out[n].carried = few.dot(way);
   }
 }
 
