@@ -126,6 +126,29 @@ TEST(DeadLoads, AFreeBodyGainsTheirForceAndMomentInOneSubstep) {
   }
 }
 
+// Switched on and off at once, within steps too.
+TEST(DeadLoads, APulseGivesItsImpulse) {
+  for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit}) {
+    for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {
+      BodyDescription b = synthetic::body(synthetic::shortTube(), 6e3);
+      b.surface = surface;
+      const Vector3d force(0.01, -0.02, 0.005);
+      const double from = 0.02, to = 0.0537;
+      for (DeadLoad load : someDeadLoads(*b.model, force)) {
+        load.from = load.to = from;
+        b.deadLoads.push_back(load);
+        load.from = load.to = to;
+        load.force = -load.force;
+        b.deadLoads.push_back(load);
+      }
+      World world({.gravity = {0, 0, 0}, .integrator = integrator}, {b});
+      for (int frame = 0; frame < 4; ++frame) world.advance({});
+      const Vector3d impulse = (to - from) * force;
+      EXPECT_LT((momentum(world.data()).linear - impulse).norm(), 1e-6 * impulse.norm());
+    }
+  }
+}
+
 // All of a host's at once are what each of them would be alone, by the transpose of its node's velocity; of a body that
 // has moved, on links, spheres and frames.
 TEST(DeadLoads, ASkinGivesEachOfThemToItsSpheres) {
@@ -149,8 +172,8 @@ TEST(DeadLoads, ASkinGivesEachOfThemToItsSpheres) {
     for (const NodeForce& load : d.deadLoads) {
       const HostPoint host = hostPoint(d, load.node);
       for (int k = 0; k < host.count; ++k) {
-        linear[host.spheres[k]] += d.substep * shareAt(d, load, 0.03) * host.force[k] * load.force;
-        angular[host.spheres[k]] += d.substep * shareAt(d, load, 0.03) * host.torque[k] * load.force;
+        linear[host.spheres[k]] += d.substep * shareAt(d, load, 0.03, d.substep) * host.force[k] * load.force;
+        angular[host.spheres[k]] += d.substep * shareAt(d, load, 0.03, d.substep) * host.torque[k] * load.force;
       }
     }
     for (int i = 0; i < d.spheres.count; ++i) {

@@ -161,9 +161,10 @@ void layOutDeadLoads(WorldData& d) {
   gatherSkinLoads(d);
 }
 
-double shareAt(const WorldData& d, const NodeForce& load, double time) {
+double shareAt(const WorldData& d, const NodeForce& load, double time, double duration) {
   if (d.frame < 0 || time < load.from) return 0;
-  return time < load.to ? (time - load.from) / (load.to - load.from) : 1;
+  const double grows = std::max(load.to - load.from, duration);
+  return std::min(1.0, (time - load.from) / grows);
 }
 
 // A constant force bounds no step: explicit, and by the same way to the hosts of a skin as the tools' forces.
@@ -172,7 +173,7 @@ void applyDeadLoads(WorldData& d, double time) {
   bool skinIsLoaded = false;
   for (std::size_t k = 0; k < d.deadLoads.size(); ++k) {
     const NodeForce& load = d.deadLoads[k];
-    const double share = shareAt(d, load, time);
+    const double share = shareAt(d, load, time, d.substep);
     if (!(share > 0)) continue;
     const int group = d.skinLoads.groupOfLoad[k], node = load.node;
     if (group < 0) {

@@ -197,7 +197,7 @@ void settleTool(WorldData& d, ImplicitData& s, std::size_t k, const StageLoads& 
 
 void addDeadLoads(const WorldData& d, ImplicitData& s, double time) {
   for (const NodeForce& load : d.deadLoads) {
-    const double size = load.force.norm(), share = shareAt(d, load, time);
+    const double size = load.force.norm(), share = shareAt(d, load, time, s.duration);
     if (!(share * size > 0)) continue;
     LoadRow row;
     row.first = static_cast<int>(s.rowQuad.size());
