@@ -16,6 +16,7 @@
 #include "app/shape_mesh.h"
 #include "app/simulation.h"
 #include "physics/dynamics/fixation.h"
+#include "physics/model/node_volumes.h"
 #include "physics/sort_unique.h"
 #include "render/renderer.h"
 
@@ -183,11 +184,14 @@ static void requireSphere(const Scene& scene, const SceneBody& body, int line, c
 static void loadModels(Scene& scene) {
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     SceneBody& body = scene.bodies[b];
+    const bool isSkin = body.surface == SurfaceMode::skin;
     for (std::size_t e = 0; e < b && !body.model; ++e)
-      if (scene.bodies[e].modelPath == body.modelPath) body.model = scene.bodies[e].model;
+      if (scene.bodies[e].modelPath == body.modelPath && (scene.bodies[e].surface == SurfaceMode::skin) == isSkin)
+        body.model = scene.bodies[e].model;
     if (!body.model) {
       requireFile(scene, body.line, "model", fmt::format("model of body \"{}\"", body.name), body.modelPath);
-      body.model = std::make_shared<const SoftBodyModel>(readModel(body.modelPath));
+      const SoftBodyModel model = readModel(body.modelPath);
+      body.model = std::make_shared<const SoftBodyModel>(isSkin ? withoutNodeVolumes(model) : model);
     }
     for (std::size_t k = 0; k < body.fixed.size(); ++k)
       requireSphere(scene, body, body.fixedAt[k], "spheres", "fixes", body.fixed[k].sphere);

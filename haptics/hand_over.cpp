@@ -96,10 +96,11 @@ constexpr int kFrames = 3;
 // the velocity that the surface had over the last kFrames, it leaves alone what moves steadily against the tool. It
 // would make a free body heavier that the tool sets in motion: it is for a tool that is still, gone where the device
 // moves by kStill of the depth that is felt in a frame, starts once all kFrames lie within that time, and grows over
-// kSettled. With kT a tool deep in a liver came to rest within seconds, with 2 kT at once.
+// kSettled. With kT a tool deep in a liver came to rest within seconds, with 2 kT at once or after a second of swinging
+// by newtons, as the least change had it.
 static double steadying(ServoTool& tool, const Path& path, double frameDuration) {
   constexpr double kDampers = 2, kStill = 0.01;
-  constexpr double kSettled = 0.1;  // s
+  constexpr double kSettled = 0.2;  // s
   const double still = kStill * tool.push / tool.settings.stiffness, moved = path.velocity.norm() * frameDuration;
   tool.stillFor = still > moved ? tool.stillFor + frameDuration : 0;
   const double since = tool.stillFor - kFrames * frameDuration;

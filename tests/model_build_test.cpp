@@ -209,7 +209,17 @@ TEST(NodeVolumes, SharedByTheLayerTheBodyStaysItself) {
   EXPECT_NEAR(total.volume / exact.volume, 1, 1e-9);
   EXPECT_LT((total.centroid - exact.centroid).norm(), 1e-9);
   EXPECT_LT((total.secondMoment - exact.secondMoment).norm(), 1e-6 * exact.secondMoment.norm());
-  const SoftBodyModel once = model;
+  const SoftBodyModel once = model, skin = withoutNodeVolumes(model);
+  const MassProperties carried =
+      totalOf(remainingSpheres(skin.restNodes, skin.spheres, skin.attachments), skin.restNodes, skin.attachments);
+  EXPECT_LT((carried.centroid - exact.centroid).norm(), 1e-9);
+  EXPECT_LT((carried.secondMoment - exact.secondMoment).norm(), 1e-6 * exact.secondMoment.norm());
+  for (std::size_t n = 0; n < skin.attachments.size(); ++n) {
+    EXPECT_EQ(skin.attachments[n].volume, 0);
+    const Eigen::Vector3d place =
+        restAnchor(skin.attachments[n], skin.spheres, skin.links) + skin.attachments[n].restOffset;
+    EXPECT_LT((place - skin.restNodes[n]).norm(), 1e-12);
+  }
   shareOutMassByLayer({100, 50, 0}, settings.surfaceMassFraction, model);
   for (std::size_t n = 0; n < model.attachments.size(); ++n)
     EXPECT_NEAR(model.attachments[n].volume / once.attachments[n].volume, 1, 1e-9);

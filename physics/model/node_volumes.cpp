@@ -183,6 +183,25 @@ void shareOutMassByLayer(const IdentifiedLayer& layer, double fraction, SoftBody
   reprojectAttachments({model.restNodes, model.triangles}, model.spheres, model.links, model.attachments);
 }
 
+SoftBodyModel withoutNodeVolumes(const SoftBodyModel& model) {
+  SoftBodyModel out = model;
+  std::vector<Vector3d> moment(model.spheres.size(), Vector3d::Zero());  // m4, about the frames
+  for (std::size_t n = 0; n < out.attachments.size(); ++n) {
+    Attachment& a = out.attachments[n];
+    moment[a.massSphere] += a.volume * (model.restNodes[n] - model.spheres[a.massSphere].restFrame);
+    a.volume = 0;
+  }
+  for (std::size_t i = 0; i < moment.size(); ++i) {
+    FillingSphere& s = out.spheres[i];
+    const Vector3d way = moment[i] / s.volume;
+    s.restFrame += way;
+    s.secondMoment -= s.volume * way * way.transpose();
+  }
+  for (std::size_t n = 0; n < out.attachments.size(); ++n)  // links end where they did
+    if (Attachment& a = out.attachments[n]; !a.onLink) a.restOffset = out.restNodes[n] - out.spheres[a.host].restFrame;
+  return out;
+}
+
 std::vector<MassProperties> remainingSpheres(const std::vector<Vector3d>& nodes,
                                              const std::vector<FillingSphere>& spheres,
                                              const std::vector<Attachment>& attachments) {
