@@ -9,7 +9,6 @@
 #include "physics/model/build_report.h"
 #include "physics/model/identify/necks.h"
 #include "physics/model/node_volumes.h"
-#include "physics/model/plane_section.h"
 #include "physics/model/symmetric_eigen.h"
 #include "tests/complaint.h"
 #include "tests/test_shapes.h"
@@ -62,19 +61,6 @@ TEST(PowerCells, SumToTheBodyAndVoxelsAloneAreClose) {
   EXPECT_LT((sum.centroid - exact.centroid).norm(), 1e-12);
   EXPECT_LT((sum.secondMoment - exact.secondMoment).norm(), 1e-10 * exact.secondMoment.norm());
   ASSERT_EQ(cells.contactArea.size(), 1u);
-}
-
-TEST(PlaneSection, EllipseAndItsHalves) {
-  const TriangleMesh mesh = ellipsoidMesh(5, {3, 2, 1});
-  const Plane plane{Vector3d::Zero(), Vector3d::UnitY(), Vector3d::UnitZ()};
-  const double area = std::numbers::pi * 2 * 1;
-  const SectionMoments whole = planeSection(mesh, plane);
-  EXPECT_NEAR(whole.area / area, 1, 3e-3);
-  EXPECT_NEAR(whole.secondMoment(0, 0) / (area * 4 / 4), 1, 5e-3);
-  EXPECT_NEAR(whole.secondMoment(1, 1) / (area * 1 / 4), 1, 5e-3);
-  const PowerSites sites{{{0, -1, 0}, {0, 1, 0}, {5, 1, 0}}, {0, 0, 0}, {9, 9, 9}};
-  EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 1}).area / area, 1, 3e-3);
-  EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 2}).area / area, 0.5, 3e-3);
 }
 
 TEST(LinkSections, StraightTubeGivesItsBeam) {

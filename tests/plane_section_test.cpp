@@ -1,11 +1,12 @@
-#include "physics/model/torsion_constant.h"
+#include "physics/model/plane_section.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "physics/model/plane_section.h"
+#include "physics/model/power_cells.h"
+#include "physics/model/torsion_constant.h"
 #include "tests/test_shapes.h"
 
 namespace medulla {
@@ -13,6 +14,19 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+
+TEST(PlaneSection, EllipseAndItsHalves) {
+  const TriangleMesh mesh = ellipsoidMesh(5, {3, 2, 1});
+  const Plane plane{Vector3d::Zero(), Vector3d::UnitY(), Vector3d::UnitZ()};
+  const double area = std::numbers::pi * 2 * 1;
+  const SectionMoments whole = planeSection(mesh, plane);
+  EXPECT_NEAR(whole.area / area, 1, 3e-3);
+  EXPECT_NEAR(whole.secondMoment(0, 0) / (area * 4 / 4), 1, 5e-3);
+  EXPECT_NEAR(whole.secondMoment(1, 1) / (area * 1 / 4), 1, 5e-3);
+  const PowerSites sites{{{0, -1, 0}, {0, 1, 0}, {5, 1, 0}}, {0, 0, 0}, {9, 9, 9}};
+  EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 1}).area / area, 1, 3e-3);
+  EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 2}).area / area, 0.5, 3e-3);
+}
 
 // Of the region between `low(v)` and `high(v)` for 0 < v < `height`, about the centroid that symmetry or the table
 // gives.
