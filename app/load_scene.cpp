@@ -190,8 +190,9 @@ static void loadModels(Scene& scene) {
         body.model = scene.bodies[e].model;
     if (!body.model) {
       requireFile(scene, body.line, "model", fmt::format("model of body \"{}\"", body.name), body.modelPath);
-      const SoftBodyModel model = readModel(body.modelPath);
-      body.model = std::make_shared<const SoftBodyModel>(isSkin ? withoutNodeVolumes(model) : model);
+      SoftBodyModel model = readModel(body.modelPath);
+      if (isSkin) model = withoutNodeVolumes(model);
+      body.model = std::make_shared<const SoftBodyModel>(std::move(model));
     }
     for (std::size_t k = 0; k < body.fixed.size(); ++k)
       requireSphere(scene, body, body.fixedAt[k], "spheres", "fixes", body.fixed[k].sphere);

@@ -9,9 +9,9 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-// m, of rounding, in what lies `depth` away from the goal.
+// m, of rounding, in what lies `depth` away from the goal: three planes a hundredth of a radian apart lose ten digits.
 static double roundingOf(const Vector3d& goal, double depth) {
-  return 1e-9 * depth + 1e-14 * goal.lpNorm<Eigen::Infinity>();
+  return 1e-6 * depth + 1e-14 * goal.lpNorm<Eigen::Infinity>();
 }
 
 // Point of the intersection of the chosen planes that is nearest to the goal: goal + N^T p with N N^T p = b - N goal.

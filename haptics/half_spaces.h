@@ -14,7 +14,7 @@ struct HalfSpace {
 
 // The point nearest to `goal` in up to three half-spaces, by enumeration of which of them are active. `pressure[k]` is
 // the Kuhn-Tucker multiplier: result = goal + sum pressure[k] normal[k], all >= 0. Returns false, with result
-// untouched, when no point satisfies all (within 1e-11 m), as between opposite walls.
+// untouched, when no point satisfies all (within rounding, a millionth of the way there), as between opposite walls.
 bool nearestInHalfSpaces(const Eigen::Vector3d& goal, const HalfSpace* halfSpaces, int count, Eigen::Vector3d& result,
                          std::array<double, 3>& pressure);
 

@@ -51,7 +51,7 @@ Proxy placeProxy(const Buckets& buckets, const Eigen::Vector3d& device, double t
 void followSurface(const Buckets& buckets, double alphaBefore, double alpha, Proxy& proxy);
 
 // The device moves while the surface stands at alpha: the proxy goes to the nearest reachable point, held back by
-// Coulomb friction. Afterwards its contacts are those that press. `tickDuration`, s, since the last call.
+// Coulomb friction. Afterwards its contacts are those that press. `tickDuration`, s.
 void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool, const Eigen::Vector3d& device,
                   double tickDuration, Proxy& proxy);
 

@@ -46,6 +46,27 @@ TEST(HalfSpaces, NearestPointIsFeasibleAndNoSampledPointIsNearer) {
   }
 }
 
+// Faces of a smooth mesh, a hundredth of a radian apart: what is lost by rounding makes no wall.
+TEST(HalfSpaces, FacesThatLieNearlyAlikeLeaveRoomAtAnyDepth) {
+  TestRandom random;
+  int missed = 0;
+  for (const double depth : {1e-3, 1e-5, 1e-7}) {
+    for (int n = 0; n < 2000; ++n) {
+      const Vector3d goal = random.vector(0.1), normal = random.vector(1).normalized();
+      const Vector3d corner = goal + depth * normal + random.vector(0.005 * depth);  // all three are active by turns
+      HalfSpace planes[3];
+      for (HalfSpace& plane : planes) {
+        plane.normal = (normal + random.vector(0.01)).normalized();
+        plane.offset = plane.normal.dot(corner);
+      }
+      Vector3d x;
+      std::array<double, 3> pressure;
+      if (!nearestInHalfSpaces(goal, planes, 3, x, pressure)) ++missed;
+    }
+  }
+  EXPECT_EQ(missed, 0);
+}
+
 TEST(HalfSpaces, OppositeWallsWithoutRoomAreReported) {
   const HalfSpace walls[2] = {{Vector3d::UnitX(), 0.001}, {-Vector3d::UnitX(), 0.001}};
   Vector3d x;

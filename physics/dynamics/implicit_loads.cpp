@@ -195,9 +195,12 @@ void settleTool(WorldData& d, ImplicitData& s, std::size_t k, const StageLoads& 
   }
 }
 
-void addDeadLoads(const WorldData& d, ImplicitData& s, double time) {
+void addDeadLoads(const WorldData& d, ImplicitData& s, const StageLoads& stage) {
+  const double until = stage.time.end - s.duration + stage.lasting;
   for (const NodeForce& load : d.deadLoads) {
-    const double size = load.force.norm(), share = shareAt(d, load, time, s.duration);
+    const bool atOnce = load.from == load.to;
+    const double size = load.force.norm(),
+                 share = atOnce ? shareAt(d, load, until, stage.lasting) : shareAt(d, load, stage.time.end, s.duration);
     if (!(share * size > 0)) continue;
     LoadRow row;
     row.first = static_cast<int>(s.rowQuad.size());
@@ -279,7 +282,7 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
     else
       settleTool(d, s, k, stage, rows);
   }
-  addDeadLoads(d, s, stage.time.end);
+  addDeadLoads(d, s, stage);
   for (const LoadRow& row : s.rows) {
     if (row.impulse == 0) continue;
     for (int k = row.first; k < row.end; ++k) {

@@ -26,7 +26,8 @@ void addCarriedMass(const WorldData& d, const std::vector<double>& mass, std::ve
 // implicit_loads.cpp: contacts, tools and dead loads at the present motion.
 struct StageLoads {
   const Loads* loads = nullptr;
-  StepTime time;  // of the stage
+  StepTime time;       // of the stage
+  double lasting = 0;  // s, of the step that its forces stand for: after what the stage before it stands for
 };
 void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& loads);  // rows, and their part of the residual
 void recallFriction(const WorldData& d, ImplicitData& s);  // of ContactData::contacts: ImplicitData::held

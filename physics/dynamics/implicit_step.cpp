@@ -125,7 +125,7 @@ Ending attempt(WorldData& d, ImplicitData& s, std::size_t halvings, const Loads&
   s.lost.assign(d.ranges.size(), {Vector3d::Zero(), Vector3d::Zero()});
   s.toolImpulses.assign(d.loadForces.size(), Vector3d::Zero());
   const auto solve = [&](const StepTime& end, double lasting) {
-    const bool settled = solveStage(d, s, {&loads, end});
+    const bool settled = solveStage(d, s, {&loads, end, lasting});
     addToolImpulses(d, lasting, s.toolImpulses);
     if (late > 0 && contactPushes(s)) return Ending::touched;
     if (!settled && halvings <= kMustSettle) return Ending::failed;

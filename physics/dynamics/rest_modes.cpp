@@ -157,9 +157,38 @@ struct LowestMode {
   double frequency = 0;  // rad/s
   // Of its energy: what lies in links, and in attachments where nodes are held.
   double linkShare = 1, attachedShare = 0;
-  double ownShare =
-      1;  // of its kinetic energy, what alpha acts on: spheres without nodes, on spins by the least moment
+  // Of its kinetic energy: what alpha acts on, of spheres without nodes, on spins by the least moment.
+  double ownShare = 1;
 };
+
+// Of all freedoms, of which `freedom` numbers the free ones.
+Eigen::SparseMatrix<double> wholeMasses(const BodyDescription& body, const std::vector<int>& freedom, int count) {
+  const CellMasses cells = cellMasses(body);
+  std::vector<Eigen::Triplet<double>> mass;
+  const auto put = [&](int i, int j, double value) {
+    if (freedom[i] >= 0 && freedom[j] >= 0) mass.emplace_back(freedom[i], freedom[j], value);
+  };
+  for (int i = 0; i < static_cast<int>(cells.mass.size()); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      put(6 * i + k, 6 * i + k, cells.mass[i]);
+      for (int l = 0; l < 3; ++l) put(6 * i + 3 + k, 6 * i + 3 + l, cells.inertia[i](k, l));
+    }
+  }
+  Eigen::SparseMatrix<double> out(count, count);
+  out.setFromTriplets(mass.begin(), mass.end());
+  return out;
+}
+
+// Of the kinetic energy of `motion` (6 per sphere, whole cells' energy 1).
+double ownShareOf(const BodyMechanics& mechanics, const VectorXd& motion) {
+  double sum = 0;
+  for (std::size_t i = 0; i < mechanics.sphereMass.size(); ++i) {
+    const auto at = 6 * static_cast<Eigen::Index>(i);
+    sum += mechanics.sphereMass[i] * motion.segment<3>(at).squaredNorm() +
+           symmetricEigen(mechanics.sphereInertia[i]).values[0] * motion.segment<3>(at + 3).squaredNorm();
+  }
+  return sum;
+}
 
 LowestMode lowestMode(const BodyDescription& body, const BodyMechanics& mechanics) {
   const SoftBodyModel& m = *body.model;
@@ -172,22 +201,10 @@ LowestMode lowestMode(const BodyDescription& body, const BodyMechanics& mechanic
   const RestRates held = heldRates(body, mechanics);
   if (count == 0 || links.rows() + held.rows() == 0) return {};
 
-  const CellMasses cells = cellMasses(body);
-  std::vector<Eigen::Triplet<double>> mass;
-  const auto put = [&](int i, int j, double value) {
-    if (freedom[i] >= 0 && freedom[j] >= 0) mass.emplace_back(freedom[i], freedom[j], value);
-  };
-  for (int i = 0; i < spheres; ++i) {
-    for (int k = 0; k < 3; ++k) {
-      put(6 * i + k, 6 * i + k, cells.mass[i]);
-      for (int l = 0; l < 3; ++l) put(6 * i + 3 + k, 6 * i + 3 + l, cells.inertia[i](k, l));
-    }
-  }
   const RestRates toFree = freeOnly(freedom, count), ofLinks = links * toFree, ofNodes = held * toFree;
   Eigen::SparseMatrix<double> k = ofLinks.transpose() * ofLinks;
   if (ofNodes.rows() > 0) k += Eigen::SparseMatrix<double>(ofNodes.transpose() * ofNodes);
-  Eigen::SparseMatrix<double> mm(count, count);
-  mm.setFromTriplets(mass.begin(), mass.end());
+  const Eigen::SparseMatrix<double> mm = wholeMasses(body, freedom, count);
 
   // Inverse iteration, rigid motions projected out; a shift far below any mode keeps the factorisation regular.
   MatrixXd rigid =
@@ -217,10 +234,7 @@ LowestMode lowestMode(const BodyDescription& body, const BodyMechanics& mechanic
     out.linkShare = ofLinksAlone / all;
     out.attachedShare = layer.attached / all;
   }
-  out.ownShare = 0;
-  for (int i = 0; i < spheres; ++i)
-    out.ownShare += mechanics.sphereMass[i] * motion.segment<3>(6 * i).squaredNorm() +
-                    symmetricEigen(mechanics.sphereInertia[i]).values[0] * motion.segment<3>(6 * i + 3).squaredNorm();
+  out.ownShare = ownShareOf(mechanics, motion);
   return out;
 }
 
@@ -302,7 +316,7 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
   // It acts on the spheres for all that hangs on them, too.
   const double relaxes = mode.linkShare * mechanics.linkRelaxation + mode.attachedShare * mechanics.surfaceRelaxation;
   const auto damping = [&](double relaxation) { return (relaxation - relaxes) * lowest * lowest / mode.ownShare; };
-  mechanics.massDamping = damping(asked);
+  mechanics.massDamping = integrator == Integrator::implicit ? 0 : damping(asked);
   // Nobody watches bodies settle: critical damping of the lowest mode brings them to rest soonest.
   mechanics.settlingDamping = lowest > 0 ? damping(std::max(asked, 2 / lowest)) : 0;
   // Both matrices are sums of the links' and the surface's, and the modes that are stiffest are not those damped most:

@@ -30,8 +30,8 @@ void dragVelocities(WorldData&, const Batch&);  // driven.cpp: the medium's resi
 void stepVelocities(WorldData&, const Batch&);  // spheres and nodes
 // dead_loads.cpp: as they are at `time`, the substep's end (s).
 void applyDeadLoads(WorldData&, double time);
-// How much of such a load acts in the stage of `duration` (s) that ends at `time` (s), 0 to 1: of one that is there at
-// once the mean. None while bodies settle.
+// How much of such a load acts in the `duration` (s) that ends at `time` (s), 0 to 1: of one that is there at once the
+// mean. None while bodies settle.
 double shareAt(const WorldData&, const NodeForce& load, double time, double duration);
 // driven.cpp: bodies with driven spheres get their velocity at time 0.
 void startDrivenBodies(WorldData&);
