@@ -11,6 +11,18 @@ static LoadedScene shortScene(double duration) {
   return loadScene(readScene(path, {{"clock.duration", std::to_string(duration)}}));
 }
 
+// A skin's nodes have no mass: its spheres stand at the centroids of whole cells.
+TEST(Simulation, BodiesShareAModelFileAsSkinsAndOthersEachTheirOwnWay) {
+  const LoadedScene loaded = loadScene(readScene(std::string(MEDULLA_SOURCE_DIR) + "/scenes/heap.xml",
+                                                 {{"body.bean_3.surface", "skin"}, {"body.bean_6.surface", "skin"}}));
+  const std::vector<SceneBody>& bodies = loaded.scene.bodies;
+  EXPECT_EQ(bodies[0].model, bodies[8].model);
+  EXPECT_EQ(bodies[3].model, bodies[6].model);
+  ASSERT_NE(bodies[0].model, bodies[3].model);
+  EXPECT_GT(bodies[0].model->attachments[0].volume, 0);
+  EXPECT_EQ(bodies[3].model->attachments[0].volume, 0);
+}
+
 TEST(Simulation, TheSameSceneTwiceStaysInLockstep) {
   const LoadedScene loaded = shortScene(3);  // approach and press
   Simulation a(loaded), b(loaded);
