@@ -1,8 +1,8 @@
 #include "app/commands/run_notes.h"
 
 #include <fmt/format.h>
-#include <Eigen/Geometry>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <set>
 
