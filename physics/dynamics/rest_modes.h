@@ -19,8 +19,8 @@ void raiseRotaryInertia(const RestModel& rest, BodyMechanics& mechanics);
 
 // Sets what damps `mechanics` (both relaxations, massDamping, settlingDamping) from the tissue's damping ratio, and
 // lowestFrequency, which it goes by, and returns the largest stable substep (s) of the body under semi-implicit Euler
-// with damping taken at the old velocity. For explicit steps moments of inertia are raised before; implicit ones have no
-// massDamping, and relaxations that make up for edges, which have no dampers, instead.
+// with damping taken at the old velocity. For explicit steps moments of inertia are raised before; implicit ones have
+// no massDamping, and relaxations that make up for edges, which have no dampers, instead.
 double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrator integrator);
 
 // rad/s: the lowest mode of spheres and links that deforms the body, the surface's mass riding along; 0 where none
