@@ -96,7 +96,7 @@ constexpr int kFrames = 3;
 // the velocity that the surface had over the last kFrames, it leaves alone what moves steadily against the tool. It
 // would make a free body heavier that the tool sets in motion: it is for a tool that is still, gone where the device
 // moves by kStill of the depth that is felt in a frame, starts once all kFrames lie within that time, and grows over
-// kSettled. With kT a tool deep in a liver came to rest within seconds, with 2 kT at once or after a second of swinging
+// kSettled. With kT a tool deep in a liver came to rest within seconds, with 2 kT at once or after seconds of swinging
 // by newtons, as the least change had it.
 static double steadying(ServoTool& tool, const Path& path, double frameDuration) {
   constexpr double kDampers = 2, kStill = 0.01;

@@ -195,6 +195,8 @@ void settleTool(WorldData& d, ImplicitData& s, std::size_t k, const StageLoads& 
   }
 }
 
+// Those that grow are taken at the stage's end, which is of second order. One that comes at once acts for the part that
+// it is there of what the stage stands for: the stages' ends alone would miss up to half a step.
 void addDeadLoads(const WorldData& d, ImplicitData& s, const StageLoads& stage) {
   const double until = stage.time.end - s.duration + stage.lasting;
   for (const NodeForce& load : d.deadLoads) {
