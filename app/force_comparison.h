@@ -14,7 +14,7 @@ struct ForceMatch {
   double peak = 0;          // N, the largest simulated force
   double peakMeasured = 0;  // N
   // s by which the simulated force follows the measured one, and how well they then agree: the largest correlation of
-  // the two less their means, over shifts of up to half a second or a quarter of the time. Positive: it comes later.
+  // what overlaps, over shifts of up to half a second or a quarter of the time. Positive: it comes later.
   // Empty where one of the two never changes.
   std::optional<double> lag;
   double correlation = 0;  // -1 to 1

@@ -32,6 +32,21 @@ TEST(ForceComparison, FindsRmsPeaksAndLag) {
   EXPECT_NEAR(late.peak, 2 * late.peakMeasured, 1e-3);
 }
 
+// A lag is the least shift among those that agree alike, and shifts lose what lies beyond their ends: nothing comes
+// round from the other one.
+TEST(ForceComparison, TakesTheNearestOfRepeats) {
+  Forces swing, ramp, late;
+  for (int k = 0; k < 512; ++k) {
+    const double turn = 2 * EIGEN_PI * k / 32;
+    swing.emplace_back(std::sin(turn), 0, std::cos(turn));
+    ramp.emplace_back(0, k < 500 ? 0 : 1, 0);
+    late.emplace_back(0, k < 5 ? 1 : 0, 0);
+  }
+  EXPECT_EQ(matchForces(swing, swing, 0.01).lag, 0);
+  const ForceMatch ends = matchForces(ramp, late, 0.01);
+  EXPECT_LT(ends.correlation, 0.1);
+}
+
 TEST(ForceComparison, AConstantForceHasNoLag) {
   const Forces constant(100, Eigen::Vector3d(0, 0, 2)), zero(100, Eigen::Vector3d::Zero());
   const ForceMatch match = matchForces(zero, constant, 0.01);

@@ -184,10 +184,10 @@ int compareLogs(const CompareOptions& options) {
   if (const std::optional<Cell> cell = firstDifference(a, b, options.tolerance)) {
     const auto [row, column] = *cell;
     return differing({{"row", fmt::format("{}", row + 1), ""},
-                      {"t", a.text[row][0], "s"},
+                      {"t", std::string(a.text[row][0]), "s"},
                       {"field", a.columns[column], ""},
-                      {"a", a.text[row][column], ""},
-                      {"b", b.text[row][column], ""},
+                      {"a", std::string(a.text[row][column]), ""},
+                      {"b", std::string(b.text[row][column]), ""},
                       {"line_a", fmt::format("{}", a.lines[row]), ""},
                       {"line_b", fmt::format("{}", b.lines[row]), ""}});
   }

@@ -19,9 +19,10 @@ static bool endsWithin(const CsvRows& rows, const std::string& text, std::size_t
 }
 
 LogTable readLog(const std::string& path, bool mayBeCut) {
-  const std::string text = readTextFile(path);
   LogTable table;
   table.path = path;
+  table.content = std::make_shared<const std::string>(readTextFile(path));
+  const std::string& text = *table.content;
   CsvRows rows(text, path);
   if (!rows.next()) throw inputError(path, 0, "no header, expected the names of a log's columns");
   rows.requireCommas();
@@ -37,7 +38,7 @@ LogTable readLog(const std::string& path, bool mayBeCut) {
     if (const std::size_t n = table.value.size(); n > 1 && value[0] < table.value[n - 2][0])
       rows.fail(fmt::format("t goes back from {} to {}: expected rows in the order of time", table.value[n - 2][0],
                             value[0]));
-    table.text.emplace_back(rows.cells().begin(), rows.cells().end());
+    table.text.push_back(rows.cells());
     table.lines.push_back(rows.line());
   }
   return table;

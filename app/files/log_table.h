@@ -1,6 +1,8 @@
 #pragma once
 
+#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace medulla {
@@ -9,10 +11,11 @@ namespace medulla {
 struct LogTable {
   std::string path;
   std::vector<std::string> columns;
-  std::vector<int> lines;                      // of each row in the file
-  std::vector<std::vector<std::string>> text;  // [row][column]
-  std::vector<std::vector<double>> value;      // the same as numbers
-  bool isCut = false;                          // the file ends in the midst of one more row
+  std::vector<int> lines;  // of each row in the file
+  std::shared_ptr<const std::string> content;
+  std::vector<std::vector<std::string_view>> text;  // [row][column] of the content
+  std::vector<std::vector<double>> value;           // the same as numbers
+  bool isCut = false;                               // the file ends in the midst of one more row
 };
 
 // Throws std::runtime_error "FILE:LINE: ..." where it is missing or has no header, and on rows that have not as many
