@@ -39,11 +39,10 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   previous_ = current_;
   sampleInputs(0, inputs_);
 
-  std::vector<TouchableBody> bodies;
-  for (const SceneBody& body : loaded.scene.bodies) bodies.push_back({body.model});
+  std::vector<TouchableBody> bodies;  // none without tools: three trees of every surface, which nobody feels
   if (!loaded.trajectories.empty()) {
     const std::vector<std::vector<NodeGive>> give = world_.nodeGive();
-    for (std::size_t b = 0; b < bodies.size(); ++b) bodies[b].give = give[b];
+    for (std::size_t b = 0; b < give.size(); ++b) bodies.push_back({loaded.scene.bodies[b].model, give[b]});
   }
   std::vector<ToolSettings> tools;
   for (const SceneTool& tool : loaded.scene.tools) tools.push_back(tool.settings);
@@ -51,7 +50,7 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
 
   totals_.touched.resize(tools.size());
   totals_.held.resize(tools.size());
-  totals_.pressed.resize(bodies.size());
+  totals_.pressed.resize(loaded.scene.bodies.size());
   totals_.closings.resize(tools.size());
   totals_.squeezedTicks.resize(tools.size());
   for (const ToolSample& input : inputs_) totals_.beganClosed.push_back(input.grip > kGripCloses);

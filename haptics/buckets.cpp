@@ -158,10 +158,12 @@ static void appendBody(const SoftBodyModel& model, BlendedSurface& surface, std:
   }
 }
 
-static void copyNodes(const DynamicsFrame& frame, std::vector<Vector3d>& nodes) {
+// Of as many bodies as can be touched.
+static void copyNodes(const DynamicsFrame& frame, std::size_t bodies, std::vector<Vector3d>& nodes) {
+  assert(bodies <= frame.bodies.size());
   std::size_t n = 0;
-  for (const BodyFrame& body : frame.bodies)
-    for (const Vector3d& x : body.nodes) {
+  for (std::size_t b = 0; b < bodies; ++b)
+    for (const Vector3d& x : frame.bodies[b].nodes) {
       assert(n < nodes.size());
       nodes[n++] = x;
     }
@@ -232,8 +234,8 @@ Buckets::Buckets(const std::vector<TouchableBody>& bodies, double largestRadius,
   data_->bounds.resize((data_->buckets.size() + 3) / 4);
   surface.from.resize(surface.bodyOfNode.size());
   surface.to.resize(surface.bodyOfNode.size());
-  copyNodes(rest, surface.from);
-  copyNodes(rest, surface.to);
+  copyNodes(rest, bodies.size(), surface.from);
+  copyNodes(rest, bodies.size(), surface.to);
   const TriangleMesh restMesh{surface.from, surface.triangles};
   surface.trianglesOfNodes = trianglesOfVertices(restMesh);
   surface.isCrease = nodesOnCreases(restMesh);
@@ -265,8 +267,8 @@ void Buckets::commit(const DynamicsFrame& from, const DynamicsFrame& to,
                      const std::array<std::vector<Vector3d>, 2>& toolForce, double toolForceAge) {
   BlendedSurface& surface = data_->surface;
   assert(stepsBefore[0].size() == surface.from.size());
-  copyNodes(from, surface.from);
-  copyNodes(to, surface.to);
+  copyNodes(from, surface.firstNode.size(), surface.from);
+  copyNodes(to, surface.firstNode.size(), surface.to);
   surface.duration = to.time - from.time;
   surface.toolForce = toolForce;
   surface.toolForceAge = toolForceAge;

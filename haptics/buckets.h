@@ -65,7 +65,8 @@ struct SurfaceHit : SweepHit {
 // neither allocates nor locks.
 class Buckets {
  public:
-  // `largestRadius`: of any sphere that will be swept, m. Throws std::runtime_error when Embree cannot start.
+  // `bodies`: the first of those in the frames, or all; `largestRadius`: of any sphere that will be swept, m. Throws
+  // std::runtime_error when Embree cannot start.
   Buckets(const std::vector<TouchableBody>& bodies, double largestRadius, const DynamicsFrame& rest,
           const EmbreeSettings& embree = {});
   ~Buckets();
