@@ -79,9 +79,10 @@ vec3 spiralDirection(int k) {
   return {r * std::cos(turn), r * std::sin(turn), z};
 }
 
-// Averages values of vertices over the edges of triangles `first` to `last` of the mesh's index.
+// Averages values, one per vertex from `firstVertex` on, over the edges of triangles `first` to `last` of the mesh's
+// index, which name no other vertices.
 template <class Value>
-void smoothOverEdges(const SceneMesh& mesh, std::size_t first, std::size_t last, int passes,
+void smoothOverEdges(const SceneMesh& mesh, std::size_t first, std::size_t last, std::uint32_t firstVertex, int passes,
                      std::vector<Value>& value) {
   std::vector<Value> sum;
   std::vector<float> weight(value.size());
@@ -90,7 +91,7 @@ void smoothOverEdges(const SceneMesh& mesh, std::size_t first, std::size_t last,
     std::fill(weight.begin(), weight.end(), 1.f);
     for (std::size_t k = first; k < last; k += 3)
       for (int e = 0; e < 3; ++e) {
-        const std::uint32_t a = mesh.index[k + e], b = mesh.index[k + (e + 1) % 3];
+        const std::uint32_t a = mesh.index[k + e] - firstVertex, b = mesh.index[k + (e + 1) % 3] - firstVertex;
         sum[a] += value[b];
         sum[b] += value[a];
         weight[a] += 1;
@@ -98,6 +99,11 @@ void smoothOverEdges(const SceneMesh& mesh, std::size_t first, std::size_t last,
       }
     for (std::size_t i = 0; i < sum.size(); ++i) value[i] = sum[i] / weight[i];
   }
+}
+
+template <class Value>
+void smoothOverPart(const SceneMesh& mesh, const MeshPart& part, int passes, std::vector<Value>& value) {
+  smoothOverEdges(mesh, part.firstIndex, part.firstIndex + part.indexCount, part.firstVertex, passes, value);
 }
 
 bool occludes(const MeshPart& part) {
@@ -115,18 +121,18 @@ using Parts = std::vector<const MeshPart*>;
 template <class Visit>
 void visitVertices(const Parts& parts, const Visit& visit) {
   for (const MeshPart* part : parts)
-    for (std::size_t i = part->firstVertex; i < part->firstVertex + part->vertexCount; ++i) visit(i);
+    for (std::size_t i = part->firstVertex; i < part->firstVertex + part->vertexCount; ++i) visit(i, *part);
 }
 
 // Orthographic depth map of these parts seen against `direction`, and how much light each of their vertices gets along
 // it: from outside past what is in the way, from inside through it (Barre-Brisebois and Bouchard 2011, local
 // thickness).
 void gatherDirection(const SceneMesh& mesh, const Parts& parts, vec3 centre, float radius, vec3 direction,
-                     DepthMap& map, std::vector<vec3>& texel, const std::vector<float>& perDepth, Gathered& sum) {
+                     DepthMap& map, std::vector<vec3>& texel, Gathered& sum) {
   const vec3 aside = std::abs(direction.x) < 0.7f ? vec3(1, 0, 0) : vec3(0, 1, 0);
   const vec3 right = glm::normalize(glm::cross(aside, direction)), up = glm::cross(direction, right);
   const float scale = 0.5f / radius;
-  visitVertices(parts, [&](std::size_t i) {
+  visitVertices(parts, [&](std::size_t i, const MeshPart&) {
     const vec3 p = mesh.position[i] - centre;
     texel[i] = {(glm::dot(p, right) * scale + 0.5f) * kMapSide, (glm::dot(p, up) * scale + 0.5f) * kMapSide,
                 0.5f - glm::dot(p, direction) * scale};
@@ -138,14 +144,15 @@ void gatherDirection(const SceneMesh& mesh, const Parts& parts, vec3 centre, flo
       map.rasterize(texel[mesh.index[k]], texel[mesh.index[k + 1]], texel[mesh.index[k + 2]]);
   }
   const float bias = 2.5f / kMapSide;  // two and a half texels
-  visitVertices(parts, [&](std::size_t i) {
+  visitVertices(parts, [&](std::size_t i, const MeshPart& part) {
     const float cosine = glm::dot(mesh.normal[i], direction);
     if (cosine <= 0) {
-      if (perDepth[i] == 0) return;
+      if (part.look->glow == vec3(0) || !occludes(part)) return;
       const int x = int(texel[i].x), y = int(texel[i].y);
       if (x < 0 || y < 0 || x >= kMapSide || y >= kMapSide) return;
       sum.totalThrough[i] -= cosine;
-      sum.through[i] -= cosine * std::exp(-perDepth[i] * std::max(texel[i].z - map.at(x, y), 0.f));
+      const float perDepth = 2 * radius / part.look->glowDepth;  // of depths 0..1 of the map: how fast light fades
+      sum.through[i] -= cosine * std::exp(-perDepth * std::max(texel[i].z - map.at(x, y), 0.f));
       return;
     }
     sum.total[i] += cosine;
@@ -157,7 +164,8 @@ void gatherDirection(const SceneMesh& mesh, const Parts& parts, vec3 centre, flo
   });
 }
 
-void gatherLight(const SceneMesh& mesh, const Parts& parts, Gathered& sum) {
+// `texel`: room for the whole mesh.
+void gatherLight(const SceneMesh& mesh, const Parts& parts, std::vector<vec3>& texel, Gathered& sum) {
   Bounds bounds;
   for (const MeshPart* part : parts)
     if (occludes(*part)) {
@@ -169,13 +177,8 @@ void gatherLight(const SceneMesh& mesh, const Parts& parts, Gathered& sum) {
   const vec3 centre = 0.5f * (bounds.low + bounds.high);
   const float radius = std::max(0.5f * glm::length(bounds.high - bounds.low), 1e-6f);
   DepthMap map(kMapSide);
-  std::vector<vec3> texel(mesh.position.size());
-  std::vector<float> perDepth(mesh.position.size(), 0.f);  // of depths 0..1 of the map: how fast light fades in tissue
-  for (const MeshPart* part : parts)
-    if (part->look->glow != vec3(0) && occludes(*part))
-      std::fill_n(perDepth.begin() + part->firstVertex, part->vertexCount, 2 * radius / part->look->glowDepth);
   for (int k = 0; k < kDirections; ++k)
-    gatherDirection(mesh, parts, centre, radius, spiralDirection(k), map, texel, perDepth, sum);
+    gatherDirection(mesh, parts, centre, radius, spiralDirection(k), map, texel, sum);
 }
 
 // Longest and shortest way on the texture per way on the triangle, over all directions.
@@ -194,20 +197,19 @@ glm::vec2 stretchOf(const SceneMesh& mesh, const std::uint32_t* t) {
 // Where a surface curves otherwise than a sphere of its mean radius does, and at the pole that the camera sees last,
 // unrolled coordinates stretch the texture or squeeze it; vessels would show there as blots and hairs.
 void bakeDetail(SceneMesh& mesh, const MeshPart& part) {
-  const std::size_t first = part.firstIndex, last = first + part.indexCount;
-  std::vector<float> sum(mesh.position.size(), 0.f), weight = sum;
-  for (std::size_t k = first; k < last; k += 3) {
+  std::vector<float> sum(part.vertexCount, 0.f), weight = sum;
+  for (std::size_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
     const glm::vec2 stretch = stretchOf(mesh, &mesh.index[k]) / part.look->detailScale;
     if (!std::isfinite(stretch.x) || !std::isfinite(stretch.y)) continue;  // a triangle without area
     const float share = smoothStep(0.2f, 0.45f, stretch.y) * (1 - smoothStep(2.5f, 4.f, stretch.x));
     for (int corner = 0; corner < 3; ++corner) {
-      sum[mesh.index[k + corner]] += share;
-      weight[mesh.index[k + corner]] += 1;
+      sum[mesh.index[k + corner] - part.firstVertex] += share;
+      weight[mesh.index[k + corner] - part.firstVertex] += 1;
     }
   }
   for (std::size_t i = 0; i < sum.size(); ++i) sum[i] = weight[i] > 0 ? sum[i] / weight[i] : 1.f;
-  smoothOverEdges(mesh, first, last, 2, sum);
-  std::copy_n(sum.begin() + part.firstVertex, part.vertexCount, mesh.detail.begin() + part.firstVertex);
+  smoothOverPart(mesh, part, 2, sum);
+  std::copy(sum.begin(), sum.end(), mesh.detail.begin() + part.firstVertex);
 }
 
 }  // namespace
@@ -226,17 +228,18 @@ void bakeTextureCoordinates(SceneMesh& mesh, const MeshPart& part) {
   const float c = std::cos(part.look->unrollTilt), s = std::sin(part.look->unrollTilt);
   const float radius = part.look->unrollRadius > 0 ? part.look->unrollRadius : meanRadius(mesh, part);
   // Where the texture does not follow the bumps, they must not fold it.
-  std::vector<vec3> normal = mesh.normal;
-  if (part.look->unrollRadius <= 0)
-    smoothOverEdges(mesh, part.firstIndex, part.firstIndex + part.indexCount, kUnrollPasses, normal);
+  const auto ofPart = mesh.normal.begin() + part.firstVertex;
+  std::vector<vec3> normal(ofPart, ofPart + part.vertexCount);
+  if (part.look->unrollRadius <= 0) smoothOverPart(mesh, part, kUnrollPasses, normal);
   // Unrolled around z; what is flat lies across that, whatever the look's tilt.
   const std::optional<vec3> facing = facingOf(mesh, part);
   const auto tilted = [&](vec3 v) {
     if (facing) return turnedToZ(v, *facing);
     return vec3(v.x, c * v.y - s * v.z, s * v.y + c * v.z);
   };
-  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
-    mesh.uv[i] = unroll(tilted(mesh.position[i]), tilted(glm::normalize(normal[i])), radius) * part.look->detailScale;
+  for (std::uint32_t i = 0, vertex = part.firstVertex; i < part.vertexCount; ++i, ++vertex)
+    mesh.uv[vertex] =
+        unroll(tilted(mesh.position[vertex]), tilted(glm::normalize(normal[i])), radius) * part.look->detailScale;
   keepNearZero(mesh, part);
   if (occludes(part)) bakeDetail(mesh, part);
 }
@@ -275,19 +278,20 @@ void bakeOpenness(SceneMesh& mesh) {
   const std::vector<float> zero(n, 0.f);
   Gathered sum{zero, zero, zero, zero};
   Parts staying;
+  std::vector<vec3> texel(n);
   for (const MeshPart& part : mesh.parts)
     if (part.travels)
-      gatherLight(mesh, {&part}, sum);
+      gatherLight(mesh, {&part}, texel, sum);
     else
       staying.push_back(&part);
-  gatherLight(mesh, staying, sum);
+  gatherLight(mesh, staying, texel, sum);
   for (std::size_t i = 0; i < n; ++i) {
     mesh.openness[i] = sum.total[i] > 0 ? sum.light[i] / sum.total[i] : 1.f;
     mesh.thinness[i] = sum.totalThrough[i] > 0 ? sum.through[i] / sum.totalThrough[i] : 0.f;
   }
   // 64 directions leave bands otherwise.
-  smoothOverEdges(mesh, 0, mesh.index.size(), 2, mesh.openness);
-  smoothOverEdges(mesh, 0, mesh.index.size(), 2, mesh.thinness);
+  smoothOverEdges(mesh, 0, mesh.index.size(), 0, 2, mesh.openness);
+  smoothOverEdges(mesh, 0, mesh.index.size(), 0, 2, mesh.thinness);
 }
 
 }  // namespace medulla
