@@ -250,6 +250,11 @@ void settleAll(WorldData& d) {
 
 }  // namespace
 
+double contactBias(const Contact& c, double duration) {
+  if (c.gap > 0) return c.gap / duration;  // they may come as close as the gap allows
+  return std::max(kBetaTimesStep / duration * c.gap, -kPushOutSpeed);
+}
+
 ContactLaw contactLaw(const WorldData& d, const Contact& c, double duration) {
   // The spring's mass is that of whole cells. On a full surface most of it sits in nodes that hang elastically on the
   // spheres: the spheres' own would make contacts ten times softer, and what lies on them is the whole.
@@ -262,13 +267,9 @@ ContactLaw contactLaw(const WorldData& d, const Contact& c, double duration) {
   const double omega = kOmegaTimesStep / duration;  // of the mass that makes the spring as stiff as tissue asks for
   const double inverseTissue = omega * omega * inverseYoung / (kOverTissue * c.smallerRadius);
   const double softness = kGammaTimesMass * std::min(inverseCells, inverseTissue);
-  if (c.gap > 0) return {c.gap / duration, softness};  // they may come as close as the gap allows
-  ContactLaw law{kBetaTimesStep / duration * c.gap, softness};
-  if (law.bias < -kPushOutSpeed) {  // the softness shrinks likewise: the load at which v = 0 stays the spring's, k g
-    law.softness *= -kPushOutSpeed / law.bias;
-    law.bias = -kPushOutSpeed;
-  }
-  return law;
+  const double bias = contactBias(c, duration), spring = kBetaTimesStep / duration * c.gap;
+  // Where the push out is limited the softness shrinks likewise: the load at which v = 0 stays the spring's, k g.
+  return {bias, spring < -kPushOutSpeed ? softness * (bias / spring) : softness};
 }
 
 void notePenetration(ContactData& c) {

@@ -38,7 +38,8 @@ struct ContactLaw {
   double bias, softness;
 };
 ContactLaw contactLaw(const WorldData& d, const Contact& c, double duration);
-void notePenetration(ContactData& c);  // of ContactData::contacts
+double contactBias(const Contact& c, double duration);  // ContactLaw::bias
+void notePenetration(ContactData& c);                   // of ContactData::contacts
 
 void solveContacts(WorldData& d);  // contact_solve.cpp: impulses on spheres
 

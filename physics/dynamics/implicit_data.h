@@ -33,7 +33,12 @@ struct LoadRow {
   double impulse = 0;  // N s at the present motion
 };
 
-// A contact or a tool's spring: three rows, along the normal and two tangents.
+struct MovedBall {
+  Quad arm;       // m, from its sphere's frame to its centre
+  Quad velocity;  // m/s, of the centre
+};
+
+// A contact that pushes or a tool's spring: three rows, along the normal and two tangents.
 struct PointLoad {
   bool isContact = false;
   std::size_t index = 0;  // in ContactData::contacts, or of Loads, tool springs first
@@ -42,6 +47,7 @@ struct PointLoad {
 
 // What sliding asks of a contact's or a tool's friction: implicit_loads.cpp.
 struct Drag {
+  std::size_t place = 0;     // a contact's index, or a load's behind all contacts; ascending
   Eigen::Vector3d wanted;    // N s: what would stop it
   Eigen::Vector3d foretold;  // N s: what the linear system made of that, up to the limit
   double most = 0;           // N s: Coulomb's limit; 0 where nothing pushes
@@ -118,7 +124,9 @@ struct ImplicitData {
   std::vector<int> rowQuad;
   std::vector<Quad> rowCoefficient;
   std::vector<PointLoad> loads;
-  std::vector<Drag> drags, dragsBefore;  // as `loads`: at the present motion, and where the last system was made
+  std::vector<MovedBall> balls;          // per sphere, where there are contacts
+  std::vector<Drag> drags, dragsBefore;  // of what pushes at the present motion, and where the last system was made
+  bool isFirstSystem = true;             // none was made in this stage
   std::vector<Holding> held;             // per contact
 
   StageStart before, start;      // of the step, of its present stage

@@ -38,40 +38,48 @@ void addNodeTerms(const WorldData& d, ImplicitData& s, int node, const HostPoint
 }
 
 template <class AddTerms>
-void addRows(ImplicitData& s, bool isContact, std::size_t index, const Vector3d& normal, const AddTerms& addTerms) {
-  PointLoad load{isContact, index, axesAround(normal)};
-  for (const Vector3d& axis : load.axes) {
-    LoadRow row;
-    row.first = static_cast<int>(s.rowQuad.size());
-    addTerms(axis);
-    row.end = static_cast<int>(s.rowQuad.size());
-    s.rows.push_back(row);
+void addRow(ImplicitData& s, const Vector3d& axis, const AddTerms& addTerms) {
+  const auto first = static_cast<int>(s.rowQuad.size());
+  addTerms(axis);
+  s.rows.push_back(LoadRow{first, static_cast<int>(s.rowQuad.size())});
+}
+
+// Arms from the spheres' frames to their balls' centres, the mean of the stage's start and the present state: what a
+// turning arm adds to a way is its rate there times the duration, to third order, and its work is that of the gap that
+// it opens. And how fast the centres move by them.
+void moveBalls(const WorldData& d, ImplicitData& s) {
+  s.balls.resize(d.spheres.count);
+  for (int i = 0; i < d.spheres.count; ++i) {
+    const Vector3d now = quaternionOf(d.spheres.orientation[i]) * vectorOf(d.contact.restBall[i]);
+    s.balls[i].arm = quadOf(0.5 * (now + vectorOf(d.contact.arm[i])));
+    store(s.balls[i].velocity, load(s.motion[2 * i]) + crossProduct(load(s.motion[2 * i + 1]), load(s.balls[i].arm)));
   }
-  s.loads.push_back(load);
 }
 
-// From the sphere's frame to its ball's centre, the mean of the stage's start and the present state: what a turning arm
-// adds to a way is its rate there times the duration, to third order, and its work is that of the gap that it opens.
-Quad meanArm(const WorldData& d, std::uint32_t sphere) {
-  const Vector3d now = quaternionOf(d.spheres.orientation[sphere]) * vectorOf(d.contact.restBall[sphere]);
-  return quadOf(0.5 * (now + vectorOf(d.contact.arm[sphere])));
+// Of most contacts that are near enough to be looked at nothing else is asked. A point of contact lies along the normal
+// from its ball's centre, and moves along it as that does.
+bool pushes(const ImplicitData& s, const Contact& c) {
+  Lanes velocity = splat(0);
+  for (int e = 0; e < c.ends; ++e) velocity = fma(splat(c.weight[e]), load(s.balls[c.sphere[e]].velocity), velocity);
+  return dotProduct(velocity, c.normal) + contactBias(c, s.duration) < 0;
 }
 
-void addContactRows(const WorldData& d, ImplicitData& s, std::size_t index) {
-  const Contact& c = d.contact.contacts[index];
-  const Vector3d normal(c.normal[0], c.normal[1], c.normal[2]);
+void addContact(ImplicitData& s, const Contact& c, std::size_t index) {
+  const PointLoad load{true, index, axesAround({c.normal[0], c.normal[1], c.normal[2]})};
   std::array<Vector3d, 4> levers;
   for (int e = 0; e < c.ends; ++e) {
     Quad lever;
-    store(lever, leverOf(meanArm(d, c.sphere[e]), c, e));
+    store(lever, leverOf(s.balls[c.sphere[e]].arm, c, e));
     levers[e] = vectorOf(lever);
   }
-  addRows(s, true, index, normal, [&](const Vector3d& axis) {
-    for (int e = 0; e < c.ends; ++e) {
-      addTerm(s, 2 * static_cast<int>(c.sphere[e]), c.weight[e] * axis);
-      addTerm(s, 2 * static_cast<int>(c.sphere[e]) + 1, c.weight[e] * levers[e].cross(axis));
-    }
-  });
+  for (const Vector3d& axis : load.axes)
+    addRow(s, axis, [&](const Vector3d& along) {
+      for (int e = 0; e < c.ends; ++e) {
+        addTerm(s, 2 * static_cast<int>(c.sphere[e]), c.weight[e] * along);
+        addTerm(s, 2 * static_cast<int>(c.sphere[e]) + 1, c.weight[e] * levers[e].cross(along));
+      }
+    });
+  s.loads.push_back(load);
 }
 
 double rateOf(const ImplicitData& s, const LoadRow& row) {
@@ -106,17 +114,18 @@ void turnTangents(ImplicitData& s, PointLoad& load, const LoadRow* rows, double 
 // other way, at one contact of a heap or another in every iteration. With foretold e^T / most in place of e e^T it does
 // not (Chan, Golub and Mulet 1999, of total variation, which has the same kink; of friction: Stadler 2004): what slides
 // on comes to that, what turns about is resisted as by the chord.
-void setDrag(ImplicitData& s, std::size_t load, const Vector3d& wanted, double most, const Vector3d& foretoldFirst) {
-  Drag& now = s.drags[load];
-  now = {wanted, wanted, most};
-  if (s.dragsBefore.empty()) {
-    now.foretold = foretoldFirst;
-  } else if (const Drag& before = s.dragsBefore[load]; before.wanted.norm() > before.most) {
-    const double size = before.wanted.norm(), along = before.wanted.dot(wanted - before.wanted) / (size * size);
-    now.foretold = before.most / size * wanted - along * before.foretold;
+Drag& setDrag(ImplicitData& s, std::size_t place, const Vector3d& wanted, double most, const Vector3d& foretoldFirst) {
+  Drag& now = s.drags.emplace_back();
+  now = {place, wanted, s.isFirstSystem ? foretoldFirst : wanted, most};
+  const auto before = std::lower_bound(s.dragsBefore.begin(), s.dragsBefore.end(), place,
+                                       [](const Drag& drag, std::size_t at) { return drag.place < at; });
+  if (before != s.dragsBefore.end() && before->place == place && before->wanted.norm() > before->most) {
+    const double size = before->wanted.norm(), along = before->wanted.dot(wanted - before->wanted) / (size * size);
+    now.foretold = before->most / size * wanted - along * before->foretold;
   }
   const double foretold = now.foretold.norm();
   if (foretold > most) now.foretold *= most / foretold;
+  return now;
 }
 
 // What resists more motion along the drag, and across it, as shares of what resists where it sticks.
@@ -136,8 +145,7 @@ Resistance resistanceOf(const Drag& drag) {
 // limit, is passive: its work is l.v = (l0 - l / c).l / s <= (l0^2 - l^2) / (2 s). Between steps of different durations
 // the force stays, not the impulse, and s may change as well: a ledger says what has really been taken in, and
 // sumWorkOfLoads() lets no more than that come back.
-void settleContact(const WorldData& d, ImplicitData& s, std::size_t k, LoadRow* rows) {
-  PointLoad& load = s.loads[k];
+void settleContact(const WorldData& d, ImplicitData& s, PointLoad& load, LoadRow* rows) {
   const Contact& c = d.contact.contacts[load.index];
   const ContactLaw law = contactLaw(d, c, s.duration);
   const Vector3d rate = ratesOf(s, rows);
@@ -149,16 +157,15 @@ void settleContact(const WorldData& d, ImplicitData& s, std::size_t k, LoadRow* 
   const Vector3d held = s.held[load.index].impulse;
   const double drag[2] = {load.axes[1].dot(held) - sticking * rate[1], load.axes[2].dot(held) - sticking * rate[2]};
   const double most = c.friction * wanted, whole = std::hypot(drag[0], drag[1]);
-  setDrag(s, k, drag[0] * load.axes[1] + drag[1] * load.axes[2], most, held);
+  const Drag& asked = setDrag(s, load.index, drag[0] * load.axes[1] + drag[1] * load.axes[2], most, held);
   if (whole > 0) turnTangents(s, load, rows, drag[0] / whole, drag[1] / whole);
-  const Resistance resistance = resistanceOf(s.drags[k]);
+  const Resistance resistance = resistanceOf(asked);
   rows[1].impulse = std::min(whole, most);
   rows[1].weight = resistance.along * sticking;
   rows[2].weight = resistance.across * sticking;
 }
 
-void settleTool(WorldData& d, ImplicitData& s, std::size_t k, const StageLoads& stage, LoadRow* rows) {
-  PointLoad& load = s.loads[k];
+void settleTool(WorldData& d, ImplicitData& s, const StageLoads& stage, PointLoad& load, LoadRow* rows) {
   const PointSpring p = pointSpring(d, *stage.loads, load.index, stage.time.remaining);
   Vector3d x = Vector3d::Zero();
   for (int i = 0; i < p.count; ++i) x += p.weights[i] * nodePosition(d, p.nodes[i]);
@@ -177,9 +184,11 @@ void settleTool(WorldData& d, ImplicitData& s, std::size_t k, const StageLoads& 
     const double size = std::hypot(drags[1], drags[2]), most = std::max(0.0, p.friction * -pull[0]);
     // A spring up to Coulomb's friction, or a damper that reaches it where sticking ends.
     const double per = p.slides ? most / kSticking : 1, stiff = p.slides ? h * per : spring;
-    setDrag(s, k, h * per * (drags[1] * load.axes[1] + drags[2] * load.axes[2]), h * most, Vector3d::Zero());
+    const std::size_t place = d.contact.contacts.size() + load.index;
+    const Drag& asked =
+        setDrag(s, place, h * per * (drags[1] * load.axes[1] + drags[2] * load.axes[2]), h * most, Vector3d::Zero());
     if (size > 0) turnTangents(s, load, rows, drags[1] / size, drags[2] / size);
-    const Resistance resistance = resistanceOf(s.drags[k]);
+    const Resistance resistance = resistanceOf(asked);
     force[1] = std::min(per * size, most);
     force[2] = 0;
     weight[1] = resistance.along * stiff;
@@ -267,22 +276,27 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   s.rowQuad.clear();
   s.rowCoefficient.clear();
   s.loads.clear();
-  for (std::size_t k = 0; k < d.contact.contacts.size(); ++k) addContactRows(d, s, k);
+  s.drags.clear();
+  const std::vector<Contact>& contacts = d.contact.contacts;
+  if (!contacts.empty()) moveBalls(d, s);
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    if (pushes(s, contacts[k])) addContact(s, contacts[k], k);
   for (std::size_t k = 0; k < d.loadForces.size(); ++k) {
     const PointSpring p = pointSpring(d, *stage.loads, k, stage.time.remaining);
     std::array<HostPoint, 3> hosts;
     for (int i = 0; i < p.count; ++i) hosts[i] = hostPoint(d, p.nodes[i]);
-    addRows(s, false, k, p.outward != nullptr ? *p.outward : Vector3d::UnitX(), [&](const Vector3d& axis) {
-      for (int i = 0; i < p.count; ++i) addNodeTerms(d, s, p.nodes[i], hosts[i], p.weights[i] * axis);
-    });
+    const PointLoad load{false, k, axesAround(p.outward != nullptr ? *p.outward : Vector3d::UnitX())};
+    for (const Vector3d& axis : load.axes)
+      addRow(s, axis, [&](const Vector3d& along) {
+        for (int i = 0; i < p.count; ++i) addNodeTerms(d, s, p.nodes[i], hosts[i], p.weights[i] * along);
+      });
+    s.loads.push_back(load);
   }
-  s.drags.assign(s.loads.size(), {Vector3d::Zero(), Vector3d::Zero()});
   for (std::size_t k = 0; k < s.loads.size(); ++k) {
-    LoadRow* rows = &s.rows[3 * k];
     if (s.loads[k].isContact)
-      settleContact(d, s, k, rows);
+      settleContact(d, s, s.loads[k], &s.rows[3 * k]);
     else
-      settleTool(d, s, k, stage, rows);
+      settleTool(d, s, stage, s.loads[k], &s.rows[3 * k]);
   }
   addDeadLoads(d, s, stage);
   for (const LoadRow& row : s.rows) {

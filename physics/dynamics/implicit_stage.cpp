@@ -314,6 +314,7 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   }
   s.motion = s.start.motion;
   s.dragsBefore.clear();
+  s.isFirstSystem = true;
   followArcs(d, s);
   leadDriven(d, s, stage.time.end);
   place(d, s, s.duration);
@@ -325,6 +326,7 @@ bool solveStage(WorldData& d, ImplicitData& s, const StageLoads& stage) {
   for (int i = 0; i < kIterations && left > 1; ++i) {
     const double before = left;
     s.dragsBefore = s.drags;
+    s.isFirstSystem = false;
     if (hasMoved && !assembleSystem(d, s, way == Way::definite)) {
       way = Way::definite;
       assembleSystem(d, s, true);
