@@ -5,6 +5,7 @@
 
 #include "app/files/input_error.h"
 #include "app/interrupt.h"
+#include "app/progress.h"
 #include "render/stage_times.h"
 
 namespace medulla {
@@ -31,10 +32,7 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
       frameDuration_(1 / loaded.scene.dynamicsRate),
       tickDuration_(1 / loaded.scene.servoRate),
       world_(makeWorld(loaded)) {
-  while (world_.time() < 0) {
-    checkInterrupt();
-    world_.advance({});
-  }
+  settle();
   world_.readFrame(current_);
   previous_ = current_;
   sampleInputs(0, inputs_);
@@ -58,6 +56,16 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   record_.from = record_.to = current_;
   record_.inputs.assign(ticksPerFrame_ + 1, inputs_);
   record_.tools.assign(ticksPerFrame_ + 1, servo_->tools());
+}
+
+void Simulation::settle() {
+  const double start = world_.time();
+  Progress progress("settle", -start, "s");
+  while (world_.time() < 0) {
+    checkInterrupt();
+    world_.advance({});
+    progress.update(world_.time() - start);
+  }
 }
 
 void Simulation::sampleInputs(double time, std::vector<ToolSample>& out) const {

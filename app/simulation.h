@@ -114,6 +114,7 @@ class Simulation {
   const World& world() const { return world_; }
 
  private:
+  void settle();  // until the first frame at time 0
   void runTicks();
   void advanceDynamics();
   void accountTicks();

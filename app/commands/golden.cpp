@@ -11,6 +11,7 @@
 #include "app/files/output_file.h"
 #include "app/files/text.h"
 #include "app/interrupt.h"
+#include "app/progress.h"
 #include "app/standard_streams.h"
 #include "app/tool_fields.h"
 #include "physics/content_hash.h"
@@ -95,9 +96,11 @@ std::vector<Moment> renderMoments(const std::string& path, const std::string& co
   for (const Moment& moment : moments) times.push_back(moment.frame / scene.fps);
   PictureTimes pictures(times, 0);
   Picture picture;
+  Progress progress(stemOf(path), times.back(), "s");
   while (!simulation.finished()) {
     checkInterrupt();
     simulation.advanceFrame();
+    progress.update(simulation.time());
     pictures.afterFrame(simulation, [&](int k, const PictureState& state) {
       view.compose(state, ViewKind::tissue, {}, picture);
       renderer.render(picture, moments[k].image);
