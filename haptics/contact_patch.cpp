@@ -56,11 +56,11 @@ void fadePatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, 
   fade(std::exp(-fading), std::exp(-duration / kLong), patch);
 }
 
-void addContacts(const Proxy& proxy, double toolRadius, double push, double way, ContactPatch& patch) {
+void addContacts(std::span<const ProxyContact> contacts, double toolRadius, double push, double way,
+                 ContactPatch& patch) {
   const double kept = std::exp(-way / (kWayPerRadius * toolRadius));
   for (ContactPatch::Entry& entry : patch.entries) entry.left += way;
-  for (int k = 0; k < proxy.contactCount; ++k) {
-    const ProxyContact& contact = proxy.contacts[k];
+  for (const ProxyContact& contact : contacts) {
     const double share = push * contact.share;
     if (!(share > 0)) continue;
     auto entry = std::find_if(patch.entries.begin(), patch.entries.end(),

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "haptics/proxy.h"
@@ -35,10 +36,11 @@ constexpr int kContactPatchCapacity = 64;  // triangles; beyond, a new one takes
 void fadePatch(const BlendedSurface& surface, double alpha, const Proxy& proxy, double toolRadius, double way,
                double duration, ContactPatch& patch);
 
-// Adds the proxy's contacts of one tick, each by its share of `push` (m, >= 0: how deep the device is). `way` (m): what
-// the device went, or what the proxy slid on the tissue where that is more, as on tissue that moves along under a still
-// tool.
-void addContacts(const Proxy& proxy, double toolRadius, double push, double way, ContactPatch& patch);
+// Adds what is touched in one tick, or left, each contact by its share of `push` (m, >= 0: how deep the device is).
+// `way` (m): what the device went, or what the proxy slid on the tissue where that is more, as on tissue that moves
+// along under a still tool.
+void addContacts(std::span<const ProxyContact> contacts, double toolRadius, double push, double way,
+                 ContactPatch& patch);
 
 // The patch as contacts of the surface at alpha, shares summing to 1, with the shaded normals along which the hand
 // feels them; of an edge that of the touch, since from a place that trails behind, the way to the proxy leans forward,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 
 #include "haptics/buckets.h"
 #include "haptics/tool_input.h"
@@ -35,6 +36,7 @@ struct Proxy {
   std::array<ProxyContact, 3> contacts;
 
   bool inContact() const { return contactCount > 0; }
+  std::span<const ProxyContact> touched() const { return std::span(contacts).first(contactCount); }
   // The contact that presses most; only in contact.
   const ProxyContact& mainContact() const;
   // Unit; along which it is pushed where there is no friction; only in contact.

@@ -65,8 +65,7 @@ static Vector3d motionForce(const ServoTool& tool, const TissueMotion& tissue) {
 }
 
 static std::span<const ProxyContact> touchedContacts(const ServoTool& tool) {
-  const Proxy& proxy = tool.proxy;
-  return proxy.inContact() ? std::span(proxy.contacts).first(proxy.contactCount) : std::span(&tool.lastContact, 1);
+  return tool.proxy.inContact() ? tool.proxy.touched() : std::span(&tool.lastContact, 1);
 }
 
 // N, on the tissue, as the dynamics had it; to be asked only where it is known.
@@ -127,13 +126,15 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   const Vector3d motion = motionForce(tool, tissue);
   tool.estimate = std::max(0.0, spring + std::clamp(motion.dot(normal), -tool.largestPush, tool.largestPush));
   const double push = tool.push = pushFelt(surface, alpha, normal, tissue, tool);
-  Vector3d drag = proxy.inContact() ? Vector3d(tool.settings.stiffness * tangential(pull, normal)) : Vector3d::Zero();
+  Vector3d drag =
+      proxy.inContact() ? Vector3d(tool.settings.stiffness * tangential(pull, normal)) : Vector3d(push * tool.dragged);
   if (proxy.slipping || !tool.sticks) tool.leadWhereItStuck = tangential(tissue.lead, normal);
   tool.sticks = !proxy.slipping;
   if (tool.sticks)
     drag += tangential(motion - tool.settings.stiffness * tool.leadWhereItStuck, normal);
-  else if (spring > 0)
+  else if (proxy.inContact() && spring > 0)
     drag *= push / spring;
+  if (proxy.inContact() && push > 0) tool.dragged = drag / push;
   return withinCone(push * normal + dragKeptToTissue(surface, alpha, normal, tissue, tool, drag), normal,
                     tool.settings.staticFriction * proxy.wedging);
 }
@@ -166,24 +167,46 @@ static Vector3d gripFelt(const BlendedSurface& surface, double alpha, const Tiss
   return keptToTissue(surface, alpha, tissue, tool, force - off);
 }
 
+// Of the surface that the tool is leaving, the place that is nearest to it by now: seen from where it touched last,
+// what it slides along has fallen away from under it.
+static ProxyContact contactBelow(const Buckets& buckets, double alpha, const ServoTool& tool) {
+  const BlendedSurface& surface = buckets.surface();
+  const Vector3d& centre = tool.proxy.centre;
+  const int body = surface.bodyOfNode[surface.triangles[tool.lastContact.triangle][0]];
+  ProxyContact nearest = tool.lastContact;
+  nearest.point = pointAt(surface.triangle(nearest.triangle, alpha), nearest.weights);
+  double distance = (centre - nearest.point).norm();
+  for (const int t : buckets.near(centre, tool.settings.radius)) {
+    if (surface.bodyOfNode[surface.triangles[t][0]] != body) continue;
+    const TrianglePoint closest = closestPoint(surface.triangle(t, alpha), centre);
+    const double apart = (centre - closest.point).norm();
+    if (!(apart < distance)) continue;
+    distance = apart;
+    nearest = {t, closest.weights, closest.point, (centre - closest.point) / apart, 1};
+  }
+  return nearest;
+}
+
 // In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
 // contact is therefore handed over until the tool is clear of the point by its radius: springs that only push do no
 // harm where nothing is pushed, and without them the tissue would jump free and knock against the tool. All of the
 // patch: with the last triangle alone, the nodes around it did so, and a tool that left a limp organ felt up to three
 // times what it had just held.
-static void followLeaving(const BlendedSurface& surface, double alphaBefore, double alpha, ServoTool& tool) {
+static void followLeaving(const Buckets& buckets, double alphaBefore, double alpha, ServoTool& tool) {
+  const BlendedSurface& surface = buckets.surface();
   if (tool.proxy.inContact()) {
     tool.lastContact = tool.proxy.mainContact();
     tool.lastFelt = tool.proxy.feltNormal();
     if (!tool.isLeaving) {
       tool.largestPush = 0;
+      tool.dragged.setZero();
       tool.sticks = false;
       tool.pathEnd.reset();
       beginContact(surface, alphaBefore, tool.lastContact, tool.lastFelt, tool.settings.stiffness, tool.motion);
     }
     tool.isLeaving = true;
   } else if (tool.isLeaving) {
-    tool.lastContact.point = pointAt(surface.triangle(tool.lastContact.triangle, alpha), tool.lastContact.weights);
+    tool.lastContact = contactBelow(buckets, alpha, tool);
     tool.isLeaving = (tool.proxy.centre - tool.lastContact.point).norm() <= 2 * tool.settings.radius;
   }
 }
@@ -293,11 +316,12 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
   tool.motion.velocity = way / tickDuration;  // of what has slipped out it was another
   const Vector3d carried = tool.proxy.centre;
   followDevice(buckets, alpha, tool.settings, tool.device.position, tickDuration, tool.proxy);
-  followLeaving(surface, alphaBefore, alpha, tool);
+  followLeaving(buckets, alphaBefore, alpha, tool);
   record(contactForce(surface, alpha, way, tool), tool, state);
-  const double push = (tool.proxy.centre - tool.device.position).norm();
   const double slid = tangential(tool.proxy.centre - carried, tool.lastFelt).norm();
-  addContacts(tool.proxy, tool.settings.radius, push, std::max(way.norm(), slid), tool.patch);
+  if (tool.proxy.inContact()) tool.depth = (tool.proxy.centre - tool.device.position).norm();
+  if (tool.isLeaving)
+    addContacts(touchedContacts(tool), tool.settings.radius, tool.depth, std::max(way.norm(), slid), tool.patch);
   if (tool.isLeaving) tool.patch.isTouched = true;
 }
 

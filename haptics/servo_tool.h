@@ -25,6 +25,7 @@ struct ServoTool {
   Eigen::Vector3d lastFelt = Eigen::Vector3d::Zero();  // unit; along which it was felt
   // m, across: how far what the contact sticks to was ahead of the late surface when it began to. There it was touched.
   Eigen::Vector3d leadWhereItStuck = Eigen::Vector3d::Zero();
+  Eigen::Vector3d dragged = Eigen::Vector3d::Zero();  // across, per push, when it touched last
   bool sticks = false;
   double largestPush = 0;  // N, of the coupling's spring during this contact
   DeviceMotion motion;     // in this contact or grip
@@ -33,6 +34,7 @@ struct ServoTool {
   std::optional<Eigen::Vector3d> pathEnd;  // m, of the device's path as handed over since the frame began
   double estimate = 0;                     // N, of the force at the last tick, before it was kept to the tissue's
   double push = 0;                         // N, along the normal, of what was felt at the last tick
+  double depth = 0;                        // m, of the device, when it touched last
   double stillFor = 0;                     // s, that its device has been still while it pushes
   int ticks = 0;                           // in this frame
   bool isLeaving = false;

@@ -40,7 +40,7 @@ TEST(ContactPatch, WhatIsTouchedNowCountsHoweverManyTrianglesWereBefore) {
   const int last = 2 * kContactPatchCapacity;
   for (int triangle = 0; triangle <= last; ++triangle) {
     fade(0.01, patch);
-    addContacts(touching(triangle), 0.005, 1, 0, patch);
+    addContacts(touching(triangle).touched(), 0.005, 1, 0, patch);
   }
   ASSERT_EQ(patch.entries.size(), kContactPatchCapacity);
   for (const ContactPatch::Entry& entry : patch.entries) {
@@ -53,7 +53,7 @@ TEST(ContactPatch, WhatIsTouchedNowCountsHoweverManyTrianglesWereBefore) {
 
 TEST(ContactPatch, FadesAndIsGoneAfterAFrameWithoutTouch) {
   ContactPatch patch;
-  addContacts(touching(7), 0.005, 2, 0, patch);
+  addContacts(touching(7).touched(), 0.005, 2, 0, patch);
   fade(std::numbers::ln2, patch);
   ASSERT_EQ(patch.entries.size(), 1U);
   EXPECT_DOUBLE_EQ(patch.entries[0].share, 1);
@@ -63,14 +63,14 @@ TEST(ContactPatch, FadesAndIsGoneAfterAFrameWithoutTouch) {
 
 TEST(ContactPatch, WhatHasComeOffTheProxyIsForgottenTwentyTimesAsFast) {
   ContactPatch patch;
-  addContacts(touching(7), 0.005, 1, 0, patch);
+  addContacts(touching(7).touched(), 0.005, 1, 0, patch);
   fade(0.01, patch, {0.002, 0, 0});
   EXPECT_NEAR(patch.entries[0].share, std::exp(-0.2), 1e-12);
 }
 
 TEST(ContactPatch, WhatLiesBelowAToolThatRidesOnARimIsNot) {
   ContactPatch patch;
-  addContacts(touching(7), 0.005, 1, 0, patch);
+  addContacts(touching(7).touched(), 0.005, 1, 0, patch);
   fade(0.01, patch, {0.001, 0, 0.002});
   EXPECT_NEAR(patch.entries[0].share, std::exp(-0.01), 1e-12);
 }
@@ -80,8 +80,8 @@ TEST(ContactPatch, WhatBeginsGrowsToItsShareHoweverShortTheFrames) {
   ContactPatch patch;
   for (int frame = 0; frame < 1200; ++frame) {
     fade(1.0 / 60, patch);
-    addContacts(touching(1), 0.005, 1, 0, patch);
-    if (frame >= 600) addContacts(touching(2), 0.005, 1, 0, patch);
+    addContacts(touching(1).touched(), 0.005, 1, 0, patch);
+    if (frame >= 600) addContacts(touching(2).touched(), 0.005, 1, 0, patch);
   }
   ASSERT_EQ(patch.entries.size(), 2U);
   EXPECT_NEAR(patch.entries[1].share / (patch.entries[0].share + patch.entries[1].share), 0.5, 0.01);
@@ -98,7 +98,7 @@ TEST(ContactPatch, WhatTrailsBehindPushesAlongTheNormalOfItsTouch) {
     const double along = tick / 20.0;
     proxy.contacts[0].weights = {1 - along, along, 0};
     proxy.centre = {0.004 * along, 0, 0.005};
-    addContacts(proxy, 0.005, 1, 0.0002, patch);
+    addContacts(proxy.touched(), 0.005, 1, 0.0002, patch);
   }
   std::vector<ProxyContact> contacts;
   patchContacts(surface, 0, proxy, 0.005, patch, contacts);

@@ -34,6 +34,29 @@ TEST(Simulation, TheSameSceneTwiceStaysInLockstep) {
   EXPECT_GT(a.totals().forceMax, 0.05);
 }
 
+// A slide ends as the tool is lifted off: in the late surface it has left the tissue while that still pushes it. The
+// springs of where it touched last, a millimetre behind, let the tissue jump up to the tool: a knock of 0.107 N where
+// it felt 0.03, and dynamics at 1200 Hz have 0.01.
+TEST(Simulation, ASlideThatIsLiftedOffEndsWithoutAKnock) {
+  const LoadedScene loaded = shortScene(4.9);
+  Simulation simulation(loaded);
+  double largest = 0, step = 0;
+  Eigen::Vector3d before = Eigen::Vector3d::Zero();
+  while (!simulation.finished()) {
+    simulation.advanceFrame();
+    for (const std::vector<ToolState>& tick : simulation.record().tools) {
+      if (simulation.time() > 4.55) {
+        largest = std::max(largest, tick[0].force.norm());
+        step = std::max(step, (tick[0].force - before).norm());
+      }
+      before = tick[0].force;
+    }
+  }
+  EXPECT_GT(largest, 0.02);
+  EXPECT_LT(largest, 0.04);
+  EXPECT_LT(step, 0.005);
+}
+
 TEST(Simulation, PicturesOnTicksShowTheTickAndOthersLieBetween) {
   const LoadedScene loaded = shortScene(1);
   Simulation simulation(loaded);
