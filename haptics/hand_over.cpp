@@ -150,7 +150,7 @@ static void handOverContacts(const BlendedSurface& surface, double alpha, double
          across, damper, damper > 0 ? surfaceVelocity(surface, contact, frameDuration) : Vector3d(path.velocity)},
         out);
   }
-  if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.lastContact, {.across = pull}, out);
+  if (contacts.empty() && tool.isLeaving) handOverContact(surface, tool, path, tool.left[0], {.across = pull}, out);
 }
 
 // Every held node pulled to where the tool wants it, by its share of the tool's stiffness: pulling is as stiff as

@@ -65,7 +65,7 @@ static Vector3d motionForce(const ServoTool& tool, const TissueMotion& tissue) {
 }
 
 static std::span<const ProxyContact> touchedContacts(const ServoTool& tool) {
-  return tool.proxy.inContact() ? tool.proxy.touched() : std::span(&tool.lastContact, 1);
+  return tool.proxy.inContact() ? tool.proxy.touched() : std::span(tool.left);
 }
 
 // N, on the tissue, as the dynamics had it; to be asked only where it is known.
@@ -103,6 +103,13 @@ static Vector3d dragKeptToTissue(const BlendedSurface& surface, double alpha, co
                   dragSince(surface, alpha, tissue, normal, tool.settings, tool.motion));
 }
 
+// m: where the tool's centre would touch what it is leaving.
+static Vector3d placeLeft(const ServoTool& tool) {
+  Vector3d sum = Vector3d::Zero();
+  for (const ProxyContact& c : tool.left) sum += c.share * (c.point + tool.settings.radius * c.normal);
+  return sum;
+}
+
 // The coupling of a contact that pushes, or that the tool is leaving: along the normal the spring, negative once the
 // device has left the late surface, plus the motion's part, never pulling. The motion's part is bounded by the largest
 // that the spring has been in this contact, so that force begins without a step on a surface that already moves.
@@ -112,12 +119,9 @@ static Vector3d contactForce(const BlendedSurface& surface, double alpha, const 
   tool.estimate = tool.push = 0;
   if (!tool.isLeaving) return Vector3d::Zero();
   const Proxy& proxy = tool.proxy;
-  const ProxyContact& last = tool.lastContact;
   const Vector3d& normal = tool.lastFelt;
   const Vector3d pull = proxy.centre + proxy.shading - tool.device.position;
-  const double depth = proxy.inContact()
-                           ? pull.dot(normal)
-                           : normal.dot(last.point + tool.settings.radius * last.normal - tool.device.position);
+  const double depth = proxy.inContact() ? pull.dot(normal) : normal.dot(placeLeft(tool) - tool.device.position);
   const double spring = tool.settings.stiffness * depth;
   tool.largestPush = std::max(tool.largestPush, spring);
   tool.motion.way[0] += std::max(way.dot(normal), -std::max(0.0, depth)) * normal;  // from where it touched
@@ -172,8 +176,8 @@ static Vector3d gripFelt(const BlendedSurface& surface, double alpha, const Tiss
 static ProxyContact contactBelow(const Buckets& buckets, double alpha, const ServoTool& tool) {
   const BlendedSurface& surface = buckets.surface();
   const Vector3d& centre = tool.proxy.centre;
-  const int body = surface.bodyOfNode[surface.triangles[tool.lastContact.triangle][0]];
-  ProxyContact nearest = tool.lastContact;
+  const int body = surface.bodyOfNode[surface.triangles[tool.left[0].triangle][0]];
+  ProxyContact nearest = tool.left[0];
   nearest.point = pointAt(surface.triangle(nearest.triangle, alpha), nearest.weights);
   double distance = (centre - nearest.point).norm();
   for (const int t : buckets.near(centre, tool.settings.radius)) {
@@ -192,22 +196,40 @@ static ProxyContact contactBelow(const Buckets& buckets, double alpha, const Ser
 // harm where nothing is pushed, and without them the tissue would jump free and knock against the tool. All of the
 // patch: with the last triangle alone, the nodes around it did so, and a tool that left a limp organ felt up to three
 // times what it had just held.
+//
+// Where it slides meanwhile, what it leaves is what lies below it. The place where it touched last would be seen from
+// aside, past the tool's flank: a stroke of the gallbladder that was lifted off let the tissue jump up to it, and felt
+// 0.107 N where it had 0.03. What is felt comes from there as far as the last place lies aside: straight off, the
+// nearest place is a dent's rim, and of what a stiff tool pressed into a slab it gave back twice as much and more.
 static void followLeaving(const Buckets& buckets, double alphaBefore, double alpha, ServoTool& tool) {
   const BlendedSurface& surface = buckets.surface();
+  auto& [last, below] = tool.left;
   if (tool.proxy.inContact()) {
-    tool.lastContact = tool.proxy.mainContact();
+    last = below = tool.proxy.mainContact();
+    last.share = 1;
+    below.share = 0;
     tool.lastFelt = tool.proxy.feltNormal();
+    tool.depth = (tool.proxy.centre - tool.device.position).norm();
     if (!tool.isLeaving) {
       tool.largestPush = 0;
       tool.dragged.setZero();
       tool.sticks = false;
       tool.pathEnd.reset();
-      beginContact(surface, alphaBefore, tool.lastContact, tool.lastFelt, tool.settings.stiffness, tool.motion);
+      beginContact(surface, alphaBefore, last, tool.lastFelt, tool.settings.stiffness, tool.motion);
     }
     tool.isLeaving = true;
   } else if (tool.isLeaving) {
-    tool.lastContact = contactBelow(buckets, alpha, tool);
-    tool.isLeaving = (tool.proxy.centre - tool.lastContact.point).norm() <= 2 * tool.settings.radius;
+    constexpr double kAside = 0.2;  // of the tool's radius
+    last.point = pointAt(surface.triangle(last.triangle, alpha), last.weights);
+    below = contactBelow(buckets, alpha, tool);
+    const double aside = tangential(tool.proxy.centre - last.point, last.normal).norm();
+    below.share = std::min(1.0, aside / (kAside * tool.settings.radius));
+    if (below.share == 1) {
+      last = below;
+      below.share = 0;
+    }
+    last.share = 1 - below.share;
+    tool.isLeaving = (tool.proxy.centre - last.point).norm() <= 2 * tool.settings.radius;
   }
 }
 
@@ -239,7 +261,7 @@ static Vector3d heldVelocity(const ServoTool& tool, const ToolSample& before, do
 // What jaws would close on: also what is felt still, while the late surface has come off the proxy already.
 static const ProxyContact* contactToHold(const ServoTool& tool, const Vector3d& felt) {
   if (tool.proxy.inContact()) return &tool.proxy.mainContact();
-  return tool.isLeaving && !felt.isZero(0) ? &tool.lastContact : nullptr;
+  return tool.isLeaving && !felt.isZero(0) ? &tool.left[0] : nullptr;
 }
 
 // Opens or closes. The targets of what it takes hold of are measured where the nodes are by now, and then shifted so
@@ -318,10 +340,13 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
   followDevice(buckets, alpha, tool.settings, tool.device.position, tickDuration, tool.proxy);
   followLeaving(buckets, alphaBefore, alpha, tool);
   record(contactForce(surface, alpha, way, tool), tool, state);
+  ProxyContact below = tool.left[1];
+  below.share = 1;
   const double slid = tangential(tool.proxy.centre - carried, tool.lastFelt).norm();
-  if (tool.proxy.inContact()) tool.depth = (tool.proxy.centre - tool.device.position).norm();
-  if (tool.isLeaving)
-    addContacts(touchedContacts(tool), tool.settings.radius, tool.depth, std::max(way.norm(), slid), tool.patch);
+  if (tool.proxy.inContact())
+    addContacts(tool.proxy.touched(), tool.settings.radius, tool.depth, std::max(way.norm(), slid), tool.patch);
+  else if (tool.isLeaving)
+    addContacts({&below, 1}, tool.settings.radius, tool.depth, std::max(way.norm(), slid), tool.patch);
   if (tool.isLeaving) tool.patch.isTouched = true;
 }
 

@@ -21,7 +21,8 @@ struct ServoTool {
   Grip grip;
   Eigen::Vector3d deviceSum = Eigen::Vector3d::Zero();  // of positions over the frame's ticks
   ContactPatch patch;
-  ProxyContact lastContact;                            // while isLeaving: in contact, or not yet clear of it
+  // While isLeaving, in contact or not yet clear of it: where it touched last, and what lies below it by now.
+  std::array<ProxyContact, 2> left;
   Eigen::Vector3d lastFelt = Eigen::Vector3d::Zero();  // unit; along which it was felt
   // m, across: how far what the contact sticks to was ahead of the late surface when it began to. There it was touched.
   Eigen::Vector3d leadWhereItStuck = Eigen::Vector3d::Zero();
