@@ -11,6 +11,7 @@
 #include "haptics/buckets.h"
 #include "haptics/force_bounds.h"
 #include "haptics/hand_over.h"
+#include "haptics/leaving.h"
 #include "haptics/servo_tool.h"
 #include "haptics/tissue_motion.h"
 #include "haptics/triple_buffer.h"
@@ -171,68 +172,6 @@ static Vector3d gripFelt(const BlendedSurface& surface, double alpha, const Tiss
   return keptToTissue(surface, alpha, tissue, tool, force - off);
 }
 
-// Of the surface that the tool is leaving, the place that is nearest to it by now: seen from where it touched last,
-// what it slides along has fallen away from under it.
-static ProxyContact contactBelow(const Buckets& buckets, double alpha, const ServoTool& tool) {
-  const BlendedSurface& surface = buckets.surface();
-  const Vector3d& centre = tool.proxy.centre;
-  const int body = surface.bodyOfNode[surface.triangles[tool.left[0].triangle][0]];
-  ProxyContact nearest = tool.left[0];
-  nearest.point = pointAt(surface.triangle(nearest.triangle, alpha), nearest.weights);
-  double distance = (centre - nearest.point).norm();
-  for (const int t : buckets.near(centre, tool.settings.radius)) {
-    if (surface.bodyOfNode[surface.triangles[t][0]] != body) continue;
-    const TrianglePoint closest = closestPoint(surface.triangle(t, alpha), centre);
-    const double apart = (centre - closest.point).norm();
-    if (!(apart < distance)) continue;
-    distance = apart;
-    nearest = {t, closest.weights, closest.point, (centre - closest.point) / apart, 1};
-  }
-  return nearest;
-}
-
-// In the late surface a tool that withdraws loses contact before the tissue, in the dynamics, lets go of it. The
-// contact is therefore handed over until the tool is clear of the point by its radius: springs that only push do no
-// harm where nothing is pushed, and without them the tissue would jump free and knock against the tool. All of the
-// patch: with the last triangle alone, the nodes around it did so, and a tool that left a limp organ felt up to three
-// times what it had just held.
-//
-// Where it slides meanwhile, what it leaves is what lies below it. The place where it touched last would be seen from
-// aside, past the tool's flank: a stroke of the gallbladder that was lifted off let the tissue jump up to it, and felt
-// 0.107 N where it had 0.03. What is felt comes from there as far as the last place lies aside: straight off, the
-// nearest place is a dent's rim, and of what a stiff tool pressed into a slab it gave back twice as much and more.
-static void followLeaving(const Buckets& buckets, double alphaBefore, double alpha, ServoTool& tool) {
-  const BlendedSurface& surface = buckets.surface();
-  auto& [last, below] = tool.left;
-  if (tool.proxy.inContact()) {
-    last = below = tool.proxy.mainContact();
-    last.share = 1;
-    below.share = 0;
-    tool.lastFelt = tool.proxy.feltNormal();
-    tool.depth = (tool.proxy.centre - tool.device.position).norm();
-    if (!tool.isLeaving) {
-      tool.largestPush = 0;
-      tool.dragged.setZero();
-      tool.sticks = false;
-      tool.pathEnd.reset();
-      beginContact(surface, alphaBefore, last, tool.lastFelt, tool.settings.stiffness, tool.motion);
-    }
-    tool.isLeaving = true;
-  } else if (tool.isLeaving) {
-    constexpr double kAside = 0.2;  // of the tool's radius
-    last.point = pointAt(surface.triangle(last.triangle, alpha), last.weights);
-    below = contactBelow(buckets, alpha, tool);
-    const double aside = tangential(tool.proxy.centre - last.point, last.normal).norm();
-    below.share = std::min(1.0, aside / (kAside * tool.settings.radius));
-    if (below.share == 1) {
-      last = below;
-      below.share = 0;
-    }
-    last.share = 1 - below.share;
-    tool.isLeaving = (tool.proxy.centre - last.point).norm() <= 2 * tool.settings.radius;
-  }
-}
-
 static void record(const Vector3d& force, ServoTool& tool, ToolState& state) {
   const double size = force.norm();
   state.force = size > tool.settings.forceMax ? Vector3d(tool.settings.forceMax / size * force) : force;
@@ -340,14 +279,8 @@ static void tickTool(const Buckets& buckets, double alphaBefore, double alpha, d
   followDevice(buckets, alpha, tool.settings, tool.device.position, tickDuration, tool.proxy);
   followLeaving(buckets, alphaBefore, alpha, tool);
   record(contactForce(surface, alpha, way, tool), tool, state);
-  ProxyContact below = tool.left[1];
-  below.share = 1;
   const double slid = tangential(tool.proxy.centre - carried, tool.lastFelt).norm();
-  if (tool.proxy.inContact())
-    addContacts(tool.proxy.touched(), tool.settings.radius, tool.depth, std::max(way.norm(), slid), tool.patch);
-  else if (tool.isLeaving)
-    addContacts({&below, 1}, tool.settings.radius, tool.depth, std::max(way.norm(), slid), tool.patch);
-  if (tool.isLeaving) tool.patch.isTouched = true;
+  addToPatch(std::max(way.norm(), slid), tool);
 }
 
 void Servo::tick(double alpha, const std::vector<ToolSample>& inputs) {
