@@ -2,6 +2,7 @@
 
 #include <sched.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cstdlib>
 #include <filesystem>
@@ -37,6 +38,17 @@ void keepNoShadersOfOtherWidths() {
   if (std::getenv("LP_NATIVE_VECTOR_WIDTH")) setenv("MESA_SHADER_CACHE_DISABLE", "true", 1);
 }
 
+// Mesa dies of these by a signal, without a word.
+void refuseWhatCrashesMesa(const std::string& kind) {
+  const auto refuse = [](const char* variable, const std::vector<std::string>& allowed, const std::string& expected) {
+    const char* value = std::getenv(variable);
+    if (!value || !*value || std::find(allowed.begin(), allowed.end(), value) != allowed.end()) return;
+    throw std::runtime_error(std::string("the environment has ") + variable + "=" + value + ", expected " + expected);
+  };
+  if (kind == "osmesa") refuse("GALLIUM_DRIVER", {"llvmpipe", "softpipe"}, "llvmpipe, softpipe or nothing");
+  refuse("LP_NATIVE_VECTOR_WIDTH", {"128", "256"}, "128, 256 or nothing");
+}
+
 }  // namespace
 
 std::unique_ptr<GlContext> makeGlContext(const std::string& name) {
@@ -46,7 +58,10 @@ std::unique_ptr<GlContext> makeGlContext(const std::string& name) {
     if (name != "auto" && name != kind.name) continue;
     std::string reason = std::string("not built in: install ") + kind.package + " and rebuild";
     try {
-      if (kind.make) return kind.make();
+      if (kind.make) {
+        refuseWhatCrashesMesa(kind.name);
+        return kind.make();
+      }
     } catch (const std::runtime_error& error) {
       reason = error.what();
     }

@@ -262,6 +262,13 @@ TEST_F(Outputs, WithoutAnyContextTheReasonsAreSaid) {
   expectRefused(render({"-o", "frames"}, none), "no OpenGL context to draw with: osmesa: ");
   expectRefused(render({"-o", "frames"}, none), "; egl: ");
   expectRefused(render({"-o", "frames", "--context", "egl"}, none), "no OpenGL context to draw with: egl: ");
+  for (const auto& [variable, value] :
+       {std::pair("GALLIUM_DRIVER", "zink"), std::pair("LP_NATIVE_VECTOR_WIDTH", "512")}) {
+    ProgramOptions crashing;  // Mesa, by a signal
+    crashing.environment = {{variable, value}};
+    expectRefused(render({"-o", "frames", "--context", "osmesa"}, crashing),
+                  fmt::format("the environment has {}={}, expected ", variable, value));
+  }
   EXPECT_TRUE(contents().empty());
 }
 
