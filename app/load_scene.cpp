@@ -16,6 +16,7 @@
 #include "app/shape_mesh.h"
 #include "app/simulation.h"
 #include "physics/dynamics/fixation.h"
+#include "physics/dynamics/link_mechanics.h"
 #include "physics/model/node_volumes.h"
 #include "physics/sort_unique.h"
 #include "render/renderer.h"
@@ -155,6 +156,17 @@ static void requireDrivenFree(const Scene& scene, const SceneBody& body) {
                         body.name, fixed.sphere));
 }
 
+static void requireSteeredLinks(const Scene& scene, const SceneBody& body) {
+  for (std::size_t k = 0; k < body.steered.size(); ++k) {
+    const std::optional<Region>& where = body.steered[k].where;
+    const std::vector<Eigen::Vector3d> middles = linkMiddles(body);
+    const auto lies = [&](const Eigen::Vector3d& middle) { return !where || contains(*where, middle); };
+    if (!std::any_of(middles.begin(), middles.end(), lies))
+      throw inputError(scene.path, body.steeredAt[k],
+                       fmt::format("no link of body \"{}\" has its middle in here", body.name));
+  }
+}
+
 static void resolveLoads(const Scene& scene, SceneBody& body) {
   const SoftBodyModel& model = *body.model;
   for (const SceneLoad& load : body.loads) {
@@ -248,6 +260,7 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
   for (SceneBody& body : scene.bodies) {
     resolveFixes(scene, body);
     requireDrivenFree(scene, body);
+    requireSteeredLinks(scene, body);
     resolveLoads(scene, body);
     loaded.references.push_back(loadReference(scene, body));
   }

@@ -42,7 +42,8 @@ struct SceneBody : BodyDescription {
   std::string referencePath;  // where another program puts its vertices at the end; empty: none
   std::vector<SceneFix> fixes;
   std::vector<SceneLoad> loads;
-  std::vector<int> fixedAt, drivenAt;  // lines, of each sphere fixed by number and each driven one
+  // Lines, of each sphere fixed by number, each driven one, and each element that steers links.
+  std::vector<int> fixedAt, drivenAt, steeredAt;
 };
 
 // What does not move: drawn if it has a look, holding bodies if it says so.

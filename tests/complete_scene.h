@@ -22,7 +22,7 @@ inline constexpr const char* completeScene = R"(<?xml version="1.0"?>
         orientation="0.707 0 0.707 0" links="springs" surface="skin" reference="fem.txt">
     <fix spheres="0 1" dof="translation"/>
     <fix spheres="4" dof="all"/> <drive sphere="2" axis="0 1 1" amplitude="0.1" frequency="2" phase="0.5" velocity="1 0 0" dof="all"/>
-    <links elongation="2" flexion="3" torsion="0.5"/><neighbours names="second"/>
+    <links select="all" elongation="2" flexion="3" torsion="0.5"/><neighbours names="second"/>
   </body>
   <body name="second" model="second.model.xml" tissue="liver" look="liver"> <fix box="0 1 2 3 4 5"/> <fix sphere="1 2 3 0.5" dof="translation"/> <fix plane="0 2 0 0.5"/> <fix vertices="held.csv"/> <load box="1 2 3 4 5 6" force="0 0 1.5" from="0.5" to="2"/> <load sphere="7 8 9 1" force="1 0 0"/> <load plane="0 0 1 3" force="2 0 0"/> <load vertices="pulled.csv" force="3 0 0" from="0" to="0"/> <load file="loads.csv" to="4"/> </body>
   <static shape="mesh" mesh="/abs/wall.obj" look="wall" position="1 0 0" orientation="0 1 0 0" unit="mm" contact="true" friction="0.4"/><static shape="plane" normal="0 0 2" position="0 0 3"/><static shape="box" size="1 2 3" look="fat" contact="false"/><static shape="sphere" radius="4"/>

@@ -50,7 +50,7 @@ TEST(World, BodiesOfOneModelMoveAsEachAlone) {
   bodies[1].tissue.young = 9e3;
   bodies[2].tissue.damping = 0.3;
   bodies[3].links = LinkModel::springs;
-  bodies[4].factors.flexion = 2;
+  bodies[4].steered = {{{.flexion = 2}}};
   bodies[5].fixed = {{1, FixedFreedom::all}};
   World together(settings, bodies);
   for (int i = 0; i < 10; ++i) together.advance({});
@@ -183,7 +183,7 @@ TEST(World, DescriptionsThatCannotBeSimulatedAreRefused) {
   expectSays(refusal([](BodyDescription& b) { b.tissue.poisson = 0.5; }), "Poisson's ratio");
   expectSays(refusal([](BodyDescription& b) { b.tissue.density = std::nan(""); }), "density");
   expectSays(refusal([](BodyDescription& b) { b.tissue.damping = -0.1; }), "damping ratio");
-  expectSays(refusal([](BodyDescription& b) { b.factors.flexion = 0; }), "flexion factor");
+  expectSays(refusal([](BodyDescription& b) { b.steered = {{{.flexion = 0}}}; }), "flexion factor");
   expectSays(refusal([](BodyDescription& b) { b.fixed = {{99, FixedFreedom::all}}; }), "sphere 99");
   expectSays(refusal([](BodyDescription& b) { b.model = std::make_shared<SoftBodyModel>(); }), "no spheres");
 }

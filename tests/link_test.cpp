@@ -26,7 +26,7 @@ static World bareChain(int spheres, SurfaceMode surface, double damping) {
   b.model = model;
   b.surface = surface;
   b.tissue.damping = damping;
-  b.factors = {1.3, 0.8, 1.6};
+  b.steered = {{{1.3, 0.8, 1.6}}};
   WorldSettings settings;
   settings.gravity.setZero();
   return World(settings, {b});
@@ -49,7 +49,7 @@ TEST(Link, BendingCostsEnergyWhateverTheTwist) {
   for (LinkSection& s : model->links[0].sections) s.bendingMomentU *= 36;
   b.model = model;
   b.surface = SurfaceMode::skin;
-  b.factors.torsion = 1e-9;
+  b.steered[0].factors.torsion = 1e-9;
   Random random(7);
   for (int trial = 0; trial < 20; ++trial) {
     World world(weightless(), {b});

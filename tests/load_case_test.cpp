@@ -191,6 +191,25 @@ TEST_F(LoadCase, RegionsHoldTogetherWhatOneOfThemAllHolds) {
   EXPECT_EQ(fixed(kHeld + turning), whole);
 }
 
+// Of all, or of both halves of the body, or of a half twice the root of it: the same. Of a half alone it is not.
+TEST_F(LoadCase, LinksAreSteeredByRegions) {
+  const auto hash = [&](const std::string& links) {
+    World world = makeWorld(
+        loadScene(readScene(scene(kHeld + links + "<load sphere='-0.06 -0.07 0.02 0.03' force='0 0 0.01'/>"))));
+    for (int frame = 0; frame < 5; ++frame) world.advance({});
+    return world.stateHash();
+  };
+  const std::string lower = "<links plane='0 1 0 -0.05' flexion='X'/>",
+                    upper = "<links plane='0 -1 0 0.05' flexion='X'/>";
+  const auto by = [](std::string links, const char* x) { return links.replace(links.find('X'), 1, x); };
+  const std::uint64_t whole = hash("<links select='all' flexion='4'/>");
+  EXPECT_EQ(hash(by(lower, "4") + by(upper, "4")), whole);
+  EXPECT_EQ(hash(by(upper, "2") + by(lower, "4") + by(upper, "2")), whole);
+  EXPECT_NE(hash(by(lower, "4")), whole);
+  EXPECT_NE(hash(by(upper, "4")), whole);
+  EXPECT_NE(hash(by(lower, "4")), hash(by(upper, "4")));
+}
+
 TEST_F(LoadCase, MistakesNameFileAndLine) {
   folder.write("far.csv", "vertex\n10\n235\n");
   folder.write("nan.csv", "vertex,fx,fy,fz\n10,0,nan,0\n");
@@ -216,6 +235,8 @@ TEST_F(LoadCase, MistakesNameFileAndLine) {
                 "surface in here; expected more of it, or spheres by number");
   EXPECT_EQ(refusal("<load box='5 5 5 6 6 6' force='1 0 0'/>"),
             "case.xml:4: no surface node of body \"pear\" lies in here");
+  EXPECT_EQ(refusal("<links box='5 5 5 6 6 6' flexion='2'/>"),
+            "case.xml:4: no link of body \"pear\" has its middle in here");
   EXPECT_EQ(refusal("<load vertices='none.csv' force='1 0 0'/>"),
             "case.xml:4: list of vertices \"none.csv\" does not exist");
   EXPECT_EQ(refusal("<load file='none.csv'/>"), "case.xml:4: file of forces \"none.csv\" does not exist");

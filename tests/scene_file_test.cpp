@@ -38,9 +38,7 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(body.neighbours, std::vector<int>{1});
   EXPECT_EQ(s.bodies[1].neighbours, std::nullopt);
   EXPECT_EQ(body.surface, SurfaceMode::skin);
-  EXPECT_EQ(body.factors.elongation, 2);
-  EXPECT_EQ(body.factors.flexion, 3);
-  EXPECT_EQ(body.factors.torsion, 0.5);
+  EXPECT_EQ(body.steered, (std::vector<SteeredLinks>{{{2, 3, 0.5}}}));
   EXPECT_EQ(body.worldFromModel.translation(), Eigen::Vector3d(0.1, 0.2, 0.3));
   // A quarter turn about y, given with three digits: a rotation to the last bit nevertheless.
   EXPECT_NEAR((body.worldFromModel.linear() * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(), 0, 1e-12);
@@ -298,6 +296,10 @@ TEST_F(SceneFile, WrongValuesOfWhatHoldsAndMovesBodiesLikewise) {
       {"box=\"0 1 2 3 4 5\"", "box=\"0 1 2 3 4 1\"",
        R"(x.xml:16: <fix> box="0 1 2 3 4 1": expected the lower corner first: x0 y0 z0 x1 y1 z1)"},
       {"1 2 3 0.5", "1 2 3 0", R"(x.xml:16: <fix> sphere="1 2 3 0": expected a radius > 0: x y z r)"},
+      {"<links ", "<links box=\"0 0 0 1 1 1\" ",
+       "x.xml:14: <links> says which by one attribute of select, box, sphere, plane"},
+      {"select=\"all\"", "select=\"some\"", R"(x.xml:14: <links> select="some": expected all)"},
+      {"select=\"all\"", "sphere=\"0 0 0 0\"", R"(x.xml:14: <links> sphere="0 0 0 0": expected a radius > 0: x y z r)"},
       {"<fix box=\"0 1 2 3 4 5\"/>", "<fix/>",
        "x.xml:16: <fix> says where by one attribute of spheres, box, sphere, plane, vertices"},
       {"<fix box", "<fix vertices=\"a.csv\" box",

@@ -22,8 +22,8 @@ TEST_F(SceneOverrides, OverridesReplaceSingleAttributes) {
   EXPECT_EQ(s.bodies[0].tissue.young, 1e4);  // the later one
   EXPECT_EQ(s.dynamics.gravity, Eigen::Vector3d::Zero());
   EXPECT_EQ(s.tools[0].settings.radius, 0.005);
-  EXPECT_EQ(s.bodies[0].factors.torsion, 7);
-  EXPECT_EQ(s.bodies[1].factors.flexion, 8);  // where the scene has no <links>
+  EXPECT_EQ(s.bodies[0].steered[0].factors.torsion, 7);
+  EXPECT_EQ(s.bodies[1].steered[0].factors.flexion, 8);  // where the scene has no <links>
   EXPECT_EQ(s.bodies[1].worldFromModel.translation(), Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(s.name, "other");
 }

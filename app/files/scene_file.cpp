@@ -192,12 +192,21 @@ void readDrivenSpheres(const XmlElement& body, SceneBody& out) {
   }
 }
 
-LinkFactors readLinkFactors(const XmlElement& links) {
-  LinkFactors out;
-  out.elongation = readNumber(links, "elongation", out.elongation, kPositive);
-  out.flexion = readNumber(links, "flexion", out.flexion, kPositive);
-  out.torsion = readNumber(links, "torsion", out.torsion, kPositive);
-  return out;
+void readSteeredLinks(const XmlElement& body, SceneBody& out) {
+  for (const XmlElement* e : childrenOf(body, "links")) {
+    SteeredLinks links;
+    readChoice(*e, "select", {"all"}, 0);
+    const auto given = [&](const RegionForm& form) { return e->find(form.word) != nullptr; };
+    const auto regions = std::count_if(kRegionForms.begin(), kRegionForms.end(), given);
+    if (regions + (e->find("select") != nullptr) > 1)
+      throw std::runtime_error(e->where + ": <links> says which by one attribute of select, box, sphere, plane");
+    if (regions > 0) links.where = readRegion(*e);
+    links.factors.elongation = readNumber(*e, "elongation", links.factors.elongation, kPositive);
+    links.factors.flexion = readNumber(*e, "flexion", links.factors.flexion, kPositive);
+    links.factors.torsion = readNumber(*e, "torsion", links.factors.torsion, kPositive);
+    out.steered.push_back(links);
+    out.steeredAt.push_back(e->line);
+  }
 }
 
 // Names may stand before the body that bears them: read when all bodies are.
@@ -237,7 +246,7 @@ void readBodies(const XmlElement& root, Scene& scene) {
     readFixations(*e, scene.path, body);
     body.loads = readLoads(*e, scene.path);
     readDrivenSpheres(*e, body);
-    body.factors = readLinkFactors(onlyChild(*e, "links"));
+    readSteeredLinks(*e, body);
     scene.bodies.push_back(std::move(body));
   }
   readNeighbours(root, scene);

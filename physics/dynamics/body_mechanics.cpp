@@ -64,9 +64,11 @@ void checkDescription(const BodyDescription& body) {
   check(t.poisson, t.poisson >= 0 && t.poisson < 0.5, "Poisson's ratio", "0 or more and less than 0.5");
   check(t.density, t.density > 0, "density", "more than 0 kg/m3");
   check(t.damping, t.damping >= 0, "damping ratio", "0 or more");
-  check(body.factors.elongation, body.factors.elongation > 0, "elongation factor", "more than 0");
-  check(body.factors.flexion, body.factors.flexion > 0, "flexion factor", "more than 0");
-  check(body.factors.torsion, body.factors.torsion > 0, "torsion factor", "more than 0");
+  for (const SteeredLinks& s : body.steered) {
+    check(s.factors.elongation, s.factors.elongation > 0, "elongation factor", "more than 0");
+    check(s.factors.flexion, s.factors.flexion > 0, "flexion factor", "more than 0");
+    check(s.factors.torsion, s.factors.torsion > 0, "torsion factor", "more than 0");
+  }
   const int spheres = static_cast<int>(m.spheres.size()), links = static_cast<int>(m.links.size());
   for (const FixedSphere& f : body.fixed)
     require(f.sphere >= 0 && f.sphere < spheres,

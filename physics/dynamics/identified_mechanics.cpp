@@ -75,7 +75,8 @@ void checkIdentified(const BodyDescription& body) {
 }
 
 // What makes measures along the model's axes those along the link's, times the roots of their factors.
-static Matrix6d steeredAxes(const LinkFactors& f, const IdentifiedLink& link) {
+static Matrix6d steeredAxes(const BodyDescription& body, const IdentifiedLink& link) {
+  const LinkFactors f = factorsAt(body, 0.5 * (link.restPoint0 + link.restPoint1));
   Vector6d steer;
   steer << f.elongation, f.flexion, f.flexion, f.torsion, f.flexion, f.flexion;
   Matrix6d axes = Matrix6d::Zero();
@@ -86,7 +87,7 @@ static Matrix6d steeredAxes(const LinkFactors& f, const IdentifiedLink& link) {
 std::vector<Matrix6d> identifiedStiffness(const BodyDescription& body) {
   std::vector<Matrix6d> out;
   for (const IdentifiedLink& l : body.model->identified->links) {
-    const Matrix6d steered = steeredAxes(body.factors, l);
+    const Matrix6d steered = steeredAxes(body, l);
     const Matrix6d k = body.tissue.young * steered.transpose() * l.stiffness * steered;
     out.push_back(0.5 * (k + k.transpose()));
   }
@@ -98,7 +99,7 @@ std::vector<LinkStrains> identifiedStrains(const BodyDescription& body) {
   if (!hasStrains(*body.model->identified)) return out;
   const double root = std::sqrt(body.tissue.young);
   for (const IdentifiedLink& l : body.model->identified->links) {
-    const Matrix6d steered = root * steeredAxes(body.factors, l).transpose();
+    const Matrix6d steered = root * steeredAxes(body, l).transpose();
     out.push_back({steered * l.strain0, steered * l.strain1});
   }
   return out;

@@ -202,18 +202,41 @@ LinkStiffness stiffnessOf(const BodyDescription& body, const ElasticLink& own, c
   };
   const double inverse = 1 / line.norm(), stretch = compliance(&LinkSection::area, 0).mean;
   const double sheared = stretch * inverse * inverse * e / (kShearCoefficient * shear);
-  const double bending = body.factors.flexion * e * inverse;
+  const LinkFactors factors = factorsAt(body, 0.5 * (span.end0 + span.end1));
+  const double bending = factors.flexion * e * inverse;
   LinkStiffness k;
-  k.elongation = body.factors.elongation * e * inverse / stretch;
+  k.elongation = factors.elongation * e * inverse / stretch;
   k.flexionU = flexionStiffness(compliance(&LinkSection::bendingMomentU, turned.beyondV), sheared, beam, bending);
   k.flexionV = flexionStiffness(compliance(&LinkSection::bendingMomentV, turned.beyondU), sheared, beam, bending);
-  k.torsion = body.factors.torsion * shear * inverse /
-              complianceOf(l, span.from, span.to, span, &LinkSection::torsionConstant).mean;
+  k.torsion =
+      factors.torsion * shear * inverse / complianceOf(l, span.from, span.to, span, &LinkSection::torsionConstant).mean;
   k.restU = axesOf(line, l.restU).u;
   return k;
 }
 
 }  // namespace
+
+LinkFactors factorsAt(const BodyDescription& body, const Vector3d& middle) {
+  LinkFactors out;
+  for (const SteeredLinks& s : body.steered) {
+    if (s.where && !contains(*s.where, middle)) continue;
+    out.elongation *= s.factors.elongation;
+    out.flexion *= s.factors.flexion;
+    out.torsion *= s.factors.torsion;
+  }
+  return out;
+}
+
+std::vector<Vector3d> linkMiddles(const BodyDescription& body) {
+  const SoftBodyModel& m = *body.model;
+  std::vector<Vector3d> out;
+  if (body.links == LinkModel::identified)
+    for (const IdentifiedLink& l : m.identified->links) out.push_back(0.5 * (l.restPoint0 + l.restPoint1));
+  else
+    for (const ElasticLink& l : m.links)
+      out.push_back(0.5 * (m.spheres[l.sphere0].restLinkEnd + m.spheres[l.sphere1].restLinkEnd));
+  return out;
+}
 
 // A link to a held sphere begins where the surface around it is free: what lies within the held surface cannot bend.
 std::vector<LinkSpan> linkSpans(const BodyDescription& body, const std::vector<bool>& moves,

@@ -19,6 +19,12 @@ struct LinkSpan {
   Eigen::Matrix2d beyond = Eigen::Matrix2d::Zero();
 };
 
+// Of a link whose middle lies there at rest, in the model's frame.
+LinkFactors factorsAt(const BodyDescription& body, const Eigen::Vector3d& middle);
+
+// Middles of the links that the body goes by, in the model's frame, m.
+std::vector<Eigen::Vector3d> linkMiddles(const BodyDescription& body);
+
 // One for each of the model's links. `moves` and `turns`: per sphere, what is not held. Throws std::runtime_error,
 // without the body's name, where two linked spheres lie in one point.
 std::vector<LinkSpan> linkSpans(const BodyDescription& body, const std::vector<bool>& moves,

@@ -28,6 +28,11 @@ std::optional<Region> makeRegion(Region::Shape shape, const std::vector<double>&
   return holds ? std::optional(region) : std::nullopt;
 }
 
+bool Region::operator==(const Region& other) const {
+  return shape == other.shape && box.min() == other.box.min() && box.max() == other.box.max() &&
+         centre == other.centre && radius == other.radius && normal == other.normal && distance == other.distance;
+}
+
 bool contains(const Region& region, const Eigen::Vector3d& x) {
   switch (region.shape) {
     case Region::Shape::box:

@@ -18,6 +18,7 @@ struct Region {
   double radius = 0;
   Eigen::Vector3d normal = Eigen::Vector3d::UnitX();  // of any length but 0: points x with normal . x <= distance
   double distance = 0;
+  bool operator==(const Region& other) const;
 };
 
 // How a region is written down: its word, the numbers that follow, and what they must be.

@@ -160,7 +160,7 @@ void requireFinite(const WorldData& d, double time) {
 
 // Whether two bodies have the same BodyMechanics, wherever they lie and whatever loads them.
 bool alike(const BodyDescription& a, const BodyDescription& b) {
-  return a.model == b.model && a.tissue == b.tissue && a.factors == b.factors && a.surface == b.surface &&
+  return a.model == b.model && a.tissue == b.tissue && a.steered == b.steered && a.surface == b.surface &&
          a.links == b.links && a.fixed == b.fixed && a.fixedNodes == b.fixedNodes && a.driven.empty() &&
          b.driven.empty();
 }

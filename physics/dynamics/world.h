@@ -10,6 +10,7 @@
 #include "physics/dynamics/contact.h"
 #include "physics/dynamics/frame.h"
 #include "physics/dynamics/loads.h"
+#include "physics/dynamics/region.h"
 #include "physics/model/soft_body_model.h"
 
 namespace medulla {
@@ -28,6 +29,11 @@ struct Tissue {
 struct LinkFactors {
   double elongation = 1, flexion = 1, torsion = 1;  // > 0
   bool operator==(const LinkFactors&) const = default;
+};
+struct SteeredLinks {
+  LinkFactors factors;
+  std::optional<Region> where{};  // the links whose middles lie there, at rest; absent: all
+  bool operator==(const SteeredLinks&) const = default;
 };
 
 // How a link answers. springs: six independent damped springs (paper 2.2). beam: the flexion angles of its two ends are
@@ -69,7 +75,7 @@ struct BodyDescription {
   std::string name;
   std::shared_ptr<const SoftBodyModel> model;
   Tissue tissue;
-  LinkFactors factors;
+  std::vector<SteeredLinks> steered;  // factors of several on one link multiply
   SurfaceMode surface = SurfaceMode::full;
   LinkModel links = LinkModel::beam;
   Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
