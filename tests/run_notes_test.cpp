@@ -48,6 +48,34 @@ TEST_F(RunNotes, NumbersThatAreRightInOtherUnits) {
   EXPECT_EQ(notesWith("dynamics.gravity=0 -9810 0"), Notes{"note: gravity is 9810 m/s2; is it in that unit?"});
 }
 
+TEST_F(RunNotes, TissueTooStiffForExplicitSteps) {
+  const auto notesOf = [&](const std::string& young, const std::string& integrator) {
+    const Notes notes = complaints(run(
+        {"check", "own/organ.xml", "--set", "tissue.t.young=" + young, "--set", "dynamics.integrator=" + integrator}));
+    return std::count_if(notes.begin(), notes.end(), [](const std::string& note) {
+      return note.starts_with("note: ") &&
+             note.ends_with(
+                 " substeps per second: tissue so stiff, or cells so small, run faster in implicit steps "
+                 "(<dynamics integrator=\"implicit\"/>)");
+    });
+  };
+  EXPECT_EQ(notesOf("1e10", "explicit"), 1);
+  EXPECT_EQ(notesOf("1e10", "implicit"), 0);
+  EXPECT_EQ(notesOf("1e4", "explicit"), 0);
+}
+
+TEST_F(RunNotes, AFinThatNoSphereReachesInto) {
+  const auto notesWith = [&](const std::string& spheres) {
+    return complaints(run(
+        {"build", MEDULLA_SOURCE_DIR "/assets/dolphin/dolphin.obj", "--spheres", spheres, "-o", "dolphin.model.xml"}));
+  };
+  const Notes few = notesWith("7");
+  ASSERT_EQ(few.size(), 1u);
+  EXPECT_NE(few[0].find(" of 562 surface nodes hang on what lies outside of their part of the body"),
+            std::string::npos);
+  EXPECT_EQ(notesWith("25"), Notes{});
+}
+
 TEST_F(RunNotes, AToolThatPressesASkinFeelsItTooHard) {
   const auto notesOf = [&](const std::string& surface) {
     return complaints(run({"replay", "own/organ.xml", "--set", "body.organ.surface=" + surface}));

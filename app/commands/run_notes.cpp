@@ -145,6 +145,16 @@ static void printPassedThrough(const Scene& scene) {
         "contact=\"false\" of the shapes ends this note\n");
 }
 
+// Twenty times and more those of the shipped scenes.
+static void printManySubsteps(const World& world, double frameRate) {
+  constexpr double kMany = 1e5;  // per second
+  if (const double rate = world.substepsPerFrame() * frameRate; rate > kMany)
+    tell(
+        "note: {:.2g} substeps per second: tissue so stiff, or cells so small, run faster in implicit steps "
+        "(<dynamics integrator=\"implicit\"/>)\n",
+        rate);
+}
+
 void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world) {
   const Scene& scene = loaded.scene;
   printUnits(loaded);
@@ -167,7 +177,7 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
   for (const SceneBody& body : scene.bodies) printRigid(body);
   printUnusedNetworks(scene);
   printIdleLoads(scene, options.isExcerpt);
-  if (scene.dynamics.integrator != Integrator::implicit) return;
+  if (scene.dynamics.integrator != Integrator::implicit) return printManySubsteps(world, scene.dynamicsRate);
   if (scene.dynamics.sleepAfter > 0)
     tell("warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
   if (std::any_of(scene.bodies.begin(), scene.bodies.end(),
