@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <complex>
-#include <unsupported/Eigen/FFT>
 
 namespace medulla {
 
@@ -28,60 +26,63 @@ struct Signal {
   }
 };
 
-// Products of later[shift + i] with earlier[i], summed over i, of shifts up to `longest` to either side: those of
-// `simulated` later at [shift], of `measured` later at [size - shift]. By Fourier transforms, since the sums themselves
-// take half a second of ticks for every tick: minutes for a minute at 20 kHz.
-static std::vector<double> productsOfShifts(const Signal& simulated, const Signal& measured, std::size_t longest) {
-  std::size_t size = 1;  // with zeros enough that what a shift moves out at one end finds nothing at the other
-  while (size < simulated.forces.size() + longest + 1) size *= 2;
-  Eigen::FFT<double> transform;
-  std::vector<double> padded(size), products(size);
-  std::vector<std::complex<double>> ofSimulated, ofMeasured, sum(size);
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto spectrum = [&](const Forces& forces, std::vector<std::complex<double>>& out) {
-      for (std::size_t i = 0; i < forces.size(); ++i) padded[i] = forces[i][axis];
-      transform.fwd(out, padded);
-    };
-    spectrum(simulated.forces, ofSimulated);
-    spectrum(measured.forces, ofMeasured);
-    for (std::size_t k = 0; k < size; ++k) sum[k] += ofSimulated[k] * std::conj(ofMeasured[k]);
-  }
-  transform.inv(products, sum);
-  return products;
-}
-
 // Of what is `shift` later with the other, each less its mean there; 0 where next to nothing of one of them changes
 // there: a quotient of roundings.
-static double correlationOf(const Signal& later, const Signal& earlier, std::size_t shift, double product) {
-  constexpr double kNothing = 1e-6;  // of all that changes; roundings of the transforms are 1e-15 of both
+static double correlationAt(const Signal& later, const Signal& earlier, std::size_t shift) {
+  constexpr double kNothing = 1e-9;  // of all that changes
   const std::size_t count = later.forces.size() - shift;
   const Eigen::Vector3d ofLater = later.sums.back() - later.sums[shift], &ofEarlier = earlier.sums[count];
   const auto n = static_cast<double>(count);
   const double laterSquares = later.squares.back() - later.squares[shift] - ofLater.squaredNorm() / n,
                earlierSquares = earlier.squares[count] - ofEarlier.squaredNorm() / n;
   if (laterSquares <= kNothing * later.squares.back() || earlierSquares <= kNothing * earlier.squares.back()) return 0;
-  return (product - ofLater.dot(ofEarlier) / n) / std::sqrt(laterSquares * earlierSquares);
+  double both = -ofLater.dot(ofEarlier) / n;
+  for (std::size_t i = 0; i < count; ++i) both += later.forces[i + shift].dot(earlier.forces[i]);
+  return both / std::sqrt(laterSquares * earlierSquares);
+}
+
+// The nearest to 0 of the shifts from `first` to `last` that agree best; > 0: the simulated force is later.
+struct Shift {
+  long ticks = 0;
+  double correlation = -2;
+};
+static Shift bestShift(const Signal& simulated, const Signal& measured, long first, long last) {
+  constexpr double kRounding = 1e-9;  // forces that repeat agree as well after a period, but for rounding
+  Shift best;
+  for (long size = 0; size <= std::max(-first, last); ++size)
+    for (const long shift : {size, -size}) {
+      if (shift < first || shift > last) continue;
+      const double c = shift < 0 ? correlationAt(measured, simulated, static_cast<std::size_t>(-shift))
+                                 : correlationAt(simulated, measured, static_cast<std::size_t>(shift));
+      if (c > best.correlation + kRounding) best = {shift, c};
+    }
+  return best;
+}
+
+// Means of so many ticks each.
+static Forces pooled(const Forces& forces, std::size_t ticks) {
+  Forces out(forces.size() / ticks, Eigen::Vector3d::Zero());
+  for (std::size_t i = 0; i < out.size() * ticks; ++i) out[i / ticks] += forces[i] / static_cast<double>(ticks);
+  return out;
 }
 
 static bool changes(const Forces& forces) {
   return std::any_of(forces.begin(), forces.end(), [&](const Eigen::Vector3d& f) { return f != forces[0]; });
 }
 
+// By milliseconds first, and then by ticks around the best: half a second of ticks for every tick took minutes for a
+// minute at 20 kHz.
 static void findLag(const Forces& simulated, const Forces& measured, double tickDuration, ForceMatch& match) {
   if (!changes(simulated) || !changes(measured)) return;
-  const Signal s(simulated), m(measured);
-  const auto longest = std::min(static_cast<std::size_t>(std::lround(0.5 / tickDuration)), simulated.size() / 4);
-  const std::vector<double> products = productsOfShifts(s, m, longest);
-  match.lag = 0;
-  match.correlation = correlationOf(s, m, 0, products[0]);
-  constexpr double kRounding = 1e-9;  // forces that repeat agree as well after a period, but for rounding
-  for (std::size_t shift = 1; shift <= longest; ++shift) {
-    const double late = correlationOf(s, m, shift, products[shift]),
-                 early = correlationOf(m, s, shift, products[products.size() - shift]);
-    if (std::max(late, early) <= match.correlation + kRounding) continue;
-    match.correlation = std::max(late, early);
-    match.lag = (late >= early ? 1 : -1) * static_cast<double>(shift) * tickDuration;
-  }
+  const auto longest = std::min(std::lround(0.5 / tickDuration), static_cast<long>(simulated.size()) / 4);
+  const long pool = std::clamp(std::lround(0.001 / tickDuration), 1L, std::max(1L, longest));
+  const auto size = static_cast<std::size_t>(pool);
+  const Shift coarse =
+      bestShift(Signal(pooled(simulated, size)), Signal(pooled(measured, size)), -longest / pool, longest / pool);
+  const long first = std::max(-longest, (coarse.ticks - 1) * pool), last = std::min(longest, (coarse.ticks + 1) * pool);
+  const Shift fine = bestShift(Signal(simulated), Signal(measured), first, last);
+  match.lag = static_cast<double>(fine.ticks) * tickDuration;
+  match.correlation = fine.correlation;
 }
 
 ForceMatch matchForces(const Forces& simulated, const Forces& measured, double tickDuration) {

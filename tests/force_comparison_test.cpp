@@ -47,6 +47,12 @@ TEST(ForceComparison, TakesTheNearestOfRepeats) {
   EXPECT_LT(ends.correlation, 0.1);
 }
 
+TEST(ForceComparison, LagsOfTicksAreFoundAmongManyTicks) {
+  const Forces measured = bumps(1000, 0, 1);
+  for (const int late : {-13, 0, 2, 17})  // ticks of 0.1 ms: a millisecond has ten
+    EXPECT_NEAR(*matchForces(bumps(1000, late, 2), measured, 1e-4).lag, 1e-4 * late, 1e-12);
+}
+
 TEST(ForceComparison, AConstantForceHasNoLag) {
   const Forces constant(100, Eigen::Vector3d(0, 0, 2)), zero(100, Eigen::Vector3d::Zero());
   const ForceMatch match = matchForces(zero, constant, 0.01);
