@@ -194,6 +194,9 @@ void beginHold(const BlendedSurface& surface, double alpha, const Grip& grip, do
   device.way[0] = wayOfLead(device, alpha) - (1 - alpha) * device.way[1];
 }
 
+// Of a frame towards whose end it was touched, tissue that already moves shows its own motion more than any answer.
+constexpr double kMostMissed = 0.5;
+
 void learnFollowing(const BlendedSurface& surface, std::span<const ProxyContact> contacts, const Vector3d& normal,
                     double stiffness, double forceChange, DeviceMotion& device) {
   const auto stepOf = [&](int framesAgo) {
@@ -201,8 +204,9 @@ void learnFollowing(const BlendedSurface& surface, std::span<const ProxyContact>
                           [&](const ProxyContact& c) { return meanOver(surface, c, surface.steps[framesAgo]); });
   };
   const Vector3d last = stepOf(0), before = stepOf(1);
-  seeStep(last - before, device);
-  if (forceChange > 0) {  // between two frames' means, which lie half of each frame's way apart
+  const bool tells = device.sinceBefore < kMostMissed;
+  if (tells) seeStep(last - before, device);
+  if (tells && forceChange > 0) {  // between two frames' means, which lie half of each frame's way apart
     const auto half = [&](const Vector3d& sum) { return 0.5 * std::abs(normal.dot(sum)); };
     const double length = std::max(half(device.way[1] + device.way[2]), half(last + before));
     device.seen.forceLength += forceChange / stiffness * length;

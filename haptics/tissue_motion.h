@@ -71,6 +71,7 @@ void startFrame(const Eigen::Vector3d& lag, double duration, DeviceMotion& devic
 //   tissue may drift by itself.
 // - of a contact, how much its force changes per length that it or the device went, against the tool's stiffness:
 //   tissue that swings on its own, or has been knocked off, has steps that answer no way, but little force.
+// Neither does in a frame in whose second half it was touched.
 // `forceChange`, N: of the tissue's force along `normal`, over the frame that ended; 0 where it is not known.
 void learnFollowing(const BlendedSurface& surface, std::span<const ProxyContact> contacts,
                     const Eigen::Vector3d& normal, double stiffness, double forceChange, DeviceMotion& device);

@@ -225,7 +225,7 @@ TEST(TissueMotion, WhatVibratesInAStillGripIsFeltWhereItIs) {
 static double followedByForce(double series, double atOnce, int frames) {
   auto [surface, contact] = touchedTriangle(atOnce / (1 - atOnce) / 400);
   DeviceMotion device;
-  beginContact(surface, 1, contact, Vector3d::UnitY(), 400, device);
+  beginContact(surface, 0, contact, Vector3d::UnitY(), 400, device);
   for (int frame = 0; frame < frames; ++frame) {
     const Vector3d way(0, -1e-4, 0);
     device.way[0] += way;
@@ -242,6 +242,26 @@ TEST(TissueMotion, HowFarTouchedTissueFollowsIsSeenFromItsForce) {
   EXPECT_NEAR(followedByForce(0.01, 0.5, 20), 0.985, 3e-3);  // half as much again, to be safe
   EXPECT_NEAR(followedByForce(0.8, 0.5, 3), 0.5, 1e-12);     // not less than what it gives at once
   EXPECT_NEAR(followedByForce(0.8, 0.5, 20), 0.4, 1e-12);    // half as stiff again at most
+}
+
+// A touch late in a frame: what the tissue's own swing changed by is many times what the touch moved it, and says that
+// it follows all the way. It felt like nothing for a frame, where a liver that swung back was met.
+TEST(TissueMotion, AFrameThatEndsAsItTouchesTellsNothing) {
+  for (const double since : {0.3, 0.9}) {
+    auto [surface, contact] = touchedTriangle(1 / 400.0);  // follows by a half at once
+    DeviceMotion device;
+    surface.steps[0].assign(3, Vector3d(0, 3e-4, 0));
+    beginContact(surface, since, contact, Vector3d::UnitY(), 400, device);
+    device.way[0] += Vector3d(0, -(1 - since) * 2e-3, 0);
+    startFrame(Vector3d::Zero(), surface.duration, device);
+    surface.steps[1] = surface.steps[0];
+    surface.steps[0].assign(3, Vector3d(0, -8e-4, 0));
+    learnFollowing(surface, {&contact, 1}, Vector3d::UnitY(), 400, 1e-3, device);
+    if (since > 0.5)
+      EXPECT_NEAR(device.follows[0], 0.5, 1e-12);
+    else
+      EXPECT_GT(device.follows[0], 0.7);
+  }
 }
 
 // A shake of which the hand feels a mass and a damper too much, `late` frames after the tissue gave it; N, RMS of what
