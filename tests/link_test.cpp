@@ -49,7 +49,7 @@ TEST(Link, BendingCostsEnergyWhateverTheTwist) {
   for (LinkSection& s : model->links[0].sections) s.bendingMomentU *= 36;
   b.model = model;
   b.surface = SurfaceMode::skin;
-  b.steered[0].factors.torsion = 1e-9;
+  b.steered = {{{.torsion = 1e-9}}};
   Random random(7);
   for (int trial = 0; trial < 20; ++trial) {
     World world(weightless(), {b});

@@ -195,7 +195,8 @@ void readDrivenSpheres(const XmlElement& body, SceneBody& out) {
 void readSteeredLinks(const XmlElement& body, SceneBody& out) {
   for (const XmlElement* e : childrenOf(body, "links")) {
     SteeredLinks links;
-    readChoice(*e, "select", {"all"}, 0);
+    if (e->find("select") && readText(*e, "select") != "all")
+      refuse(*e, "select", "expected all, or box, sphere or plane instead");
     const auto given = [&](const RegionForm& form) { return e->find(form.word) != nullptr; };
     const auto regions = std::count_if(kRegionForms.begin(), kRegionForms.end(), given);
     if (regions + (e->find("select") != nullptr) > 1)

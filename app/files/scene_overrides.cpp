@@ -33,12 +33,12 @@ void listTargets(XmlElement& element, const std::string& prefix, std::vector<Tar
 
 // So that light.intensity can be overridden where the scene leaves <light> to its defaults. An element that cannot be
 // empty has none.
-void addOptionalSingles(XmlElement& element) {
+void addOptionalElements(XmlElement& element) {
   const XmlRule& rule = ruleOf(sceneRules(), element.name);
   for (const XmlRule::Child& child : rule.children) {
     const bool present = std::any_of(element.children.begin(), element.children.end(),
                                      [&](const XmlElement& e) { return e.name == child.name; });
-    if (present || child.least > 0 || child.most != 1 || !ruleOf(sceneRules(), child.name).required.empty()) continue;
+    if (present || child.least > 0 || !child.addable || !ruleOf(sceneRules(), child.name).required.empty()) continue;
     XmlElement added;
     added.name = child.name;
     added.where = element.where;
@@ -46,7 +46,7 @@ void addOptionalSingles(XmlElement& element) {
     element.children.push_back(added);
   }
   for (XmlElement& child : element.children)
-    if (child.name == "body") addOptionalSingles(child);
+    if (child.name == "body") addOptionalElements(child);
 }
 
 // A wrong name of a body or tool is the likeliest mistake: of paths with the same kind of element and attribute, if
@@ -98,7 +98,7 @@ OverriddenAttribute applyOverride(XmlElement& root, const SceneOverride& overrid
 }  // namespace
 
 std::vector<OverriddenAttribute> applyOverrides(XmlElement& root, const std::vector<SceneOverride>& overrides) {
-  if (!overrides.empty()) addOptionalSingles(root);
+  if (!overrides.empty()) addOptionalElements(root);
   std::vector<OverriddenAttribute> out;
   out.reserve(overrides.size());
   for (const SceneOverride& override : overrides) out.push_back(applyOverride(root, override));

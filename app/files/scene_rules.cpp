@@ -23,7 +23,7 @@ const XmlRules& sceneRules() {
       {"body",
        {"name", "model", "tissue", "look"},
        {"position", "orientation", "links", "surface", "reference"},
-       {{"fix", 0, many}, {"drive", 0, many}, {"load", 0, many}, {"links", 0, many}, {"neighbours", 0, 1}}},
+       {{"fix", 0, many}, {"drive", 0, many}, {"load", 0, many}, {"links", 0, many, true}, {"neighbours", 0, 1}}},
       {"fix", {}, {"sphere", "spheres", "box", "plane", "vertices", "dof"}, {}},
       {"drive", {"sphere", "axis", "amplitude", "frequency"}, {"phase", "velocity", "dof"}, {}},
       {"load", {}, {"force", "from", "to", "box", "sphere", "plane", "vertices", "file"}, {}},

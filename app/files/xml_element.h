@@ -32,6 +32,7 @@ struct XmlRule {
   struct Child {
     std::string name;
     int least = 0, most = std::numeric_limits<int>::max();
+    bool addable = most == 1;  // --set may add one that the file leaves out, where no attribute of it is required
   };
   std::string element;
   std::vector<std::string> required, optional;  // attributes
