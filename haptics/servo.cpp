@@ -115,7 +115,8 @@ static Vector3d placeLeft(const ServoTool& tool) {
 // device has left the late surface, plus the motion's part, never pulling. The motion's part is bounded by the largest
 // that the spring has been in this contact, so that force begins without a step on a surface that already moves.
 // Across, a slipping contact is dragged by friction alone, which the proxy's position already holds; one that sticks by
-// the coupling and the motion. Neither by more than friction carries.
+// the coupling and the motion; off the late surface as when it was touched last, in the ratio of the pushes. Never by
+// more than friction carries.
 static Vector3d contactForce(const BlendedSurface& surface, double alpha, const Vector3d& way, ServoTool& tool) {
   tool.estimate = tool.push = 0;
   if (!tool.isLeaving) return Vector3d::Zero();
