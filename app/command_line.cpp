@@ -111,7 +111,9 @@ CLI::Validator wholeNumberFrom(int low, int high) {
 
 void addOverrides(CLI::App& command, RunArguments& a) {
   command
-      .add_option("--set", a.sets, "replace one value of the scene, e.g. body.gallbladder.surface=skin (repeatable)")
+      .add_option("--set", a.sets,
+                  "replace one value of the scene: element[.name].attribute, children behind their parent, e.g. "
+                  "clock.duration=4, body.gallbladder.surface=skin, body.liver.links.torsion=2 (repeatable)")
       ->type_name("PATH=VALUE")
       ->allow_extra_args(false);
   command

@@ -43,13 +43,12 @@ BuildOptions buildOptions(const BuildArguments& a) {
 }
 
 void addCoverOptions(CLI::App& c, BuildArguments& a) {
-  CLI::Option* spheres =
-      c.add_option(
-           "--spheres", a.options.settings.spheres,
-           "number of filling spheres; of several meshes together: shared out so that the largest gap, in metres, "
-           "is about the same for all")
-          ->check(wholeNumberFrom(1, kSpheresMax))
-          ->capture_default_str();
+  CLI::Option* spheres = c.add_option("--spheres", a.options.settings.spheres,
+                                      "number of filling spheres, of --method cover; of several meshes together: "
+                                      "shared out so that the largest gap, in metres, "
+                                      "is about the same for all")
+                             ->check(wholeNumberFrom(1, kSpheresMax))
+                             ->capture_default_str();
   CLI::Option* gap =
       c.add_option(
            "--gap", a.options.settings.gap,
@@ -80,22 +79,25 @@ CLI::Validator compressible() {
 void addIdentification(CLI::App& c, BuildArguments& a) {
   CLI::Option* identify = c.add_flag(
       "--identify", a.options.identify,
-      fmt::format("find the links' stiffness by finite elements of the very mesh, held as --fix says, for bodies that "
+      fmt::format("find the links' stiffness by finite elements of the one mesh, held as --fix says, for bodies that "
                   "are no network of beams; seconds for a few spheres, much longer for many, {} at most",
                   kIdentifiedSpheresMax));
   c.add_option("--fix", a.options.fix,
                "what scenes hold, as their <fix>: box=x0,y0,z0,x1,y1,z1, sphere=x,y,z,r, plane=nx,ny,nz,d (m) or "
-               "vertices=FILE.csv; may be given more than once")
+               "vertices=FILE.csv; may be given more than once. A box, sphere or plane holds the material behind its "
+               "triangles, too, vertices the surface alone")
       ->type_name("REGION")
       ->allow_extra_args(false)
       ->needs(identify);
-  c.add_option("--poisson", a.options.identification.poisson, "Poisson's ratio of the tissue, 0 to less than 0.5")
+  c.add_option("--poisson", a.options.identification.poisson,
+               "Poisson's ratio of the tissue that a scene gives it, 0 to less than 0.5")
       ->check(compressible())
       ->needs(identify)
       ->capture_default_str();
-  c.add_option("--link-form", a.linkForm,
-               "six scalars per link; any stiffness between its two frames; and one that couples the links of a cell: "
-               "nearer, with shorter substeps")
+  c.add_option(
+       "--link-form", a.linkForm,
+       "diagonal: six scalars per link; uncoupled: any stiffness between its two frames; full: couples the links "
+       "of a cell, too, which is nearer, with shorter substeps")
       ->check(CLI::IsMember(namesOf(LinkForm{})))
       ->needs(identify)
       ->capture_default_str();

@@ -94,7 +94,8 @@ struct Scene {
   std::vector<CameraKey> camera;                 // at least one, strictly increasing time, the first at 0
   double lightIntensity = 1;                     // >= 0
   double lightReferenceDistance = 0.15;          // m, > 0; where intensity 1 exposes a surface fully; files say it, or
-                                                 // it is from the light to the camera's first target
+                                                 // it is to the camera's first target, from the light's position or
+                                                 // from the camera
   Eigen::Vector3d lightOffset{0.012, 0.012, 0};  // m, in the camera's frame
   std::optional<Eigen::Vector3d> lightPosition;  // m, world: instead of beside the lens
   std::optional<Eigen::Vector3d> haze;           // linear RGB, >= 0
