@@ -157,11 +157,11 @@ static void requireDrivenFree(const Scene& scene, const SceneBody& body) {
 }
 
 static void requireSteeredLinks(const Scene& scene, const SceneBody& body) {
+  const std::vector<Eigen::Vector3d> middles = linkMiddles(body);
   for (std::size_t k = 0; k < body.steered.size(); ++k) {
     const std::optional<Region>& where = body.steered[k].where;
-    const std::vector<Eigen::Vector3d> middles = linkMiddles(body);
-    const auto lies = [&](const Eigen::Vector3d& middle) { return !where || contains(*where, middle); };
-    if (!std::any_of(middles.begin(), middles.end(), lies))
+    const auto lies = [&](const Eigen::Vector3d& middle) { return contains(*where, middle); };
+    if (where && std::none_of(middles.begin(), middles.end(), lies))
       throw inputError(scene.path, body.steeredAt[k],
                        fmt::format("no link of body \"{}\" has its middle in here", body.name));
   }
