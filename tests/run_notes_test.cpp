@@ -66,8 +66,8 @@ TEST_F(RunNotes, TissueTooStiffForExplicitSteps) {
 
 TEST_F(RunNotes, AFinThatNoSphereReachesInto) {
   const auto notesWith = [&](const std::string& spheres) {
-    return complaints(run(
-        {"build", MEDULLA_SOURCE_DIR "/assets/dolphin/dolphin.obj", "--spheres", spheres, "-o", "dolphin.model.xml"}));
+    const std::string dolphin = MEDULLA_SOURCE_DIR "/assets/dolphin/dolphin.obj";
+    return complaints(run({"build", dolphin, "--spheres", spheres, "-o", "dolphin.model.xml"}));
   };
   const Notes few = notesWith("7");
   ASSERT_EQ(few.size(), 1u);
