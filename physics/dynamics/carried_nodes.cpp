@@ -45,7 +45,7 @@ void hang(WorldData& d, const HostRange& range) {
 void placeCarriedNodes(WorldData& d) {
   for (const HostRange& range : d.awake.skinOnLinks) placeOnLink(d, range);
   for (const HostRange& range : d.awake.skinOnSpheres)
-    range.onFrames ? placeOnFrames(d, range) : placeOnSphere(d, range);
+    range.onFrames ? placeSkinOnFrames(d, range) : placeOnSphere(d, range);
   for (const HostRange& range : d.awake.carriedOnLinks) {
     placeOnLink(d, range);
     hang(d, range);

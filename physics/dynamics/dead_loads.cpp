@@ -65,7 +65,7 @@ void pushFrames(WorldData& d, const LoadedHost& loaded) {
   const SkinHost& host = s.hosts[loaded.host];
   const HomeFrame home = homeFrame(s, host);
   SkinTermState* states = s.termStates.data() + host.firstTerms;
-  seeFrames(s, host, home, states);
+  seeFrames<false>(s, host, home, states);
   std::fill_n(s.termLoads.begin(), 4 * (host.endTerms - host.firstTerms), SkinTermLoad{});
   Lanes3 sum = zeroVectors(), moment = sum;
   for (int k = loaded.first; k < loaded.end; ++k) {

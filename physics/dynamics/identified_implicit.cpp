@@ -224,7 +224,7 @@ void carryOnFrames(WorldData& d, const HostRange& range, std::vector<Quad>& carr
   const SkinHost& host = s.hosts[s.skin[s.ofNodeGroup[range.firstGroup]].host];
   const HomeFrame home = homeFrame(s, host);
   SkinTermState* states = &s.termStates[host.firstTerms];
-  seeFrames(s, host, home, states);
+  seeFrames<true>(s, host, home, states);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const SkinPlace place = placeSkin<true>(s, s.skin[s.ofNodeGroup[g]], states);
     const Lanes3 along = cross(home.omega, rotate(home.rotation, place.offset));

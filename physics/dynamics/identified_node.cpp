@@ -23,7 +23,7 @@ SeenHost see(const Identified& s, const SkinHost& host) {
   thread_local std::vector<SkinTermState> room;  // kept: tools ask in every substep
   room.resize(host.endTerms - host.firstTerms);
   const SeenHost out{homeFrame(s, host), room.data()};
-  seeFrames(s, host, out.home, room.data());
+  seeFrames<false>(s, host, out.home, room.data());
   return out;
 }
 

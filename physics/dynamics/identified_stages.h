@@ -21,8 +21,9 @@ void dropWholeTurns(WorldData&, int body);
 // identified_surface.cpp: the nodes of a range that hangs on frames.
 void pullOnFrames(WorldData&, const HostRange&);
 void returnToFrames(WorldData&, const HostRange&, Lanes pressure);
-void placeOnFrames(WorldData&, const HostRange&);
-double normalEnergy(const WorldData&, int node);  // J, of what the attachment is stiffer along the normal
+void placeOnFrames(WorldData&, const HostRange&);      // carried nodes, which may move by themselves in the next frame
+void placeSkinOnFrames(WorldData&, const HostRange&);  // nodes without mass: where they are is all that is asked
+double normalEnergy(const WorldData&, int node);       // J, of what the attachment is stiffer along the normal
 
 // What acts at the places of a range's nodes (N, N m, world) goes to their frames; at the state of the last
 // pullOnFrames().

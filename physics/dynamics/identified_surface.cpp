@@ -20,9 +20,10 @@ SkinTermState* statesOf(Identified& s, const SkinHost& host) {
 }
 
 // The host's frames, seen from its home.
+template <bool withRates>
 MEDULLA_INLINE HomeFrame seeHost(Identified& s, const SkinHost& host) {
   const HomeFrame home = homeFrame(s, host);
-  seeFrames(s, host, home, statesOf(s, host));
+  seeFrames<withRates>(s, host, home, statesOf(s, host));
   return home;
 }
 
@@ -32,7 +33,7 @@ void pullOnFrames(WorldData& d, const HostRange& range) {
   Nodes& n = d.nodes;
   Identified& s = d.identified;
   const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
-  const HomeFrame home = seeHost(s, host);
+  const HomeFrame home = seeHost<true>(s, host);
   const NodeGroup* constants = constantsOf(n, range);
   const Lanes relaxation = splat(range.relaxation);
   Lanes volume = splat(0);
@@ -77,7 +78,7 @@ void placeOnFrames(WorldData& d, const HostRange& range) {
   Nodes& n = d.nodes;
   Identified& s = d.identified;
   const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
-  const HomeFrame home = seeHost(s, host);
+  const HomeFrame home = seeHost<true>(s, host);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const SkinPlace place = placeSkin<true>(s, s.skin[s.ofNodeGroup[g]], statesOf(s, host));
     const Lanes3 offset = rotate(home.rotation, place.offset);
@@ -87,6 +88,16 @@ void placeOnFrames(WorldData& d, const HostRange& range) {
     const Lanes3 velocity = home.velocity + cross(home.omega, offset) + rotate(home.rotation, place.offsetRate);
     put(velocity, n.velocity[g]);
     put(rotate(home.rotation, n.groups[g].restArea), n.area[g]);
+  }
+}
+
+void placeSkinOnFrames(WorldData& d, const HostRange& range) {
+  Identified& s = d.identified;
+  const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
+  const HomeFrame home = seeHost<false>(s, host);
+  for (int g = range.firstGroup; g < range.endGroup; ++g) {
+    const SkinPlace place = placeSkin<false>(s, s.skin[s.ofNodeGroup[g]], statesOf(s, host));
+    put(home.position + rotate(home.rotation, place.offset), d.nodes.position[g]);
   }
 }
 

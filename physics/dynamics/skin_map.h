@@ -51,7 +51,8 @@ MEDULLA_INLINE Spare spareOf(const SkinTerms& term, Lanes poisson, Lanes along) 
   return {term.length * fma(slope, all - y, fnma(two * inverse, y, y)), slope};
 }
 
-// Sets the host's SkinTermStates; `states` has one for each of its terms.
+// Sets the host's SkinTermStates, of the rates where they are asked for; `states` has one for each of its terms.
+template <bool withRates>
 MEDULLA_INLINE void seeFrames(const Identified& s, const SkinHost& host, const HomeFrame& home, SkinTermState* states) {
   const Lanes half = splat(0.5), poisson = splat(host.poisson);
   for (int t = host.firstTerms; t < host.endTerms; ++t, ++states) {
@@ -63,19 +64,21 @@ MEDULLA_INLINE void seeFrames(const Identified& s, const SkinHost& host, const H
     put(turn, states->turn);
     const Lanes3 from = frames.position - home.position, place = rotateBack(home.rotation, from);
     put(place, states->place);
-    put(place - terms.restPlace, states->way);
+    const Lanes3 way = place - terms.restPlace;
+    const Spare spare = spareOf(terms, poisson, dot(way, terms.axis));
+    states->spareSlope = spare.slope;
+    const Lanes3 beyond = spare.value * terms.axis;
+    put(beyond, states->spare);
+    put(way - beyond, states->way);
+    if (!withRates) continue;
     const Lanes3 velocity = gatherQuads(s.frames.data(), terms.frame, &FrameState::velocity) - home.velocity;
-    put(rotateBack(home.rotation, velocity - cross(home.omega, from)), states->wayRate);
+    const Lanes3 wayRate = rotateBack(home.rotation, velocity - cross(home.omega, from));
     const Lanes3 apart =
         rotateBack(home.rotation, gatherQuads(s.frames.data(), terms.frame, &FrameState::angularVelocity) - home.omega);
     put(fma(r.cosine, apart, half * cross(apart, turn)), states->turnRate);
-    const Spare spare = spareOf(terms, poisson, dot(states->way, terms.axis));
-    const Lanes spareRate = spare.slope * dot(states->wayRate, terms.axis);
-    states->spareSlope = spare.slope;
-    put(spare.value * terms.axis, states->spare);
-    put(spareRate * terms.axis, states->spareRate);
-    put(states->way - states->spare, states->way);
-    put(states->wayRate - states->spareRate, states->wayRate);
+    const Lanes3 beyondRate = (spare.slope * dot(wayRate, terms.axis)) * terms.axis;
+    put(beyondRate, states->spareRate);
+    put(wayRate - beyondRate, states->wayRate);
   }
 }
 

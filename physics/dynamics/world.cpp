@@ -321,12 +321,17 @@ Energies World::energies() const {
 
 double World::volumeRatio(int body) const {
   const BodyRange& r = data_->ranges.at(body);
+  thread_local std::vector<Quad> nodes;  // kept: asked in every frame
+  nodes.resize(r.node.size());
+  for (std::size_t i = 0; i < r.node.size(); ++i) nodes[i] = quadOf(vectorAt(data_->nodes.position, r.node[i]));
   // About the first node, as in enclosedVolume().
-  const Eigen::Vector3d origin = vectorAt(data_->nodes.position, r.node[0]);
-  const auto at = [&](int node) -> Eigen::Vector3d { return vectorAt(data_->nodes.position, r.node[node]) - origin; };
-  double volume = 0;
-  for (const auto& t : data_->bodies[body].model->triangles) volume += at(t[0]).dot(at(t[1]).cross(at(t[2])));
-  return volume / (6 * r.restVolume);
+  const Lanes origin = load(nodes[0]);
+  Lanes volume = splat(0);
+  for (const auto& t : data_->bodies[body].model->triangles) {
+    const Lanes a = load(nodes[t[0]]), b = load(nodes[t[1]]), c = load(nodes[t[2]]);
+    volume = fma(a - origin, crossProduct(b - a, c - a), volume);
+  }
+  return sumOfLanes(volume) / (6 * r.restVolume);
 }
 
 double World::lowestFrequency(int body) const {

@@ -168,14 +168,16 @@ struct GroupHost {
 };
 
 struct Nodes {
-  int count = 0;                           // with pads
-  std::vector<Lanes3> position, velocity;  // m, m/s, per group, as all that a node shares with its host's nodes alone
-  StageArray<Lanes3> force;                // N, of the current substep, weight apart; dynamic nodes only
-  StageArray<Lanes3> offset;               // m, from the anchors' bases to them; of the current substep
-  StageArray<Lanes3> area;                 // m2, of the surface at rest, carried along; of the current substep
-  StageArray<Quad> displaced;              // m, per node: from where the host would carry it; of the current substep
-  std::vector<double> swollen;             // m3, per host: between its nodes and their anchors; of the current substep
-  std::vector<double> mass, inverseMass;   // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
+  int count = 0;  // with pads
+  // m, m/s, per group, as all that a node shares with its host's nodes alone. Velocities of skins mean nothing: what
+  // acts on them asks their hosts.
+  std::vector<Lanes3> position, velocity;
+  StageArray<Lanes3> force;               // N, of the current substep, weight apart; dynamic nodes only
+  StageArray<Lanes3> offset;              // m, from the anchors' bases to them; of the current substep
+  StageArray<Lanes3> area;                // m2, of the surface at rest, carried along; of the current substep
+  StageArray<Quad> displaced;             // m, per node: from where the host would carry it; of the current substep
+  std::vector<double> swollen;            // m3, per host: between its nodes and their anchors; of the current substep
+  std::vector<double> mass, inverseMass;  // kg, 1/kg; 0 on pads and on skin; inverse 0 on fixed nodes
   std::vector<NodeGroup> groups;
   std::vector<GroupHost> groupHosts;
   std::vector<HostRange> onLinks, onSpheres;          // dynamic nodes, first in the arrays
