@@ -46,7 +46,7 @@ struct Buckets::Data {
   // The sphere around both frames, its radius (m) inflated as the buckets' bounds are. Every query asks them all: side
   // by side they fit a first-level cache.
   std::vector<BoundGroup> bounds;
-  std::vector<int> near;  // result of the last near(): reserved for all triangles
+  std::vector<int> near;  // result of the last near() or above(): reserved for all triangles
 
   Data() = default;
   Data(const Data&) = delete;
@@ -397,6 +397,20 @@ const std::vector<int>& Buckets::near(const Vector3d& centre, double distance) c
     rtcPointQuery(bucket.scene, &point, &context, addCandidate, &query);
   });
   std::sort(found.begin(), found.end());
+  return found;
+}
+
+const std::vector<int>& Buckets::above(const Vector3d& p) const {
+  std::vector<int>& found = data_->near;
+  found.clear();
+  const std::vector<Bucket>& buckets = data_->buckets;
+  for (std::size_t k = 0; k < buckets.size(); ++k) {
+    const BoundGroup& group = data_->bounds[k / 4];
+    const Vector3d away = vectorOf(group.centre, static_cast<int>(k % 4)) - p;
+    const double reach = group.radius[k % 4];
+    if (away.head<2>().squaredNorm() <= reach * reach && away.z() >= -reach)
+      found.insert(found.end(), buckets[k].triangles.begin(), buckets[k].triangles.end());
+  }
   return found;
 }
 

@@ -93,6 +93,8 @@ class Buckets {
   // Triangles whose box around both frames, grown by largestRadius, comes within `distance` of `centre`, sorted: a
   // superset of those that come so near at any alpha. Valid until the next call.
   const std::vector<int>& near(const Eigen::Vector3d& centre, double distance) const;
+  // A superset of the triangles that lie over p along z at any alpha. Valid until the next call of either.
+  const std::vector<int>& above(const Eigen::Vector3d& p) const;
 
  private:
   struct Data;

@@ -12,7 +12,7 @@
 #include "haptics/force_bounds.h"
 #include "haptics/force_shading.h"
 #include "haptics/half_spaces.h"
-#include "physics/model/mesh_topology.h"
+#include "haptics/inside.h"
 
 namespace medulla {
 
@@ -261,83 +261,6 @@ void followDevice(const Buckets& buckets, double alpha, const ToolSettings& tool
   proxy.slideDirection.setZero();
 }
 
-// ---- Inside and outside ----------------------------------------------------------------------------------
-
-namespace {
-struct Surroundings {
-  double winding = 0;  // how many bodies it is in
-  double distance = std::numeric_limits<double>::infinity();
-  Vector3d exit = Vector3d::Zero();  // just outside of the nearest of the triangles that it is behind
-};
-}  // namespace
-
-// Over the triangle's point of these weights, a hundredth nearer to its middle: over an edge that has folded in, it
-// could be below the other triangle.
-static Vector3d justOutside(const Triangle& t, const Vector3d& weights, double toolRadius) {
-  const Vector3d outward = doubleArea(t).normalized();
-  return pointAt(t, 0.99 * weights + Vector3d::Constant(0.01 / 3)) + kStandOff * toolRadius * outward;
-}
-
-static Surroundings lookAround(const BlendedSurface& surface, double alpha, double toolRadius, const Vector3d& p) {
-  Surroundings out;
-  double wayOut = out.distance;
-  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
-    const Triangle triangle = surface.triangle(int(t), alpha);
-    out.winding += solidAngle(triangle.a, triangle.b, triangle.c, p) / (4 * std::numbers::pi);
-    const TrianglePoint q = closestPoint(triangle, p);
-    const double distance = (q.point - p).norm();
-    out.distance = std::min(out.distance, distance);
-    if (distance >= wayOut || doubleArea(triangle).dot(p - q.point) > 0) continue;
-    wayOut = distance;
-    out.exit = justOutside(triangle, q.weights, toolRadius);
-  }
-  return out;
-}
-
-// Out through the nearest triangle that it is behind, as often as needed: bodies may overlap, and parts of a surface
-// that trembles be turned inside out.
-static Vector3d outOfBodies(const BlendedSurface& surface, double alpha, double toolRadius, Vector3d p) {
-  const std::size_t passes = surface.firstNode.size() + 4;
-  for (std::size_t pass = 0; pass < passes; ++pass) {
-    const Surroundings around = lookAround(surface, alpha, toolRadius, p);
-    if (around.winding < 0.5) break;
-    p = around.exit;
-  }
-  return p;
-}
-
-// Of a triangle around its point of these weights, one of which is 0 on an edge and two at a corner.
-static double angleAround(const Triangle& triangle, const Vector3d& weights) {
-  const int zeros = int(std::count(weights.data(), weights.data() + 3, 0.0));
-  if (zeros < 2) return (zeros == 0 ? 2 : 1) * std::numbers::pi;
-  const Vector3d corner = pointAt(triangle, weights);
-  Vector3d sides[2];
-  int count = 0;
-  for (const Vector3d* other : {&triangle.a, &triangle.b, &triangle.c})
-    if (*other != corner && count < 2) sides[count++] = (*other - corner).normalized();
-  return count < 2 ? 0 : std::acos(std::clamp(sides[0].dot(sides[1]), -1.0, 1.0));
-}
-
-// Of the triangles that are nearest to it, by their normals weighted by the angles around the nearest point (Baerentzen
-// and Aanaes 2005): of a surface that nowhere passes through itself, exact.
-static bool liesBehind(const Buckets& buckets, double alpha, const Vector3d& p) {
-  constexpr double kSame = 1e-9;
-  double distance = std::numeric_limits<double>::infinity();
-  Vector3d nearest = p, normal = Vector3d::Zero();
-  for (const int t : buckets.near(p, 0)) {
-    const Triangle triangle = buckets.surface().triangle(t, alpha);
-    const TrianglePoint q = closestPoint(triangle, p);
-    const double d = (p - q.point).norm();
-    if (d > (1 + kSame) * distance) continue;
-    if (d < (1 - kSame) * distance) normal.setZero();
-    distance = d;
-    nearest = q.point;
-    const Vector3d area = doubleArea(triangle);
-    normal += angleAround(triangle, q.weights) * area.normalized();
-  }
-  return normal.dot(p - nearest) < 0;
-}
-
 // ---- The surface moves -----------------------------------------------------------------------------------
 
 // The mean motion of what the proxy touches. Without it a still tool feels nothing of a surface that moves through it.
@@ -393,20 +316,20 @@ static int nearestTriangle(const Buckets& buckets, double alpha, const Vector3d&
 // and where no end of passes is found, some are passed. Then it goes on from just outside of the triangle that was
 // nearest to it, over the place that was nearest.
 //
-// Looking around takes time that grows with the body: only from behind what is nearest, and where a contact was lost.
+// More than what is nearest is asked only from behind that, and where a contact was lost.
 static void keepOutside(const Buckets& buckets, double alphaBefore, double alpha, const Vector3d& start, Proxy& proxy) {
   const bool lost = proxy.lookNext && !proxy.inContact();
   proxy.lookNext = proxy.inContact();
   if (!lost && !liesBehind(buckets, alpha, proxy.centre)) return;
-  const double toolRadius = proxy.toolRadius;
-  if (lookAround(buckets.surface(), alpha, toolRadius, proxy.centre).winding < 0.5) return;
+  if (windingNumber(buckets, alpha, proxy.centre) <= 0) return;
+  const double standOff = kStandOff * proxy.toolRadius;
   double distance = std::numeric_limits<double>::infinity();
   const int t = nearestTriangle(buckets, alphaBefore, start, distance);
   if (t >= 0) {
     const Vector3d weights = closestPoint(buckets.surface().triangle(t, alphaBefore), start).weights;
-    proxy.centre = justOutside(buckets.surface().triangle(t, alpha), weights, toolRadius);
+    proxy.centre = justOutside(buckets.surface().triangle(t, alpha), weights, standOff);
   }
-  proxy.centre = outOfBodies(buckets.surface(), alpha, toolRadius, proxy.centre);
+  proxy.centre = outOfBodies(buckets, alpha, standOff, proxy.centre);
   proxy.lookNext = true;
 }
 
@@ -481,8 +404,8 @@ Vector3d Proxy::feltNormal() const {
 Proxy placeProxy(const Buckets& buckets, const Vector3d& device, double toolRadius) {
   Proxy proxy;
   proxy.toolRadius = toolRadius;
-  proxy.centre = outOfBodies(buckets.surface(), 1, toolRadius, device);
-  proxy.radius = std::min(toolRadius, lookAround(buckets.surface(), 1, toolRadius, proxy.centre).distance);
+  proxy.centre = outOfBodies(buckets, 1, kStandOff * toolRadius, device);
+  proxy.radius = std::min(toolRadius, distanceToSurface(buckets.surface(), 1, proxy.centre));
   return proxy;
 }
 
