@@ -100,13 +100,13 @@ void readView(const RenderArguments& a, ViewOptions& view) {
 }
 
 RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) {
+  RunArguments run = a.run;
+  run.scene = scene;
+  for (std::string* file : {&run.log, &run.frameTimes}) *file = fileOf(scene, *file);
+  for (std::string& record : run.records) record = fileOf(scene, record);
+  for (std::vector<std::string>& surface : run.surfaces) surface.at(1) = fileOf(scene, surface.at(1));
   RenderOptions options;
-  options.run = runOptions(a.run);
-  options.run.scene = scene;
-  options.run.logPath = fileOf(scene, a.run.log);
-  options.run.frameTimesPath = fileOf(scene, a.run.frameTimes);
-  for (SurfaceRequest& surface : options.run.surfaces) surface.path = fileOf(scene, surface.path);
-  for (auto& [tool, path] : options.run.records) path = fileOf(scene, path);
+  options.run = runOptions(run);
   options.cacheToRead = fileOf(scene, a.cache);
   for (const std::string& output : a.outputs) options.outputs.push_back(fileOf(scene, output));
   if (options.outputs.empty()) options.outputs = {fileOf(scene, a.still.empty() ? "{scene}.mp4" : "{scene}.png")};

@@ -120,8 +120,14 @@ TEST_F(BadInput, OutputsThatAreCalledAsAnotherKindOfFileAreWrongUsage) {
     expectRefused(run({"replay", "own/organ.xml", option, "own/organ.xml"}),
                   fmt::format("{} own/organ.xml: expected a file that ends in {}", option, ending), 2);
   expectRefused(run({"replay", "own/organ.xml", "--record", "probe=own/organ.xml"}), "ends in .csv", 2);
-  expectRefused(run({"render", "own/organ.xml", "--log", "{scene}.obj", "-o", "a.mp4"}), "--log {scene}.obj: expected",
+  expectRefused(run({"render", "own/organ.xml", "--log", "{scene}.obj", "-o", "a.mp4"}), "--log organ.obj: expected",
                 2);
+  expectRefused(run({"render", "own/organ.xml", "--log", "own/{scene}.xml", "-o", "a.mp4"}), "ends in .csv", 2);
+  folder.write("organ.txt", "mine");
+  for (const char* option : {"--log", "--frame-times", "--record"})
+    expectRefused(run({"render", "own/organ.xml", option, "{scene}.txt", "-o", "a.mp4"}), "does not exist yet", 2);
+  EXPECT_EQ(read("organ.txt"), "mine");
+  std::filesystem::remove(folder / "organ.txt");
   expectRefused(run({"replay", "own/organ.xml", "--surface-at", "end", "own/organ.xml"}), "ends in .obj", 2);
   expectRefused(run({"build", mesh, "-o", "own/organ.ply"}), "-o own/organ.ply: expected a file that ends in .xml", 2);
   expectRefused(run({"build", mesh, "-o", "m.xml", "--report", "own/organ.xml"}), "--report own/organ.xml: exp", 2);

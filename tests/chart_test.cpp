@@ -120,6 +120,15 @@ TEST_F(ChartCommand, RunsThatFailAtOnceHaveACost) {
   EXPECT_TRUE(std::isfinite(std::stod(rows[1].at(cpu)))) << rows[1].at(cpu);
 }
 
+// As does one in which bodies do not even settle.
+TEST_F(ChartCommand, RunsThatFailWhileBodiesSettleHaveFailed) {
+  const ProgramResult r = chart({"--steps", "0.25,20", "--methods", "full", "--set", "dynamics.gravity=0 -9.81 0",
+                                 "--set", "clock.settle=0.5", "--set", "clock.duration=0.1"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_TRUE(r.out.starts_with("runs 2\nfailed 1\n")) << r.out;
+  EXPECT_EQ(rowsOf(folder / "out/chart.csv").at(1).at(14), "0");
+}
+
 TEST_F(ChartCommand, SmallerStepsComeNearerAndTooLargeOnesFail) {
   ProgramOptions withoutGnuplot;
   withoutGnuplot.path = folder.path();

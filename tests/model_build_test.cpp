@@ -35,6 +35,17 @@ TEST(SurfaceQueries, BallAgainstItsOwnMesh) {
   EXPECT_TRUE(segmentCrosses(tree, -1.5 * mesh.vertices[17], mesh.vertices[17], 17));
 }
 
+// Rays along a side of the tree's boxes meet what lies in it, on whichever side.
+TEST(SurfaceQueries, RaysInTheSidesOfABoxMeetIt) {
+  TriangleMesh mesh;
+  for (int k = 0; k < 8; ++k) mesh.vertices.emplace_back(k & 1, k >> 1 & 1, k >> 2);
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  const SurfaceTree tree = makeSurfaceTree(mesh);
+  for (const double x : {0., 0.5, 1.}) EXPECT_EQ(firstHit(tree, {x, 0.3, -1}, Vector3d::UnitZ(), 10), 1) << x;
+  EXPECT_FALSE(std::isfinite(firstHit(tree, {1.1, 0.3, -1}, Vector3d::UnitZ(), 10)));
+}
+
 TEST(MassProperties, BoxFarFromTheOrigin) {
   TriangleMesh mesh;
   const Vector3d at(100, -50, 20), size(1, 2, 3);

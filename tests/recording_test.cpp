@@ -101,7 +101,8 @@ TEST_F(Recording, ColumnsByNameOrNumberWithUnitsSeparatorsAndForces) {
   std::replace(semicolon.begin(), semicolon.end(), ',', ';');
   std::replace(blank.begin(), blank.end(), ',', ' ');
   std::replace(tab.begin(), tab.end(), ',', '\t');
-  for (const std::string& text : {comma, semicolon, blank, tab}) {
+  const std::string commented = "# recorded 2026-01-02, lab 3; metres\n" + blank, late = "\r\n# t x y z; m\n" + comma;
+  for (const std::string& text : {comma, semicolon, blank, tab, commented, late}) {
     const Trajectory t = read("", inside, text);
     ASSERT_EQ(t.samples.size(), 2u);
     EXPECT_NEAR(t.samples[1].time, 0.01, 1e-15);

@@ -189,6 +189,14 @@ std::vector<RecordedFrame> framesToRecord(const LoadedScene& loaded) {
   return out;
 }
 
+// Of the body whose volume has changed most.
+double farthestVolumeRatio(const World& world) {
+  double out = 1;
+  for (int b = 0; b < static_cast<int>(world.bodies().size()); ++b)
+    if (std::abs(world.volumeRatio(b) - 1) > std::abs(out - 1)) out = world.volumeRatio(b);
+  return out;
+}
+
 Outcome execute(const ChartRun& run, const std::function<void(double)>& progress) {
   const LoadedScene loaded = loadRun(run.options);
   Outcome out;
@@ -196,24 +204,23 @@ Outcome execute(const ChartRun& run, const std::function<void(double)>& progress
   out.point.spheres = run.spheres;
   out.point.step = run.step;
   out.moments = framesToRecord(loaded);
-  Simulation simulation(loaded);
-  const double start = processCpuSeconds();
-  while (!simulation.finished() && !out.point.failedAt) {
-    checkInterrupt();
-    try {
-      simulation.advanceFrame();
-      recordFrames(simulation, simulation.finished(), out.moments);
-    } catch (const std::runtime_error&) {  // the state is not finite any more
-      out.point.failedAt = simulation.totals().simulated;
+  std::optional<Simulation> simulation;
+  double start = processCpuSeconds(), simulated = 1 / loaded.scene.dynamicsRate;  // at least a frame is tried
+  try {
+    simulation.emplace(loaded);  // bodies settle
+    start = processCpuSeconds();
+    while (!simulation->finished()) {
+      checkInterrupt();
+      simulated = simulation->time() + 1 / loaded.scene.dynamicsRate;
+      simulation->advanceFrame();
+      recordFrames(*simulation, simulation->finished(), out.moments);
+      progress(simulated);
     }
-    progress(simulation.totals().simulated);
+    out.point.volumeRatio = farthestVolumeRatio(simulation->world());
+  } catch (const NotFinite&) {
+    out.point.failedAt = simulation ? simulated : 0;
   }
-  out.point.cpu = (processCpuSeconds() - start) / simulation.totals().simulated;
-  for (int b = 0; b < static_cast<int>(loaded.scene.bodies.size()) && !out.point.failedAt; ++b) {
-    const double ratio = simulation.world().volumeRatio(b);
-    if (!out.point.volumeRatio || std::abs(ratio - 1) > std::abs(*out.point.volumeRatio - 1))
-      out.point.volumeRatio = ratio;
-  }
+  out.point.cpu = (processCpuSeconds() - start) / simulated;
   return out;
 }
 

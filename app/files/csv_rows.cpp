@@ -50,7 +50,7 @@ bool CsvRows::next() {
 
 char CsvRows::separatorOf(std::string_view text) {
   std::string_view row;
-  while (row.empty() && !text.empty()) row = takeLine(text);
+  while (row.empty() && !text.empty()) row = takeRow(text);
   for (const char separator : {',', ';'})
     if (row.find(separator) != std::string_view::npos) return separator;
   return ' ';

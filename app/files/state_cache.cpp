@@ -84,7 +84,8 @@ void exchangeQuaternion(Bytes& bytes, Quaternion& q) {
 template <typename Bytes, typename Vector>
 void exchangeNode(Bytes& bytes, Vector& node) {
   for (int a = 0; a < 3; ++a) {
-    auto value = static_cast<float>(node[a]);
+    float value = 0;
+    if constexpr (!Bytes::reads) value = static_cast<float>(node[a]);
     bytes.raw(value);
     if constexpr (Bytes::reads) node[a] = value;
   }

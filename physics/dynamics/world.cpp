@@ -154,7 +154,7 @@ void requireFinite(const WorldData& d, double time) {
                   "it was deformed beyond what substeps of {:.3g} s follow: use more substeps, or a stiffer tissue, or "
                   "lower what acts on it: gravity, loads, the tools' speed, stiffness or damping",
                   d.substep);
-    throw std::runtime_error(fmt::format("body '{}' is not finite at {:.6g} s: {}", d.bodies[b].name, time, cause));
+    throw NotFinite(fmt::format("body '{}' is not finite at {:.6g} s: {}", d.bodies[b].name, time, cause));
   }
 }
 

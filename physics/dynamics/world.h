@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -120,6 +121,11 @@ struct CreepReport {
 };
 
 struct WorldData;  // arrays laid out for the step; physics/dynamics/world_data.h
+
+// A body's state is not finite any more; says which, when and why.
+struct NotFinite : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 class World {
  public:

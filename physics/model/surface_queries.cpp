@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <numeric>
 
@@ -144,11 +145,17 @@ void trianglesWithin(const SurfaceTree& tree, const Vector3d& p, double within, 
             });
 }
 
+// `inverse`: of the direction, infinite along an axis that the ray is perpendicular to: there 0 times it, of an origin
+// on the box's very side, would be no number.
 static bool meetsBox(const SurfaceTree::Node& node, const Vector3d& origin, const Vector3d& inverse, double reach) {
   double enter = 0, leave = reach;
   for (int a = 0; a < 3; ++a) {
+    if (std::isinf(inverse[a])) {
+      if (origin[a] < node.low[a] || origin[a] > node.high[a]) return false;
+      continue;
+    }
     const double t0 = (node.low[a] - origin[a]) * inverse[a], t1 = (node.high[a] - origin[a]) * inverse[a];
-    enter = std::max(enter, std::min(t0, t1));  // a NaN from 0 * infinity leaves the slab open
+    enter = std::max(enter, std::min(t0, t1));
     leave = std::min(leave, std::max(t0, t1));
   }
   return enter <= leave * (1 + 1e-12) + 1e-12;
