@@ -1,7 +1,5 @@
 #include "render/video_writer.h"
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <cassert>
 #include <condition_variable>
@@ -158,14 +156,7 @@ void VideoWriter::write(const Image& image) {
 
 StageTimes::Stage VideoWriter::encoding() const {
   const std::lock_guard lock(data_->mutex);
-  StageTimes::Stage out = data_->encoding;
-  clockid_t clock{};
-  timespec now{};
-  // Of the picture that is at work, too.
-  const bool running = data_->feeder.joinable() && pthread_getcpuclockid(data_->feeder.native_handle(), &clock) == 0;
-  if (running && clock_gettime(clock, &now) == 0)
-    out.cpu = static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-  return out;
+  return data_->encoding;
 }
 
 void VideoWriter::finish(const std::function<void()>& goOn) {

@@ -29,7 +29,7 @@ bool isHeader(std::span<const std::string_view> cells, std::span<const std::stri
                     });
 }
 
-// Calls `row` for every row but a header, with the node of the vertex in its first column.
+// Calls `row` for every row but a header, with the vertex in its first column and its node.
 template <typename Row>
 void forEachVertex(std::string_view text, const std::string& name, const SoftBodyModel& model,
                    std::span<const std::string_view> columns, const Row& row) {
@@ -46,7 +46,7 @@ void forEachVertex(std::string_view text, const std::string& name, const SoftBod
     const int vertex = rows.index(0, columns[0], model.nodeOfInputVertex.size());
     const int node = model.nodeOfInputVertex[vertex];
     if (node < 0) rows.fail(fmt::format("vertex {} is none of the surface: repair dropped it from the mesh", vertex));
-    row(rows, node);
+    row(rows, vertex, node);
     any = true;
   }
   if (!any) throw inputError(name, 0, fmt::format("no rows, expected at least one of {}", expected));
@@ -56,7 +56,7 @@ void forEachVertex(std::string_view text, const std::string& name, const SoftBod
 
 std::vector<int> parseVertices(std::string_view text, const std::string& name, const SoftBodyModel& model) {
   std::vector<int> nodes;
-  forEachVertex(text, name, model, kVertexColumns, [&](const CsvRows&, int node) { nodes.push_back(node); });
+  forEachVertex(text, name, model, kVertexColumns, [&](const CsvRows&, int, int node) { nodes.push_back(node); });
   sortUnique(nodes);
   return nodes;
 }
@@ -69,8 +69,7 @@ std::vector<DeadLoad> parseVertexForces(std::string_view text, const std::string
                                         const DeadLoad& whole) {
   std::vector<DeadLoad> loads;
   std::vector<bool> loaded(model.nodeOfInputVertex.size());
-  forEachVertex(text, name, model, kForceColumns, [&](const CsvRows& row, int node) {
-    const int vertex = row.index(0, kForceColumns[0], loaded.size());
+  forEachVertex(text, name, model, kForceColumns, [&](const CsvRows& row, int vertex, int node) {
     if (loaded[vertex]) row.fail(fmt::format("vertex {} stands twice", vertex));
     loaded[vertex] = true;
     DeadLoad& load = loads.emplace_back(whole);

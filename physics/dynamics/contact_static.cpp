@@ -105,11 +105,11 @@ Nearest contactAt(const Foot& f, const Vector3d& p) {
   return {side * f.distance, side / f.distance * (p - f.point)};
 }
 
-// Triangles come with their distance of some time ago; meanwhile the ball has moved by at most `moved`.
 // What lies behind a surface is held to be in it only `behind` m deep: farther away it is beyond, as under a table.
 struct Depth {
   double within, behind;  // m, of the ball's centre
 };
+// Triangles come with their distance of some time ago; meanwhile the ball has moved by at most `moved`.
 Touches touchesOf(const StaticContactShape& shape, const TriangleDistance* begin, const TriangleDistance* end,
                   const Vector3d& p, const Depth& depth, double moved) {
   const double within = depth.within;

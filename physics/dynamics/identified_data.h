@@ -106,7 +106,7 @@ struct alignas(16) SkinShare {
   float map[18][4];  // 1 and m: three columns on the way, three on the turn; loaded by 16 bytes, as weights
   float weight[4];
   float along[4];            // 1: of a way along the term's axis, what it does along that axis
-  std::int32_t state, load;  // offsets in doubles of the frame's first number in SkinTermState, and in SkinTermLoad
+  std::int32_t term, state;  // the frame's number among its host's, and its first number's in SkinTermState, in doubles
 };
 
 struct SkinGroup {  // four nodes

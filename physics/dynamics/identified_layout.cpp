@@ -180,7 +180,7 @@ void addSkin(WorldData& d, int body, const BodyMechanics& mechanics, const std::
       const int term = terms.of(frame, place);
       SkinShare& share = shares[term];
       constexpr int kDoubles = sizeof(SkinTermState) / sizeof(double);
-      share.load = term;
+      share.term = term;
       share.state = kDoubles * (term / 4) + term % 4;
       setMap(share, l, rows[k], skin[k].weight, (place - terms.homePlace()).normalized());
     }
@@ -270,6 +270,7 @@ void layOutIdentified(WorldData& d, const std::vector<BodyMechanics>& mechanics)
     s.strained.resize(s.links.size());
     s.strains.resize(s.frames.size());
   }
+  s.stillStrains.resize(s.frames.size());
   s.loads.resize(s.frames.size());
   s.termStates.resize(s.terms.size());
   int most = 0;

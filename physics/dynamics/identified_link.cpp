@@ -134,7 +134,6 @@ void returnFrameForces(WorldData& d, const Batch& batch) {
 
 double identifiedLinkEnergy(const Identified& s, const IdentifiedBody& body) {
   double sum = 0;
-  s.stillStrains.resize(s.frames.size());
   const auto first = s.stillStrains.begin() + body.firstFrame, end = s.stillStrains.begin() + body.endFrame;
   std::fill(first, end, 0);
   for (int g = body.firstLinkGroup; g < body.endLinkGroup; ++g) {

@@ -54,7 +54,7 @@ std::vector<NodeMap> mapsOf(const Identified& s, const SkinGroup& g, int lane) {
   home.map << Matrix3d::Identity(), -crossMatrix(vectorOf(g.restOffset, lane));
   std::vector<NodeMap> out{home};
   for (int k = g.firstShare; k < g.endShare; ++k) {
-    NodeMap of{s.shares[k].load, {}};
+    NodeMap of{s.shares[k].term, {}};
     for (int e = 0; e < 18; ++e) of.map(e % 3, e / 3) = s.shares[k].map[e][lane];
     if (!of.map.isZero(0)) out.push_back(of);
   }

@@ -32,9 +32,8 @@ void checkNetwork(const SoftBodyModel& m) {
             fmt::format("its model's frames {} and {} are linked and lie in one point", l.frame0, l.frame1));
   }
   for (std::size_t i = 0; i < n.skin.size(); ++i) {
-    constexpr std::size_t kMost = 6;
-    require(!n.skin[i].empty() && n.skin[i].size() <= kMost,
-            fmt::format("its model hangs node {} on {} frames: expected 1 to {}", i, n.skin[i].size(), kMost));
+    require(!n.skin[i].empty() && n.skin[i].size() <= kSkinFrames,
+            fmt::format("its model hangs node {} on {} frames: expected 1 to {}", i, n.skin[i].size(), kSkinFrames));
     double sum = 0;
     for (const SkinFrame& f : n.skin[i]) {
       require(f.frame >= 0 && f.frame < frames,

@@ -71,9 +71,9 @@ HostPoint hostPointOnFrames(const WorldData& d, int node) {
     }
     if (onWay.isZero(0) && onTurn.isZero(0) && share.weight[lane] == 0) continue;  // another node's
     onTurn += static_cast<double>(share.weight[lane]) * second.transpose();
-    const SkinTermState& at = seen.states[share.load / 4];
-    const SkinTerms& term = s.terms[host.firstTerms + share.load / 4];
-    const int l = share.load % 4;
+    const SkinTermState& at = seen.states[share.term / 4];
+    const SkinTerms& term = s.terms[host.firstTerms + share.term / 4];
+    const int l = share.term % 4;
     const Vector3d axis = vectorOf(term.axis, l);
     const double along = share.along[lane];
     onWay += at.spareSlope[l] * axis * (along * axis - onWay.transpose() * axis).transpose();

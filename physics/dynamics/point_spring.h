@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 
+#include "physics/model/identified_network.h"
+
 namespace medulla {
 
 struct Loads;
@@ -13,8 +15,8 @@ struct WorldData;
 // velocities are to it.
 struct HostPoint {
   int count = 0;  // of spheres; 0: the node has a mass of its own, or is a held one of a skin
-  std::array<int, 6> spheres{};
-  std::array<Eigen::Matrix3d, 6> force, torque;  // 1, m
+  std::array<int, kSkinFrames> spheres{};
+  std::array<Eigen::Matrix3d, kSkinFrames> force, torque;  // 1, m
 };
 
 // The common form of what tools do: ToolSpring and HeldNode.

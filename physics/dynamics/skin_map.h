@@ -165,7 +165,7 @@ MEDULLA_INLINE void giveToTerms(const Identified& s, const SkinGroup& g, const L
   };
   for (int k = g.firstShare; k < g.endShare; ++k) {
     const SkinShare& share = s.shares[k];
-    SkinTermLoad& to = loads[share.load];
+    SkinTermLoad& to = loads[share.term];
     const Lanes weight = shareEntry(share.weight), along = shareEntry(share.along);
     for (int j = 0; j < 3; ++j) {
       to.onWay[j] = timesColumn(share.map + 3 * j, to.onWay[j]);

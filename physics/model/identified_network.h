@@ -49,6 +49,9 @@ struct IdentifiedLink {
   Vector6d strain1 = Vector6d::Zero();                   // likewise; 0 of a patch
 };
 
+// A node hangs on so many frames at most; four are nearly as good, one is bad.
+constexpr int kSkinFrames = 6;
+
 // One of the frames a node hangs on. Node: x = X + sum over its frames of `map` (displacement of the frame,
 // lengthScale times its rotation), both small and seen in the frame into which the frames blend:
 //   xb = sum weight x_k,  Rb = R_0 exp(sum weight log(R_0^T R_k)),

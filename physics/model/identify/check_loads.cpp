@@ -14,18 +14,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
 NodeSurface measureNodes(const TriangleMesh& mesh, const std::vector<FixedPatch>& patches) {
-  NodeSurface out;
-  out.areas.assign(mesh.vertices.size(), 0);
-  out.normals.assign(mesh.vertices.size(), Vector3d::Zero());
-  out.held.assign(mesh.vertices.size(), false);
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Vector3d normal = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-    for (const int n : {a, b, c}) {
-      out.areas[n] += normal.norm() / 6;
-      out.normals[n] += normal;
-    }
-  }
-  for (Vector3d& n : out.normals) n.normalize();
+  NodeSurface out{vertexAreas(mesh), vertexNormals(mesh), std::vector<bool>(mesh.vertices.size(), false)};
   for (const FixedPatch& patch : patches)
     for (const int n : patch.nodes) out.held[n] = true;
   return out;

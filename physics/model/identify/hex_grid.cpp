@@ -167,7 +167,7 @@ static int nearestCell(const HexGrid& grid, const std::array<int, 3>& home, cons
     for (int i = std::max(0, home[0] - ring); i <= std::min(grid.count[0] - 1, home[0] + ring); ++i) {
       for (int j = std::max(0, home[1] - ring); j <= std::min(grid.count[1] - 1, home[1] + ring); ++j) {
         for (int k = std::max(0, home[2] - ring); k <= std::min(grid.count[2] - 1, home[2] + ring); ++k) {
-          const int cell = grid.cellAt[(static_cast<std::size_t>(i) * grid.count[1] + j) * grid.count[2] + k];
+          const int cell = grid.cellAt[indexOf(grid, {i, j, k})];
           if (cell < 0) continue;
           const Vector3d corner(i, j, k);
           const Vector3d clamped = local.cwiseMax(corner).cwiseMin(corner + Vector3d::Ones());
@@ -188,7 +188,7 @@ HexPoint locate(const HexGrid& grid, const Vector3d& point) {
   std::array<int, 3> home;
   for (int a = 0; a < 3; ++a) home[a] = std::clamp(static_cast<int>(std::floor(local[a])), 0, grid.count[a] - 1);
   HexPoint out;
-  out.cell = grid.cellAt[(static_cast<std::size_t>(home[0]) * grid.count[1] + home[1]) * grid.count[2] + home[2]];
+  out.cell = grid.cellAt[indexOf(grid, home)];
   if (out.cell < 0) out.cell = nearestCell(grid, home, local);
   std::array<std::array<double, 3>, 3> shapes;
   for (int a = 0; a < 3; ++a) {

@@ -6,8 +6,6 @@
 
 namespace medulla {
 
-constexpr int kSkinFrames = 6;  // a node hangs on so many frames, the nearest; four are nearly as good, one is bad
-
 // Hangs the mesh's nodes on frames so that they answer loads on all frames as near to finite elements as rigid motion
 // of all together allows, which is reproduced exactly. `compliance` is that of the frames (6 frames square),
 // `nodesUnderLoads` the displacements of the mesh's nodes under unit loads on the frames (3 nodes x 6 frames). Nodes of
