@@ -129,6 +129,38 @@ std::optional<LoadedScene> loadMethod(const ChartRun& run, const ChartOptions& o
   }
 }
 
+// Substeps per dynamics frame that the run is to take.
+void addRun(const LoadedScene& base, ChartRun run, int substeps, std::vector<ChartRun>& runs) {
+  if (substeps > kMostSubsteps)
+    throw std::runtime_error(
+        fmt::format("{} asks for {} substeps per dynamics frame: expected at most {}; raise clock.dynamics, or lower "
+                    "Young's modulus",
+                    run.curve, substeps, kMostSubsteps));
+  run.options.overrides.push_back({"dynamics.substeps", fmt::format("{}", substeps)});
+  run.step = 1 / (base.scene.dynamicsRate * substeps);
+  runs.push_back(std::move(run));
+}
+
+// A model has curves of its own: by its spheres, by its file's name where those are alike, or else by its place.
+void nameCurveApart(const std::vector<ChartRun>& runs, const ChartOptions& options, ChartRun& run) {
+  if (options.models.size() < 2) return;
+  const auto isTaken = [&] {
+    return std::any_of(runs.begin(), runs.end(),
+                       [&](const ChartRun& r) { return r.curve == run.curve && r.model != run.model; });
+  };
+  run.curve += fmt::format("_{}_spheres", run.spheres);
+  if (isTaken()) run.curve += "_" + plainName(fs::path(modelPathOf(options.models[run.model])).stem().string());
+  if (isTaken()) run.curve += fmt::format("_{}", run.model + 1);
+}
+
+std::set<int> substepsOf(const ChartOptions& options, const LoadedScene& loaded) {
+  std::set<int> out;
+  for (const double step : options.steps)
+    out.insert(step > 0 ? std::max(1, static_cast<int>(std::lround(1 / (step * loaded.scene.dynamicsRate))))
+                        : chosenSubsteps(loaded));
+  return out;
+}
+
 // Every run of the chart. Where the scene names no reference there is one more, the reference, last: the first method
 // on the most spheres, at half of the smallest step.
 std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& base) {
@@ -136,19 +168,8 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
   for (const std::string& model : options.models) models.push_back({modelOverride(model, base.scene)});
   if (models.empty()) models.push_back({});
   std::vector<ChartRun> runs;
-  int most = 0;  // substeps
+  int mostSubsteps = 0;
   ChartRun reference;
-  const auto add = [&](ChartRun run, int count) {
-    if (count > kMostSubsteps)
-      throw std::runtime_error(
-          fmt::format("{} asks for {} substeps per dynamics frame: expected at most {}; raise clock.dynamics, or lower "
-                      "Young's modulus",
-                      run.curve, count, kMostSubsteps));
-    run.options.overrides.push_back({"dynamics.substeps", fmt::format("{}", count)});
-    run.step = 1 / (base.scene.dynamicsRate * count);
-    most = std::max(most, count);
-    runs.push_back(std::move(run));
-  };
   for (std::size_t number = 0; number < options.methods.size(); ++number) {
     const std::string& name = options.methods[number];
     const auto method = std::find_if(chartMethods().begin(), chartMethods().end(),
@@ -157,25 +178,18 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
       ChartRun run{name, options.run, 0, 0, number, k};
       for (const auto& overrides : {expanded(method->overrides, base.scene), models[k]})
         run.options.overrides.insert(run.options.overrides.end(), overrides.begin(), overrides.end());
-      const std::optional<LoadedScene> perhaps = loadMethod(run, options);
-      if (!perhaps) break;
-      const LoadedScene& loaded = *perhaps;
-      requireSameMeshes(base, loaded);
-      run.spheres = spheresOf(loaded);
-      if (models.size() > 1) run.curve += fmt::format("_{}_spheres", run.spheres);
-      const auto isAlike = [&](const ChartRun& r) { return r.curve == run.curve && r.model != k; };
-      if (std::any_of(runs.begin(), runs.end(), isAlike))
-        run.curve += "_" + plainName(fs::path(modelPathOf(options.models[k])).stem().string());
-      if (std::any_of(runs.begin(), runs.end(), isAlike)) run.curve += fmt::format("_{}", k + 1);
-      if (name == options.methods[0] && run.spheres > reference.spheres) reference = run;
-      std::set<int> substeps;
-      for (const double step : options.steps)
-        substeps.insert(step > 0 ? std::max(1, static_cast<int>(std::lround(1 / (step * base.scene.dynamicsRate))))
-                                 : chosenSubsteps(loaded));
-      for (const int count : substeps) add(run, count);
+      const std::optional<LoadedScene> loaded = loadMethod(run, options);
+      if (!loaded) break;
+      requireSameMeshes(base, *loaded);
+      run.spheres = spheresOf(*loaded);
+      nameCurveApart(runs, options, run);
+      if (number == 0 && run.spheres > reference.spheres) reference = run;
+      const std::set<int> all = substepsOf(options, *loaded);
+      for (const int substeps : all) addRun(base, run, substeps, runs);
+      mostSubsteps = std::max(mostSubsteps, *all.rbegin());
     }
   }
-  if (!namesReference(base)) add(reference, 2 * most);
+  if (!namesReference(base)) addRun(base, reference, 2 * mostSubsteps, runs);
   return runs;
 }
 
