@@ -129,7 +129,7 @@ std::optional<LoadedScene> loadMethod(const ChartRun& run, const ChartOptions& o
   }
 }
 
-// Substeps per dynamics frame that the run is to take.
+// `substeps`: per dynamics frame.
 void addRun(const LoadedScene& base, ChartRun run, int substeps, std::vector<ChartRun>& runs) {
   if (substeps > kMostSubsteps)
     throw std::runtime_error(
@@ -233,6 +233,9 @@ Outcome execute(const ChartRun& run, const std::function<void(double)>& progress
     out.point.volumeRatio = farthestVolumeRatio(simulation->world());
   } catch (const NotFinite&) {
     out.point.failedAt = simulation ? simulated : 0;
+  } catch (const std::runtime_error&) {  // a tool that such a body carried away
+    if (!simulation) throw;
+    out.point.failedAt = simulated;
   }
   out.point.cpu = (processCpuSeconds() - start) / simulated;
   return out;
