@@ -96,7 +96,8 @@ Grid fillGrid(const std::vector<AxisBox>& boxes, double size, BroadPhase& phase)
   const bool dense = cells <= 4.0 * static_cast<double>(count);
   const std::size_t buckets = dense ? static_cast<std::size_t>(cells) : std::bit_ceil(2 * count);
   if (!dense) grid.mask = static_cast<std::uint32_t>(buckets - 1);
-  phase.begin.assign(buckets + 1, 0);
+  phase.begin.resize(buckets + 1);  // grows ahead of need, which assign() does not
+  std::fill(phase.begin.begin(), phase.begin.end(), 0);
   phase.entries.resize(count);
   for (const CellRange& r : phase.ranges) forEachCell(r, [&](const Cell& c) { ++phase.begin[grid.bucketOf(c)]; });
   std::uint32_t end = 0;
