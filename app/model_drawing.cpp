@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "app/scene_view.h"
-#include "physics/dynamics/identified_mechanics.h"
+#include "physics/model/attachment.h"
 #include "render/looks.h"
 
 namespace medulla {

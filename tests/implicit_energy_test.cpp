@@ -61,7 +61,7 @@ TEST(ImplicitEnergy, WhatFliesBesideAFailingBodyFliesOn) {
   const Vector3d velocity(1, 2, 0.3);
   const BodyDescription ball = synthetic::ball("ball", 0.01, {1, 0, 0});
   for (const Failing& f : {Failing{LinkModel::beam, 1, 0.005, 161}, Failing{LinkModel::identified, 1, 0.005, 2},
-                           Failing{LinkModel::identified, 2, 0.05, 4}}) {
+                           Failing{LinkModel::identified, 2, 0.05, 23}}) {
     World alone(settingsOf(f), {ball}), beside(settingsOf(f), {tube(f.links), ball});
     WorldData& d = beside.data();
     const int sphere = d.ranges[1].firstSphere;

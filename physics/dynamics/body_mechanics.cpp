@@ -39,8 +39,8 @@ constexpr double kFoundationFactor = 0.7;
 constexpr double kLayerThicknessOverDepth = 1.0 / 17;
 
 // Volume pressure: the bulk modulus E / 3 (1 - 2 nu), of Young's modulus not more than this. More keeps the volume
-// little better, and would alone bound the step. Identified layers are fitted, and their figures measured, beside E.
-constexpr double kLargestBulk = 1.2, kLargestIdentifiedBulk = 1;
+// little better, and would alone bound the step.
+constexpr double kLargestBulk = 1.2;
 
 // Of the bulk modulus: beyond a tenth of the volume the pressure stays. Where a body lies inside out it would be any
 // number.
@@ -132,21 +132,15 @@ std::vector<Attachment> attachmentsToSpans(const SoftBodyModel& m, const std::ve
 // Each host keeps the volume that lies around it: a section that is squeezed bulges beside. One pressure for the body
 // let it grow wherever there is surface. The hosts share the volume by area times depth, the attachments' with its
 // floor: a pressure so is never more than a few times as stiff as the attachments that it presses.
-void setBulk(const BodyDescription& body, double volume, const std::vector<double>& depth, BodyMechanics& out) {
-  const double compression = 1 / (3 * (1 - 2 * body.tissue.poisson));
-  const double largest = isIdentified(body) ? kLargestIdentifiedBulk : kLargestBulk;
-  const double bulk = std::min(compression, largest) * body.tissue.young;
+void setBulk(const BodyDescription& body, const std::vector<double>& depth, BodyMechanics& out) {
+  const double poisson = body.tissue.poisson;
+  const double bulk = body.tissue.young * (isIdentified(body) ? identifiedBulk(poisson)
+                                                              : std::min(1 / (3 * (1 - 2 * poisson)), kLargestBulk));
   out.largestPressure = kLargestSwelling * bulk;
-  out.linkBulk.assign(body.model->links.size(), 0);
-  out.sphereBulk.assign(body.model->spheres.size(), 0);
-  double sum = 0;
-  for (std::size_t i = 0; i < depth.size(); ++i) {
-    const Attachment& a = out.attachments[i];
-    (a.onLink ? out.linkBulk : out.sphereBulk)[a.host] += a.area * depth[i];
-    sum += a.area * depth[i];
-  }
-  for (std::vector<double>* hosts : {&out.linkBulk, &out.sphereBulk})
-    for (double& share : *hosts) share = share > 0 && volume > 0 ? bulk / (volume * share / sum) : 0;
+  const HostVolumes volumes = hostVolumes(*body.model, out.attachments, depth);
+  const auto perVolume = [&](double volume) { return volume > 0 ? bulk / volume : 0; };
+  for (const double volume : volumes.links) out.linkBulk.push_back(perVolume(volume));
+  for (const double volume : volumes.spheres) out.sphereBulk.push_back(perVolume(volume));
 }
 
 void setSurfaceStiffness(const BodyDescription& body, BodyMechanics& out) {
@@ -163,7 +157,7 @@ void setSurfaceStiffness(const BodyDescription& body, BodyMechanics& out) {
     out.attachmentStiffness[i] = body.tissue.young * a.area * layer.tangential;
     out.normalExcess.push_back(body.tissue.young * a.area * (layer.normal - layer.tangential));
   }
-  setBulk(body, enclosedVolume(mesh), depth, out);
+  setBulk(body, depth, out);
   const auto thickness = [&](int i, int j) {
     return isIdentified(body) ? m.identified->layer.membrane : kLayerThicknessOverDepth * 0.5 * (depth[i] + depth[j]);
   };

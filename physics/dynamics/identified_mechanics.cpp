@@ -137,25 +137,6 @@ std::vector<std::vector<SkinFrame>> heldSkin(const SoftBodyModel& model) {
   return out;
 }
 
-std::vector<Attachment> attachmentsToFrames(const SoftBodyModel& model,
-                                            const std::vector<std::vector<SkinFrame>>& skin) {
-  std::vector<Attachment> out = model.attachments;
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    Attachment& a = out[i];
-    a.onLink = false;
-    a.along = 0;
-    a.host = a.massSphere;
-    double most = 0;
-    for (const SkinFrame& f : skin[i]) {
-      if (f.frame >= static_cast<int>(model.spheres.size()) || f.weight <= most) continue;
-      most = f.weight;
-      a.host = f.frame;
-    }
-    a.restOffset = model.restNodes[i] - model.spheres[a.host].restFrame;
-  }
-  return out;
-}
-
 SphereCell sphereCell(const BodyDescription& body, int sphere) {
   const FillingSphere& s = body.model->spheres[sphere];
   if (!isIdentified(body)) return {s.volume, s.secondMoment};

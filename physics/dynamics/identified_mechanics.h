@@ -37,10 +37,6 @@ LinkBending linkBending(const IdentifiedNetwork& network, const IdentifiedLink& 
 // Nodes of patches hang on the patch alone: they do not move at all.
 std::vector<std::vector<SkinFrame>> heldSkin(const SoftBodyModel& model);
 
-// On the sphere that it has most of; where it has none, on that whose mass it takes.
-std::vector<Attachment> attachmentsToFrames(const SoftBodyModel& model,
-                                            const std::vector<std::vector<SkinFrame>>& skin);
-
 // Of the model's own cells, or of those identified: m3, and m5 about the sphere's frame.
 struct SphereCell {
   double volume = 0;

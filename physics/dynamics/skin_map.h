@@ -9,12 +9,14 @@
 // in the home frame,
 //   node = home + R (restOffset + sum (map_k (e_k - g_k, s_k) + along_k g_k) + s x (s x lever) / 2),
 //   s = sum weight_k s_k.
-// The maps are the skin's first derivatives, the last term what turning adds to second order. Stretch thins by
-// 1 / sqrt(1 + 2 nu y), not by 1 - nu y: with a the line between the two frames at rest, l its length and y = a.e_k /
-// l,
-//   g_k = a l (y - (1 - 1 / sqrt(1 + 2 nu y)) / nu),   along_k = a.map_k a,
-// keeps what a way along the line does along that line, and takes from what it does across. Rates and the transpose are
-// exact:
+// The maps are the skin's first derivatives, the last term what turning adds to second order. A neo-Hookean bar
+// stretched by y has 1 + (1 - 2 nu) y of its volume, but for terms in y^3 and (1 - 2 nu)^2 y^2, and so thins by
+//   thinness(y) = sqrt((1 + (1 - 2 nu) y) / (1 + y)),
+// not by 1 - nu y: with a the line between the two frames at rest, l its length and y = a.e_k / l,
+//   g_k = a l (y - (1 - thinness(y)) / nu),   along_k = a.map_k a,
+// keeps what a way along the line does along that line, and takes from what it does across. (Of 1 / sqrt(1 + 2 nu y),
+// which only agrees to first order, a cylinder stretched by a quarter lost 0.5 % of its volume.) Rates and the
+// transpose are exact:
 //   e_k' = R^T (v_k - v - omega x (x_k - home)),   s_k' = c_k D + D x s_k / 2,   D = R^T (omega_k - omega).
 namespace medulla {
 
@@ -37,18 +39,18 @@ MEDULLA_INLINE HomeFrame homeFrame(const Identified& s, const SkinHost& host) {
   return out;
 }
 
-// The spare part of a way `along` (m) the term's axis, over that axis, and its slope; (1 - 1 / s) / nu is
-// 2 y / (s (s + 1)). Straight below kStraightBelow.
+// The spare part of a way `along` (m) the term's axis, over that axis, and its slope, 1 - 1 / ((1 + y)^2 thinness);
+// (1 - thinness) / nu is 2 y / ((1 + y) (1 + thinness)). Straight below kStraightBelow.
 struct Spare {
   Lanes value, slope;
 };
 MEDULLA_INLINE Spare spareOf(const SkinTerms& term, Lanes poisson, Lanes along) {
   const Lanes one = splat(1), two = splat(2);
   const Lanes all = term.inverseLength * along, y = larger(all, splat(kStraightBelow - 1));
-  const Lanes s = squareRoot(fma(two * poisson, y, one)), inverse = one / (s * (s + one));
-  const Lanes kept = inverse * (s + one);  // 1 / s
-  const Lanes slope = fnma(kept * kept, kept, one);
-  return {term.length * fma(slope, all - y, fnma(two * inverse, y, y)), slope};
+  const Lanes shorter = one / (one + y), thinness = squareRoot(fnma(two * poisson * y, shorter, one));
+  const Lanes both = shorter / (thinness * (one + thinness));  // 1 / ((1 + y) thinness (1 + thinness))
+  const Lanes slope = fnma(both * shorter, one + thinness, one);
+  return {term.length * fma(slope, all - y, fnma(two * (both * thinness), y, y)), slope};
 }
 
 // Sets the host's SkinTermStates, of the rates where they are asked for; `states` has one for each of its terms.

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics/model/identified_network.h"
+#include "physics/model/mass_properties.h"
 #include "physics/model/mesh_topology.h"
 
 namespace medulla {
@@ -104,6 +106,41 @@ double attachmentDepth(const Attachment& a, const Vector3d& normal, const std::v
 HostShares hostShares(const Attachment& a, const std::vector<ElasticLink>& links) {
   if (!a.onLink) return {{a.host, a.host}, {1, 0}};
   return {{links[a.host].sphere0, links[a.host].sphere1}, {1 - a.along, a.along}};
+}
+
+std::vector<Attachment> attachmentsToFrames(const SoftBodyModel& model,
+                                            const std::vector<std::vector<SkinFrame>>& skin) {
+  std::vector<Attachment> out = model.attachments;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    Attachment& a = out[i];
+    a.onLink = false;
+    a.along = 0;
+    a.host = a.massSphere;
+    double most = 0;
+    for (std::size_t k = 0; !skin.empty() && k < skin[i].size(); ++k) {
+      const SkinFrame& f = skin[i][k];
+      if (f.frame >= static_cast<int>(model.spheres.size()) || f.weight <= most) continue;
+      most = f.weight;
+      a.host = f.frame;
+    }
+    a.restOffset = model.restNodes[i] - model.spheres[a.host].restFrame;
+  }
+  return out;
+}
+
+HostVolumes hostVolumes(const SoftBodyModel& model, const std::vector<Attachment>& attachments,
+                        const std::vector<double>& depth) {
+  HostVolumes out{std::vector<double>(model.links.size(), 0), std::vector<double>(model.spheres.size(), 0)};
+  double sum = 0;
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    const Attachment& a = attachments[i];
+    (a.onLink ? out.links : out.spheres)[a.host] += a.area * depth[i];
+    sum += a.area * depth[i];
+  }
+  const double volume = enclosedVolume({model.restNodes, model.triangles});
+  for (std::vector<double>* hosts : {&out.links, &out.spheres})
+    for (double& share : *hosts) share = share > 0 ? volume * share / sum : 0;
+  return out;
 }
 
 int countCrossings(const TriangleMesh& mesh, const SurfaceTree& tree, const std::vector<Attachment>& attachments,

@@ -36,6 +36,19 @@ HostShares hostShares(const Attachment& attachment, const std::vector<ElasticLin
 double attachmentDepth(const Attachment& attachment, const Eigen::Vector3d& normal,
                        const std::vector<FillingSphere>& spheres);
 
+// Of an identified body, on frames alone: each node on that it has most of; where it hangs on none of them (or `skin`
+// is empty, not being known yet), on that of the cell that it lies in.
+std::vector<Attachment> attachmentsToFrames(const SoftBodyModel& model,
+                                            const std::vector<std::vector<SkinFrame>>& skin);
+
+// m3, which part of a body's volume lies between each host of `attachments` and its nodes: by area times depth, that of
+// the model's own attachments.
+struct HostVolumes {
+  std::vector<double> links, spheres;
+};
+HostVolumes hostVolumes(const SoftBodyModel& model, const std::vector<Attachment>& attachments,
+                        const std::vector<double>& depth);
+
 // Nodes whose segment to the skeleton crosses the surface.
 int countCrossings(const TriangleMesh& mesh, const SurfaceTree& tree, const std::vector<Attachment>& attachments,
                    const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links);

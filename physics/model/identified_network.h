@@ -70,6 +70,12 @@ struct IdentifiedLayer {              // springs between nodes and where their f
   double membrane = 0;                // m: thickness t in k = E t sum(areas) / length^2 of an edge
 };
 
+// The bulk modulus over Young's, by which each cell resists that its surface swells beside what the frames carry: at
+// run time and where the layer is fitted. Beyond 2.5 it hardly brings a poke nearer and bounds the step.
+inline double identifiedBulk(double poisson) {
+  return std::min(1 / (3 * (1 - 2 * poisson)), 2.5);
+}
+
 struct IdentifiedError {  // % of each load's largest displacement, over loads that nothing was fitted to
   double maximum = 0, rms = 0;
 };

@@ -18,6 +18,7 @@
 #include "physics/model/identify/reduction.h"
 #include "physics/model/identify/skin_fit.h"
 #include "physics/model/identify/thin_parts.h"
+#include "physics/model/identify/trials.h"
 #include "physics/model/row_of_cells.h"
 #include "physics/sort_unique.h"
 
@@ -156,76 +157,6 @@ VoxelSolid makeSolid(const SoftBodyModel& model, const TriangleMesh& mesh, const
   }
 }
 
-// What the network makes of forces on nodes, without the layer.
-MatrixXd framesResponse(const IdentifiedNetwork& n, const MatrixXd& grounding, const RowMatrix& forces) {
-  const int frames = static_cast<int>(n.frames.size());
-  const RowSparse skin = skinMatrix(n.skin, frames);
-  const MatrixXd loads = skin.transpose() * forces;
-  MatrixXd stiffness = networkStiffness(n.links, n.lengthScale, frames);
-  if (grounding.size() > 0) stiffness += grounding;
-  return skin * solvePositive(stiffness, loads);
-}
-
-VectorXd largestOf(const MatrixXd& displacements) {
-  VectorXd out = VectorXd::Zero(displacements.cols());
-  for (Index load = 0; load < out.size(); ++load)
-    for (Index n = 0; 3 * n < displacements.rows(); ++n)
-      out[load] = std::max(out[load], displacements.block<3, 1>(3 * n, load).norm());
-  return out;
-}
-
-// Random loads; of a free body with forces, spread by area, that balance them, and displacements without their rigid
-// part, in which two answers may differ at will.
-class Trials {
- public:
-  Trials(const TriangleMesh& mesh, const VoxelSolid& solid, const IdentifiedNetwork& network, const MatrixXd& grounding)
-      : surface(measureNodes(mesh, network.patches)), mesh_(mesh), network_(network), grounding_(grounding) {
-    if (grounding.size() == 0) return;
-    felt_ = solid.loading.transpose() *
-            rigidMotions(solid.grid.nodes, network.frames[0].restPosition, 3, network.lengthScale);
-    rigid_ = rigidMotions(mesh.vertices, network.frames[0].restPosition, 3, network.lengthScale);
-    VectorXd areas(rigid_.rows());
-    for (Index k = 0; k < areas.size(); ++k) areas[k] = surface.areas[k / 3];
-    weighted_ = areas.asDiagonal() * rigid_;
-    feltWeighted_ = areas.asDiagonal() * felt_;
-  }
-
-  RowMatrix loads(LoadKind kind, int count, std::uint64_t seed) const {
-    RowMatrix forces = randomLoads(mesh_, surface, kind, network_.lengthScale, count, seed);
-    if (rigid_.size() > 0)
-      forces -= feltWeighted_ * solvePositive(felt_.transpose() * feltWeighted_, felt_.transpose() * forces);
-    return forces;
-  }
-  RowMatrix tractions(const RowMatrix& forces) const {
-    const VectorXd areas = VectorXd::Map(surface.areas.data(), static_cast<Index>(surface.areas.size()));
-    return areas.cwiseInverse().transpose().replicate<3, 1>().reshaped().asDiagonal() * forces;
-  }
-  MatrixXd exact(const VoxelSolid& solid, const RowMatrix& forces) const {
-    return deformation(solid.surface * displacementsUnder(solid, forces));
-  }
-  MatrixXd ofFrames(const RowMatrix& forces) const { return deformation(framesResponse(network_, grounding_, forces)); }
-  MatrixXd ofNetwork(const RowMatrix& forces) const {
-    return deformation(framesResponse(network_, grounding_, forces) +
-                       layerResponse(mesh_, surface, network_.layer, forces));
-  }
-
-  const NodeSurface surface;
-
- private:
-  MatrixXd deformation(MatrixXd displacements) const {
-    if (rigid_.size() > 0)
-      displacements -= rigid_ * solvePositive(rigid_.transpose() * weighted_, weighted_.transpose() * displacements);
-    return displacements;
-  }
-
-  const TriangleMesh& mesh_;
-  const IdentifiedNetwork& network_;
-  const MatrixXd& grounding_;
-  // Of a free body: 3 nodes x 6, and times the nodes' areas; and what finite elements feel of forces on the nodes,
-  // which they spread, in rigid motions: their pins carry nothing under loads that are balanced so.
-  MatrixXd rigid_, weighted_, felt_, feltWeighted_;
-};
-
 // Calls `progress` at every trial of a fit, of which nobody knows how many there will be: nearer and nearer to the end
 // of its part.
 class FitProgress {
@@ -246,42 +177,55 @@ class FitProgress {
 
 // What finite elements say of a body and its cells.
 struct Solved {
-  const TriangleMesh& mesh;
   const VoxelSolid &solid, &larger;  // the same in larger cells
   const CellFrames& cells;
   const Responses& responses;
   const EndTwists& ends;
 };
 
+RowMatrix bulkAndPokes(const Trials& trials, int count, std::uint64_t seed) {
+  RowMatrix out(3 * static_cast<Index>(trials.mesh.vertices.size()), 2 * count);
+  out << trials.loads(LoadKind::bulk, count, seed), trials.loads(LoadKind::poke, count, seed);
+  return out;
+}
+
+// Loads that skin and layer are fitted to, one half bulk, one half pokes, and what finite elements make of them.
+struct Lessons {
+  RowMatrix forces;
+  MatrixXd displacements;
+  VectorXd pokeWork;  // of the second half, on what the cells' own motion does not carry
+};
+
+IdentifiedLayer layerOf(const Trials& trials, const Lessons& lessons, const MatrixXd& left, double lengthScale,
+                        const FitProgress& progress) {
+  return fitLayer(trials.layer(), {lessons.forces, left, lessons.pokeWork}, lengthScale, progress);
+}
+
 // Bodies are loaded on their surface, where loads spread over cells would leave a body's end unstretched and untwisted;
 // responses to tractions alone leave maps too free, which send loads to the frames by the same numbers. So tractions
-// get the largest weight among loads on the frames that costs the answer to either half of `forces` no more than these
-// scatter: concentrated and random, they say little of ends, by two or three percent of the larger half's error where
-// few spheres are. Each skin is judged with the layer that goes with it: maps that take over a part of the dents are
-// the nearer without one. Of an end that is twisted beyond its frame no random load says anything.
-void chooseSkin(const Solved& solved, const Trials& trials, const RowMatrix& forces, const MatrixXd& under,
-                IdentifiedNetwork& out, const Progress& progress) {
+// get the largest weight among loads on the frames that costs the answer to either half of the lessons no more than
+// these scatter: concentrated and random, they say little of ends, by two or three percent of the larger half's error
+// where few spheres are. Of an end that is twisted beyond its frame no random load says anything.
+void chooseSkin(const Solved& solved, const Trials& trials, const Lessons& lessons, IdentifiedNetwork& out,
+                const Progress& progress) {
   constexpr double kScatter = 0.025;
   constexpr double kTwist = 30;  // at unit energy, as each of the loads on the frames; 30 to 100 differ little
-  const auto& [mesh, solid, larger, cells, responses, ends] = solved;
-  const Index half = forces.cols() / 2;
-  const VectorXd largest = largestOf(under);
+  const Responses& responses = solved.responses;
+  const EndTwists& ends = solved.ends;
+  const Index half = lessons.forces.cols() / 2;
   double first = 0, second = 0;
   std::vector<std::vector<SkinFrame>> skin;
-  IdentifiedLayer layer;
   constexpr int count = 5;
   constexpr std::array<double, count> weights = {0, 3, 10, 100, 300};
   for (int k = 0; k < count; ++k) {
     const double weight = weights[k];
-    const FitProgress trying(progress, 1. * k / count, 1. / count);
-    out.skin = fitSkin(mesh, cells, out.patches,
+    progress(1. * k / count);
+    out.skin = fitSkin(trials.mesh, solved.cells, out.patches,
                        responses.frames + weight * responses.framesUnderTractions + kTwist * ends.framesUnderTwists,
                        responses.nodes + weight * responses.nodesUnderTractions + kTwist * ends.nodesUnderTwists);
-    out.layer =
-        fitLayer(mesh, trials.surface, forces, under - trials.ofFrames(forces), largest, out.lengthScale, trying);
-    const MatrixXd found = trials.ofNetwork(forces);
-    const double bulk = errorOf(found.leftCols(half), under.leftCols(half)).rms,
-                 poke = errorOf(found.rightCols(half), under.rightCols(half)).rms;
+    const MatrixXd found = trials.ofNetwork(lessons.forces);
+    const double bulk = errorOf(found.leftCols(half), lessons.displacements.leftCols(half)).rms,
+                 poke = errorOf(found.rightCols(half), lessons.displacements.rightCols(half)).rms;
     if (weight == 0) {
       first = bulk;
       second = poke;
@@ -289,10 +233,8 @@ void chooseSkin(const Solved& solved, const Trials& trials, const RowMatrix& for
       break;
     }
     skin = out.skin;
-    layer = out.layer;
   }
   out.skin = skin;
-  out.layer = layer;
 }
 
 void fitAndClampLinks(const CellFrames& cells, const Responses& responses, const LoadsOnCells& ends, LinkForm form,
@@ -303,48 +245,49 @@ void fitAndClampLinks(const CellFrames& cells, const Responses& responses, const
       centreClamp(out.lengthScale, link);
 }
 
-// Fits skin and layer to loads of their own, then the links, from `unfitted` ones, to what the skin makes of
-// twisted ends; measures the network on others, which nothing was fitted to, and solves those again in larger cells.
-void fitSurfaceAndMeasure(const Solved& solved, const std::vector<IdentifiedLink>& unfitted, LinkForm form,
-                          Identification& result, const Progress& progress) {
-  constexpr int count = 16;
-  const auto& [mesh, solid, larger, cells, responses, ends] = solved;
-  IdentifiedNetwork& out = result.network;
-  const Trials trials(mesh, solid, out, responses.grounding);
-  RowMatrix all(3 * static_cast<Index>(mesh.vertices.size()), 4 * count);
-  all << trials.loads(LoadKind::bulk, count, 1), trials.loads(LoadKind::poke, count, 1),
-      trials.loads(LoadKind::bulk, count, 2), trials.loads(LoadKind::poke, count, 2);
-  const MatrixXd exact = trials.exact(solid, all);
-  progress(0.5);
-  const RowMatrix teaching = all.leftCols(2 * count);
-  const MatrixXd under = exact.leftCols(2 * count);
-  chooseSkin(solved, trials, teaching, under, out, [&](double part) { progress(std::lerp(0.5, 0.9, part)); });
+// Fits skin, links and layer to `lessons`. The skins are judged beside one layer, that of the cells' exact motion; the
+// links, from `unfitted` ones, follow what the skin makes of twisted ends, and the layer in the end what skin and links
+// leave of displacements: where links give too much in a pull, a layer that gives less across. How deep a poke sinks,
+// however, is the exact motion's: what links have too much or too little of does not help there.
+void fitSurface(const Solved& solved, const Trials& trials, const RowMatrix& forces,
+                const std::vector<IdentifiedLink>& unfitted, LinkForm form, IdentifiedNetwork& out,
+                const Progress& progress) {
+  const auto& [solid, larger, cells, responses, ends] = solved;
+  const Index half = forces.cols() / 2;
+  const RowMatrix solution = displacementsUnder(solid, forces);
+  const MatrixXd onSurface = solid.surface * solution;
+  const MatrixXd beside =
+      trials.deformation(onSurface - responses.nodes * solvePositive(responses.frames, cells.motion * solution));
+  const Lessons lessons{forces, trials.deformation(onSurface),
+                        forces.rightCols(half).cwiseProduct(beside.rightCols(half)).colwise().sum().transpose()};
+  progress(0.2);
+  out.layer = layerOf(trials, lessons, beside, out.lengthScale, FitProgress(progress, 0.2, 0.3));
+  chooseSkin(solved, trials, lessons, out, [&](double part) { progress(std::lerp(0.5, 0.7, part)); });
   if (!ends.cells.empty()) {
     const RowSparse skin = skinMatrix(out.skin, static_cast<int>(cells.frames.size()));
     out.links = unfitted;
     fitAndClampLinks(cells, responses, loadsOnEnds(ends, responses.frames, skin), form, out, {});
-    out.layer = fitLayer(mesh, trials.surface, teaching, under - trials.ofFrames(teaching), largestOf(under),
-                         out.lengthScale, FitProgress(progress, 0.9, 0.1));
   }
-  // Finite elements feel the forces spread into tractions. Fits to consistent ones gained pokes a tenth and lost as
-  // much of tubes that are stretched or twisted.
-  const auto consistent = [&](Index first) {
-    RowMatrix forces = consistentForces(solved.mesh, trials.tractions(all.middleCols(first, count)));
-    for (std::size_t n = 0; n < trials.surface.held.size(); ++n)
-      if (trials.surface.held[n]) forces.middleRows<3>(3 * static_cast<Index>(n)).setZero();
-    return forces;
-  };
-  const RowMatrix bulk = consistent(2 * count), poke = consistent(3 * count);
-  const MatrixXd bulkExact = exact.middleCols(2 * count, count), pokeExact = exact.rightCols(count);
+  out.layer = layerOf(trials, lessons, lessons.displacements - trials.ofFrames(forces), out.lengthScale,
+                      FitProgress(progress, 0.7, 0.3));
+}
+
+// The network's errors under loads that nothing was fitted to, and the finite elements' by solving those again in
+// larger cells. Finite elements feel the forces spread into tractions. Fits to consistent ones gained pokes a tenth and
+// lost as much of tubes that are stretched or twisted.
+void measure(const Solved& solved, const Trials& trials, int count, Identification& result) {
+  IdentifiedNetwork& out = result.network;
+  const RowMatrix loads = bulkAndPokes(trials, count, 2);
+  const MatrixXd exact = trials.exact(solved.solid, loads), inLarger = trials.exact(solved.larger, loads);
+  const RowMatrix bulk = trials.consistent(loads.leftCols(count)), poke = trials.consistent(loads.rightCols(count));
+  const MatrixXd bulkExact = exact.leftCols(count), pokeExact = exact.rightCols(count);
   out.bulk = errorOf(trials.ofNetwork(bulk), bulkExact);
   out.poke = errorOf(trials.ofNetwork(poke), pokeExact);
-  const MatrixXd inLarger = trials.exact(larger, all.rightCols(2 * count));
   const IdentifiedError ofBulk = errorOf(inLarger.leftCols(count), bulkExact),
                         ofPoke = errorOf(inLarger.rightCols(count), pokeExact);
   out.ofFiniteElements = {std::max(ofBulk.maximum, ofPoke.maximum), std::max(ofBulk.rms, ofPoke.rms)};
   result.forces = bulk;
   result.displacements = bulkExact;
-  progress(1);
 }
 
 }  // namespace
@@ -397,7 +340,12 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   const EndTwists ends = solveEnds(mesh, solid, cells, unfitted, areas);
   fitAndClampLinks(cells, responses, {}, settings.links, out, stage(0.4, 0.85));
   out.frames = cells.frames;
-  fitSurfaceAndMeasure({mesh, solid, larger, cells, responses, ends}, unfitted, settings.links, result, stage(0.85, 1));
+  const Solved solved{solid, larger, cells, responses, ends};
+  const Trials trials(model, solid, out, responses.grounding);
+  constexpr int count = 16;
+  fitSurface(solved, trials, bulkAndPokes(trials, count, 1), unfitted, settings.links, out, stage(0.85, 0.97));
+  measure(solved, trials, count, result);
+  stage(0.97, 1)(1);
   requireFinite(out);
   return result;
 }

@@ -1,11 +1,13 @@
 #include "physics/model/identify/layer_fit.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "physics/model/attachment.h"
 #include "physics/model/identify/lbfgs.h"
 #include "physics/model/mesh_topology.h"
 
@@ -20,8 +22,7 @@ using SparseMatrix = Eigen::SparseMatrix<double>;
 
 namespace {
 
-// Stiffness matrices per unit of normal, tangential and membrane; held nodes' rows are left empty.
-std::array<SparseMatrix, 3> layerParts(const TriangleMesh& mesh, const NodeSurface& surface) {
+std::array<SparseMatrix, 3> springParts(const TriangleMesh& mesh, const NodeSurface& surface) {
   std::array<std::vector<Eigen::Triplet<double>>, 3> entries;
   const auto put = [&](int part, int a, int b, const Matrix3d& k) {
     if (surface.held[a] || surface.held[b]) return;  // a held node keeps still: its neighbours' springs to it stay
@@ -60,52 +61,112 @@ SparseMatrix identityOfHeld(const NodeSurface& surface) {
   return out;
 }
 
-MatrixXd freeOnly(const RowMatrix& forces, const NodeSurface& surface) {
-  MatrixXd out = forces;
-  for (std::size_t n = 0; n < surface.held.size(); ++n)
-    if (surface.held[n]) out.middleRows<3>(3 * static_cast<Index>(n)).setZero();
+MatrixXd pressureOfCells(const SoftBodyModel& model, const std::vector<Attachment>& nodes, const NodeSurface& surface,
+                         double bulk) {
+  std::vector<double> depth;
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    depth.push_back(attachmentDepth(model.attachments[i], surface.normals[i], model.spheres));
+  const std::vector<double> volumes = hostVolumes(model, nodes, depth).spheres;
+  MatrixXd out = MatrixXd::Zero(3 * static_cast<Index>(nodes.size()), static_cast<Index>(model.spheres.size()));
+  for (Index i = 0; 3 * i < out.rows(); ++i) {
+    const int cell = nodes[i].host;
+    if (surface.held[i] || !(volumes[cell] > 0)) continue;
+    out.block<3, 1>(3 * i, cell) = std::sqrt(bulk / volumes[cell]) * surface.areas[i] * surface.normals[i];
+  }
   return out;
+}
+
+SparseMatrix springStiffness(const SurfaceLayer& surface, const Vector3d& k) {
+  return k[0] * surface.parts[0] + k[1] * surface.parts[1] + k[2] * surface.parts[2] + surface.held;
+}
+
+// The springs' matrix and the pressures' Q Q^T (Woodbury).
+class LayerSolver {
+ public:
+  explicit LayerSolver(const SurfaceLayer& surface) : surface_(surface) {
+    factors_.analyzePattern(springStiffness(surface, Vector3d::Ones()));
+  }
+  bool factorise(const Vector3d& k) {  // false where there is no stiffness somewhere
+    factors_.factorize(springStiffness(surface_, k));
+    if (factors_.info() != Eigen::Success) return false;
+    const MatrixXd& q = surface_.pressure;
+    sprung_ = factors_.solve(q);
+    closed_.compute(MatrixXd::Identity(q.cols(), q.cols()) + q.transpose() * sprung_);
+    return closed_.info() == Eigen::Success;
+  }
+  MatrixXd solve(const MatrixXd& forces) const {
+    MatrixXd x = factors_.solve(forces);
+    x -= sprung_ * closed_.solve(surface_.pressure.transpose() * x);
+    return x;
+  }
+
+ private:
+  const SurfaceLayer& surface_;
+  Eigen::SimplicialLLT<SparseMatrix> factors_;
+  MatrixXd sprung_;  // the springs' answer to Q
+  Eigen::LLT<MatrixXd> closed_;
+};
+
+// Squared errors of a trial layer's answer, relative to what it should be: of each load's displacements, and of what
+// work its pokes do times kWork. Displacements alone, most of them beside the poke, put up with springs too stiff below
+// it. `gradient`: over the logarithms of the stiffnesses k.
+double misfit(const SurfaceLayer& surface, const LayerSolver& solver, const LayerLoads& loads, const MatrixXd& left,
+              const Vector3d& k, VectorXd& gradient) {
+  constexpr double kWork = 10;  // 20 bring pokes hardly nearer and tangential loads farther off
+  const VectorXd weights = left.colwise().squaredNorm().unaryExpr([](double s) { return s > 0 ? 1 / s : 0.; });
+  const MatrixXd moved = solver.solve(loads.forces), off = left - moved;
+  double sum = (off * weights.asDiagonal()).cwiseProduct(off).sum();
+  // d moved = -K^-1 dK moved: what errors pull on `moved`, and of the work, forces . moved, `moved` itself.
+  MatrixXd pull = 2 * solver.solve(off * weights.asDiagonal());
+  const Index first = moved.cols() - loads.pokeWork.size();
+  for (Index poke = 0; poke < loads.pokeWork.size(); ++poke) {
+    const double due = loads.pokeWork[poke];
+    if (!(due > 0)) continue;
+    const auto sunk = moved.col(first + poke);
+    const double excess = loads.forces.col(first + poke).dot(sunk) / due - 1;
+    sum += kWork * excess * excess;
+    pull.col(first + poke) -= 2 * kWork * excess / due * sunk;
+  }
+  for (int part = 0; part < 3; ++part) gradient[part] = k[part] * pull.cwiseProduct(surface.parts[part] * moved).sum();
+  return sum;
+}
+
+MatrixXd freeOnly(const SurfaceLayer& surface, const MatrixXd& x) {
+  return x - surface.held * x;
 }
 
 }  // namespace
 
-MatrixXd layerResponse(const TriangleMesh& mesh, const NodeSurface& surface, const IdentifiedLayer& layer,
-                       const RowMatrix& forces) {
-  assert(forces.rows() == 3 * static_cast<Index>(mesh.vertices.size()));
-  const std::array<SparseMatrix, 3> parts = layerParts(mesh, surface);
-  const SparseMatrix k =
-      layer.normal * parts[0] + layer.tangential * parts[1] + layer.membrane * parts[2] + identityOfHeld(surface);
-  const Eigen::SimplicialLLT<SparseMatrix> factors(k);
-  if (factors.info() != Eigen::Success) throw std::runtime_error("the surface layer has no stiffness somewhere");
-  return factors.solve(freeOnly(forces, surface));
+SurfaceLayer makeSurfaceLayer(const SoftBodyModel& model, const std::vector<std::vector<SkinFrame>>& skin,
+                              const NodeSurface& surface, double poisson) {
+  return {springParts({model.restNodes, model.triangles}, surface), identityOfHeld(surface),
+          pressureOfCells(model, attachmentsToFrames(model, skin), surface, identifiedBulk(poisson))};
 }
 
-IdentifiedLayer fitLayer(const TriangleMesh& mesh, const NodeSurface& surface, const RowMatrix& forces,
-                         const MatrixXd& rest, const VectorXd& scales, double lengthScale,
+MatrixXd layerResponse(const SurfaceLayer& surface, const IdentifiedLayer& layer, const RowMatrix& forces) {
+  assert(forces.rows() == surface.held.rows());
+  LayerSolver solver(surface);
+  if (!solver.factorise({layer.normal, layer.tangential, layer.membrane}))
+    throw std::runtime_error("the surface layer has no stiffness somewhere");
+  return solver.solve(freeOnly(surface, forces));
+}
+
+IdentifiedLayer fitLayer(const SurfaceLayer& surface, const LayerLoads& loads, double lengthScale,
                          const std::function<void()>& goOn) {
-  assert(forces.rows() == 3 * static_cast<Index>(mesh.vertices.size()));
-  const std::array<SparseMatrix, 3> parts = layerParts(mesh, surface);
+  assert(loads.forces.rows() == surface.held.rows());
   // Where frames leave little that springs could do, as at the end of a slender body, the loads say nothing of them.
-  constexpr double kUsual = 0.1;  // of the objective, per squared logarithm
-  const SparseMatrix still = identityOfHeld(surface);
-  const MatrixXd loads = freeOnly(forces, surface);
-  const MatrixXd target = freeOnly(rest, surface);
-  const VectorXd weights = scales.unaryExpr([](double s) { return s > 0 ? 1 / (s * s) : 0.; });
-  Eigen::SimplicialLLT<SparseMatrix> factors;
-  factors.analyzePattern(SparseMatrix(parts[0] + parts[1] + parts[2] + still));
+  constexpr double kUsual = 0.03;  // of the objective, per squared logarithm
+  const MatrixXd left = freeOnly(surface, loads.left);
+  LayerSolver solver(surface);
   const Vector3d units(1 / lengthScale, 1 / lengthScale, lengthScale);
   // Skins leave next to nothing to give across; stiffer springs there would only shorten the step.
-  const Vector3d low(0, 0, std::log(1e-3)), high(std::log(1e3), std::log(2.), std::log(0.1));
+  const Vector3d low(0, 0, std::log(1e-3)), high(std::log(1e3), std::log(4.), std::log(0.1));
   const auto objective = [&](const VectorXd& x, VectorXd& gradient) {
     if (goOn) goOn();
     if ((x - low).minCoeff() < 0 || (x - high).maxCoeff() > 0) return std::numeric_limits<double>::infinity();
     const Vector3d k = units.cwiseProduct(Vector3d(x.array().exp()));
-    factors.factorize(SparseMatrix(k[0] * parts[0] + k[1] * parts[1] + k[2] * parts[2] + still));
-    if (factors.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
-    const MatrixXd moved = factors.solve(loads), off = target - moved;
-    const MatrixXd pull = factors.solve(MatrixXd(off * weights.asDiagonal()));
-    for (int p = 0; p < 3; ++p) gradient[p] = 2 * k[p] * pull.cwiseProduct(MatrixXd(parts[p] * moved)).sum();
-    return (off * weights.asDiagonal()).cwiseProduct(off).sum();
+    if (!solver.factorise(k)) return std::numeric_limits<double>::infinity();
+    return misfit(surface, solver, loads, left, k, gradient);
   };
   // Between what the layer of a cylinder and of a gallbladder on their beds comes to where the frames are exact.
   const VectorXd usual = Vector3d(std::log(3.), std::log(1.2), std::log(0.03));

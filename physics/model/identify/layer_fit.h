@@ -1,23 +1,41 @@
 #pragma once
 
+#include <Eigen/SparseCore>
+#include <array>
 #include <functional>
 
 #include "physics/model/identify/check_loads.h"
+#include "physics/model/soft_body_model.h"
 
 namespace medulla {
 
-// Surface nodes on springs to where their frames carry them, and between one another: area (normal n n^T + tangential
-// (1 - n n^T)) per node, membrane (sum of the two triangles' areas) / length^2 per edge, on displacements from there.
-// Answer of the free nodes to forces (3 nodes x loads); held ones keep still.
-Eigen::MatrixXd layerResponse(const TriangleMesh& mesh, const NodeSurface& surface, const IdentifiedLayer& layer,
-                              const RowMatrix& forces);
+// A surface beside what its frames carry: nodes on springs to there, and between one another, of stiffness area (normal
+// n n^T + tangential (1 - n n^T)) per node and membrane (sum of the two triangles' areas) / length^2 per edge; and the
+// pressure by which each cell keeps its volume, of stiffness Q Q^T. All per pascal of Young's modulus.
+struct SurfaceLayer {
+  std::array<Eigen::SparseMatrix<double>, 3> parts;  // 3 nodes square, per unit of normal, tangential and membrane
+  Eigen::SparseMatrix<double> held;                  // the identity on held nodes, whose rows are empty otherwise
+  Eigen::MatrixXd pressure;                          // Q, 3 nodes x cells
+};
+// Cells are the nodes' by `skin`, which may be empty, as attachmentsToFrames says.
+SurfaceLayer makeSurfaceLayer(const SoftBodyModel& model, const std::vector<std::vector<SkinFrame>>& skin,
+                              const NodeSurface& surface, double poisson);
 
-// The layer that best gives what the frames leave of the displacements under `forces`; `rest` is that (3 nodes x
-// loads), `scales` what each load's part is divided by (0: it does not count). Springs are 1 to 1000 / lengthScale, the
-// membrane 1e-3 to 0.1 lengthScale: softer would leave the frames' work to the layer, stiffer bound the time step for
-// nothing. `goOn`, if given, is called at every trial, of which there may be a hundred of seconds each; it may throw.
-IdentifiedLayer fitLayer(const TriangleMesh& mesh, const NodeSurface& surface, const RowMatrix& forces,
-                         const Eigen::MatrixXd& rest, const Eigen::VectorXd& scales, double lengthScale,
+// Answer of the free nodes to forces (3 nodes x loads); held ones keep still.
+Eigen::MatrixXd layerResponse(const SurfaceLayer& surface, const IdentifiedLayer& layer, const RowMatrix& forces);
+
+// What a layer is fitted to: of each load, what the frames leave to it, relative to the largest of that; and how much
+// the pokes, the last loads, work on it.
+struct LayerLoads {
+  RowMatrix forces;          // N, 3 nodes x loads, 0 on held nodes
+  Eigen::MatrixXd left;      // m per Pa of Young's modulus, likewise
+  Eigen::VectorXd pokeWork;  // J per Pa; 0 or less do not count
+};
+
+// Springs are 1 to 1000 / lengthScale, to 4 / lengthScale across, the membrane 1e-3 to 0.1 lengthScale: softer would
+// leave the frames' work to the layer, stiffer bound the time step for nothing. `goOn`, if given, is called at every
+// trial, of which there may be a hundred of seconds each; it may throw.
+IdentifiedLayer fitLayer(const SurfaceLayer& surface, const LayerLoads& loads, double lengthScale,
                          const std::function<void()>& goOn = {});
 
 }  // namespace medulla
