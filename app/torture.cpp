@@ -424,7 +424,7 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
         break;
     }
     out.survived = true;
-  } catch (const std::runtime_error&) {  // not finite
+  } catch (const NotFinite&) {
     out.recoveredAt.reset();
   }
   return out;

@@ -373,8 +373,8 @@ static void pushOut(const Buckets& buckets, double alpha, Proxy& proxy) {
 void followSurface(const Buckets& buckets, double alphaBefore, double alpha, Proxy& proxy) {
   const Vector3d start = proxy.centre, carried = start + carriedBy(buckets, alpha, proxy);
   if (!(carried.lpNorm<Eigen::Infinity>() <= kToolReach))
-    throw std::runtime_error("a touched surface carried the tool beyond " + std::to_string(int(kToolReach)) +
-                             " m: the state of its body is not finite any more in effect; use more substeps");
+    throw NotFinite("a touched surface carried the tool beyond " + std::to_string(int(kToolReach)) +
+                    " m: the state of its body is not finite any more in effect; use more substeps");
   proxy.centre = notPassedOver(buckets, alphaBefore, alpha, proxy, carried);
   keepOutside(buckets, alphaBefore, alpha, start, proxy);
   pushOut(buckets, alpha, proxy);

@@ -288,4 +288,17 @@ TEST(Proxy, TrianglesThatTurnOverDoNotKeepItInside) {
   EXPECT_LT(inside, 10);
 }
 
+// As a body does that diverges, in the frame before its numbers are none any more.
+TEST(Proxy, ASurfaceThatCarriesItAwayIsNotFiniteInEffect) {
+  ProxyRun r;
+  r.shape = ellipsoid(16, 16, 50, 0);
+  r.device = [](double t) { return Vector3d(0, 0, 0.06 - 0.012 * std::min(1.0, t / 0.2)); };
+  r.motion = [](const Vector3d& x, double t) { return Vector3d(x + 1e7 * std::max(0.0, t - 0.4) * Vector3d::UnitZ()); };
+  bool touched = false;
+  EXPECT_THROW(
+      r.run([&](double, const ToolState& tool, const BlendedSurface&, double) { touched = touched || tool.inContact; }),
+      NotFinite);
+  EXPECT_TRUE(touched);
+}
+
 }  // namespace medulla

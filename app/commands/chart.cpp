@@ -233,9 +233,6 @@ Outcome execute(const ChartRun& run, const std::function<void(double)>& progress
     out.point.volumeRatio = farthestVolumeRatio(simulation->world());
   } catch (const NotFinite&) {
     out.point.failedAt = simulation ? simulated : 0;
-  } catch (const std::runtime_error&) {  // a tool that such a body carried away
-    if (!simulation) throw;
-    out.point.failedAt = simulated;
   }
   out.point.cpu = (processCpuSeconds() - start) / simulated;
   return out;

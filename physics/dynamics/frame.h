@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <stdexcept>
 #include <vector>
 
 // What the dynamics hands to everybody else: the state at the end of a dynamics frame.
@@ -20,6 +21,11 @@ struct BodyFrame {
 struct NodeGive {
   double own = 0;      // by its attachment and edges, while the spheres and what lies beyond its neighbours stand still
   double carried = 0;  // by what the spheres that carry it are moved
+};
+
+// A body's state is not finite any more, or nearly so; says which, when and why.
+struct NotFinite : std::runtime_error {
+  using std::runtime_error::runtime_error;
 };
 
 struct DynamicsFrame {

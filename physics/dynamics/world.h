@@ -122,11 +122,6 @@ struct CreepReport {
 
 struct WorldData;  // arrays laid out for the step; physics/dynamics/world_data.h
 
-// A body's state is not finite any more; says which, when and why.
-struct NotFinite : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
 class World {
  public:
   // Throws std::runtime_error naming the body where a description cannot be simulated (range of a tissue value, a fixed
