@@ -92,7 +92,7 @@ class Simulation {
   explicit Simulation(const LoadedScene& loaded, const EmbreeSettings& embree = {});
 
   bool finished() const { return frame_ >= frameCount_; }
-  // Both throw std::runtime_error when the state stops being finite. The second is the dynamics' half alone, after what
+  // Both throw NotFinite when the state stops being finite. The second is the dynamics' half alone, after what
   // a servo that runs elsewhere has recorded.
   void advanceFrame();
   void advanceFrame(const ServoRecord& servo);

@@ -6,13 +6,13 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
-#include <stdexcept>
 #include <string>
 
 #include "haptics/force_bounds.h"
 #include "haptics/force_shading.h"
 #include "haptics/half_spaces.h"
 #include "haptics/inside.h"
+#include "physics/dynamics/frame.h"
 
 namespace medulla {
 

@@ -48,8 +48,8 @@ struct Proxy {
 Proxy placeProxy(const Buckets& buckets, const Eigen::Vector3d& device, double toolRadius);
 
 // The surface moves from alphaBefore to alpha (of the same two frames) and takes the proxy along: carried by what it
-// touches, never passed over, pushed out of what came too near. Throws std::runtime_error where it would be carried
-// beyond kToolReach.
+// touches, never passed over, pushed out of what came too near. Throws NotFinite where it would be carried beyond
+// kToolReach.
 void followSurface(const Buckets& buckets, double alphaBefore, double alpha, Proxy& proxy);
 
 // The device moves while the surface stands at alpha: the proxy goes to the nearest reachable point, held back by

@@ -68,7 +68,7 @@ class Servo {
 
   // One servo tick at the blend alpha (0..1], not falling within a frame, for one sample per tool. Throws
   // std::runtime_error naming the tool whose device is not finite or beyond kToolReach, whose quaternion is not unit
-  // within 1e-3 or whose grip is not finite, and where a surface carries a tool beyond kToolReach.
+  // within 1e-3 or whose grip is not finite, and NotFinite where a surface carries a tool beyond kToolReach.
   void tick(double alpha, const std::vector<ToolSample>& inputs);
 
   const std::vector<ToolState>& tools() const;

@@ -182,7 +182,7 @@ INSTANTIATE_TEST_SUITE_P(Identified, StaticAccuracy,
                                          StaticCase{"cylinder_tip_large", 7, 0.22, 0.1, 0.1, CYLINDER_ROOT},
                                          StaticCase{"cylinder_mid", 7, 0.38, 0.17, 0.1, CYLINDER_ROOT},
                                          StaticCase{"cylinder_torsion", 7, 1.5, 0.56, 0.1, CYLINDER_ROOT},
-                                         StaticCase{"cylinder_axial", 7, 2.2, 1.1, 0.1, CYLINDER_ROOT},
+                                         StaticCase{"cylinder_axial", 7, 2.2, 1.1, 0.15, CYLINDER_ROOT},
                                          StaticCase{"cylinder_poke_small", 25, 20, 3.3, 0.15, CYLINDER_BED},
                                          StaticCase{"cylinder_poke_large", 25, 19.5, 4.4, 0.3, CYLINDER_BED},
                                          StaticCase{"gallbladder_tip", 7, 0.6, 0.26, 0.1, PEAR_ROOT},
@@ -205,7 +205,7 @@ INSTANTIATE_TEST_SUITE_P(OfOtherMeshes, StaticAccuracy,
                                          StaticCase{"gallbladder_doubled_tip_large", 7, 0.92, 0.3, 0.1, PEAR_ROOT},
                                          StaticCase{"gallbladder_doubled_pull", 7, 1.7, 0.75, 0.1, PEAR_ROOT},
                                          StaticCase{"kidney_tip", 20, 3.8, 1.5, 0.1, KIDNEY_ROOT},
-                                         StaticCase{"stomach_pull", 25, 2.27, 1.18, 0.1, STOMACH_ROOT}),
+                                         StaticCase{"stomach_pull", 25, 2.28, 1.18, 0.1, STOMACH_ROOT}),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 // Bending in both planes, torsion, second bending in both planes; then stretch. The surface swings along.

@@ -37,7 +37,6 @@ VectorXd workOf(const RowMatrix& forces, const MatrixXd& moved) {
 TEST(LayerFit, TheLayerIsThatOfTheRun) {
   const Tube tube;
   BodyDescription body = synthetic::identifiedBody(tube.model, kYoung);
-  body.fixedNodes = tube.held;
   const BodyMechanics mechanics = bodyMechanics(body);
   const RestRates pressure = pressureRates(*tube.model, mechanics);
   const MatrixXd stiffness =

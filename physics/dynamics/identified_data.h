@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "physics/dynamics/simd.h"
+#include "physics/dynamics/thinning.h"
 
 // Arrays of what was identified offline (physics/model/identified_network.h), in this world's units and for AVX2: links
 // and nodes four at a time, both between frames.
@@ -97,7 +98,7 @@ struct SkinTermState {
 struct SkinHost {
   int home;  // a frame
   int firstTerms, endTerms;
-  double poisson;
+  Thinning thinning;
 };
 
 // What one frame's way and turn do to four nodes' places, and its share of how far their own frames are turned.

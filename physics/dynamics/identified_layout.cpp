@@ -114,7 +114,7 @@ class HostTerms {
  public:
   HostTerms(Identified& s, int home, const Vector3d& homePlace, double poisson) : s_(&s), homePlace_(homePlace) {
     host_ = static_cast<int>(s.hosts.size());
-    s.hosts.push_back({home, static_cast<int>(s.terms.size()), static_cast<int>(s.terms.size()), poisson});
+    s.hosts.push_back({home, static_cast<int>(s.terms.size()), static_cast<int>(s.terms.size()), thinningOf(poisson)});
   }
   int host() const { return host_; }
   const Vector3d& homePlace() const { return homePlace_; }

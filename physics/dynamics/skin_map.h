@@ -1,7 +1,6 @@
 #pragma once
 
 #include "physics/dynamics/frame_turn.h"
-#include "physics/dynamics/neo_hookean.h"
 #include "physics/dynamics/world_data.h"
 
 // How nodes follow the frames they hang on (physics/model/identified_network.h), seen from the frame of their home
@@ -9,14 +8,12 @@
 // in the home frame,
 //   node = home + R (restOffset + sum (map_k (e_k - g_k, s_k) + along_k g_k) + s x (s x lever) / 2),
 //   s = sum weight_k s_k.
-// The maps are the skin's first derivatives, the last term what turning adds to second order. A neo-Hookean bar
-// stretched by y has 1 + (1 - 2 nu) y of its volume, but for terms in y^3 and (1 - 2 nu)^2 y^2, and so thins by
-//   thinness(y) = sqrt((1 + (1 - 2 nu) y) / (1 + y)),
-// not by 1 - nu y: with a the line between the two frames at rest, l its length and y = a.e_k / l,
+// The maps are the skin's first derivatives, the last term what turning adds to second order. Stretch thins by
+// thinness(y) of thinning.h, not by 1 - nu y: with a the line between the two frames at rest, l its length and y =
+// a.e_k / l,
 //   g_k = a l (y - (1 - thinness(y)) / nu),   along_k = a.map_k a,
-// keeps what a way along the line does along that line, and takes from what it does across. (Of 1 / sqrt(1 + 2 nu y),
-// which only agrees to first order, a cylinder stretched by a quarter lost 0.5 % of its volume.) Rates and the
-// transpose are exact:
+// keeps what a way along the line does along that line, and takes from what it does across. Rates and the transpose are
+// exact:
 //   e_k' = R^T (v_k - v - omega x (x_k - home)),   s_k' = c_k D + D x s_k / 2,   D = R^T (omega_k - omega).
 namespace medulla {
 
@@ -39,24 +36,10 @@ MEDULLA_INLINE HomeFrame homeFrame(const Identified& s, const SkinHost& host) {
   return out;
 }
 
-// The spare part of a way `along` (m) the term's axis, over that axis, and its slope, 1 - 1 / ((1 + y)^2 thinness);
-// (1 - thinness) / nu is 2 y / ((1 + y) (1 + thinness)). Straight below kStraightBelow.
-struct Spare {
-  Lanes value, slope;
-};
-MEDULLA_INLINE Spare spareOf(const SkinTerms& term, Lanes poisson, Lanes along) {
-  const Lanes one = splat(1), two = splat(2);
-  const Lanes all = term.inverseLength * along, y = larger(all, splat(kStraightBelow - 1));
-  const Lanes shorter = one / (one + y), thinness = squareRoot(fnma(two * poisson * y, shorter, one));
-  const Lanes both = shorter / (thinness * (one + thinness));  // 1 / ((1 + y) thinness (1 + thinness))
-  const Lanes slope = fnma(both * shorter, one + thinness, one);
-  return {term.length * fma(slope, all - y, fnma(two * (both * thinness), y, y)), slope};
-}
-
 // Sets the host's SkinTermStates, of the rates where they are asked for; `states` has one for each of its terms.
 template <bool withRates>
 MEDULLA_INLINE void seeFrames(const Identified& s, const SkinHost& host, const HomeFrame& home, SkinTermState* states) {
-  const Lanes half = splat(0.5), poisson = splat(host.poisson);
+  const Lanes half = splat(0.5);
   for (int t = host.firstTerms; t < host.endTerms; ++t, ++states) {
     const SkinTerms& terms = s.terms[t];
     const FrameLanes frames = gatherFrames(s.frames.data(), terms.frame);
@@ -67,9 +50,9 @@ MEDULLA_INLINE void seeFrames(const Identified& s, const SkinHost& host, const H
     const Lanes3 from = frames.position - home.position, place = rotateBack(home.rotation, from);
     put(place, states->place);
     const Lanes3 way = place - terms.restPlace;
-    const Spare spare = spareOf(terms, poisson, dot(way, terms.axis));
+    const Spare spare = spareOf(host.thinning, terms.inverseLength * dot(way, terms.axis));
     states->spareSlope = spare.slope;
-    const Lanes3 beyond = spare.value * terms.axis;
+    const Lanes3 beyond = (terms.length * spare.value) * terms.axis;
     put(beyond, states->spare);
     put(way - beyond, states->way);
     if (!withRates) continue;

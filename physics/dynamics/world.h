@@ -138,7 +138,7 @@ class World {
   double stableSubstep() const;  // s, the estimate of the largest stable step
   double time() const;           // s; below 0 until the settling frames are through
   // One dynamics frame: substeps under gravity and `loads`. Returns the N s that each tool gave to the bodies (index:
-  // tool). Throws std::runtime_error naming body, time and cause when the state stops being finite.
+  // tool). Throws NotFinite naming body, time and cause when the state stops being finite.
   std::vector<Eigen::Vector3d> advance(const Loads& loads);
 
   void readFrame(DynamicsFrame& out) const;  // resized once and reused

@@ -117,11 +117,12 @@ std::vector<Attachment> attachmentsToFrames(const SoftBodyModel& model,
     a.along = 0;
     a.host = a.massSphere;
     double most = 0;
-    for (std::size_t k = 0; !skin.empty() && k < skin[i].size(); ++k) {
-      const SkinFrame& f = skin[i][k];
-      if (f.frame >= static_cast<int>(model.spheres.size()) || f.weight <= most) continue;
-      most = f.weight;
-      a.host = f.frame;
+    if (!skin.empty()) {
+      for (const SkinFrame& f : skin[i]) {
+        if (f.frame >= static_cast<int>(model.spheres.size()) || f.weight <= most) continue;
+        most = f.weight;
+        a.host = f.frame;
+      }
     }
     a.restOffset = model.restNodes[i] - model.spheres[a.host].restFrame;
   }

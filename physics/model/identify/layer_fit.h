@@ -24,18 +24,18 @@ SurfaceLayer makeSurfaceLayer(const SoftBodyModel& model, const std::vector<std:
 // Answer of the free nodes to forces (3 nodes x loads); held ones keep still.
 Eigen::MatrixXd layerResponse(const SurfaceLayer& surface, const IdentifiedLayer& layer, const RowMatrix& forces);
 
-// What a layer is fitted to: of each load, what the frames leave to it, relative to the largest of that; and how much
-// the pokes, the last loads, work on it.
+// What a layer is fitted to: what the frames leave to it of each load's displacements, relative to the root of their
+// squares' sum; and how much the pokes, the last loads, work on it. Rows of held nodes do not count.
 struct LayerLoads {
-  RowMatrix forces;          // N, 3 nodes x loads, 0 on held nodes
+  Eigen::MatrixXd forces;    // N, 3 nodes x loads
   Eigen::MatrixXd left;      // m per Pa of Young's modulus, likewise
-  Eigen::VectorXd pokeWork;  // J per Pa; 0 or less do not count
+  Eigen::VectorXd pokeWork;  // J per Pa; less than a hundredth of the mean does not count
 };
 
 // Springs are 1 to 1000 / lengthScale, to 4 / lengthScale across, the membrane 1e-3 to 0.1 lengthScale: softer would
 // leave the frames' work to the layer, stiffer bound the time step for nothing. `goOn`, if given, is called at every
 // trial, of which there may be a hundred of seconds each; it may throw.
-IdentifiedLayer fitLayer(const SurfaceLayer& surface, const LayerLoads& loads, double lengthScale,
+IdentifiedLayer fitLayer(const SurfaceLayer& surface, LayerLoads loads, double lengthScale,
                          const std::function<void()>& goOn = {});
 
 }  // namespace medulla

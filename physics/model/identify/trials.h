@@ -8,6 +8,9 @@ namespace medulla {
 // balance them, and displacements without their rigid part, in which two answers may differ at will.
 class Trials {
  public:
+  const TriangleMesh mesh;
+  const NodeSurface surface;
+
   // `network` is read at every question, so that it may go on being fitted. `grounding` as of Responses.
   Trials(const SoftBodyModel& model, const VoxelSolid& solid, const IdentifiedNetwork& network,
          const Eigen::MatrixXd& grounding);
@@ -24,10 +27,7 @@ class Trials {
   Eigen::MatrixXd ofNetwork(const RowMatrix& forces) const;
   Eigen::MatrixXd deformation(Eigen::MatrixXd displacements) const;  // without rigid motion of a free body
 
-  const TriangleMesh mesh;
-  SurfaceLayer layer() const;
-
-  const NodeSurface surface;
+  SurfaceLayer layer() const;  // with the network's skin as it is now
 
  private:
   const SoftBodyModel& model_;
