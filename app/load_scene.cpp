@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
+#include <string_view>
 
 #include "app/files/fix_text.h"
 #include "app/files/input_error.h"
@@ -23,11 +25,17 @@
 
 namespace medulla {
 
-// Of a value that turns out to be wrong only now: said where it stands, in the file or on the command line.
-static std::runtime_error valueError(const Scene& scene, int line, const std::string& attribute,
-                                     const std::string& message) {
+using Attributes = std::initializer_list<std::string_view>;
+
+// What says where nodes or links are looked for.
+static const Attributes kRegions{"box", "sphere", "plane"};
+
+// Of values that turn out to be wrong only now: said where they stand, in the file or, if one of them does, on the
+// command line.
+static std::runtime_error valueError(const Scene& scene, int line, Attributes attributes, const std::string& message) {
   for (const OverriddenAttribute& o : scene.overridden)
-    if (o.line == line && o.attribute == attribute) return inputError("--set " + o.path, 0, message);
+    if (o.line == line && std::find(attributes.begin(), attributes.end(), o.attribute) != attributes.end())
+      return inputError("--set " + o.path, 0, message);
   return inputError(scene.path, line, message);
 }
 
@@ -35,7 +43,7 @@ static std::runtime_error valueError(const Scene& scene, int line, const std::st
 static void requireFile(const Scene& scene, int line, const std::string& attribute, const std::string& what,
                         const std::string& path) {
   if (!std::filesystem::exists(path))
-    throw valueError(scene, line, attribute, fmt::format("{} \"{}\" does not exist", what, path));
+    throw valueError(scene, line, {attribute}, fmt::format("{} \"{}\" does not exist", what, path));
 }
 
 // As the build's command line says it, from that folder.
@@ -65,7 +73,7 @@ static std::vector<int> findNodes(const Scene& scene, int line, const NodeChoice
   }
   std::vector<int> nodes = nodesInRegion(*body.model, choice.region);
   if (nodes.empty())
-    throw inputError(scene.path, line, fmt::format("no surface node of body \"{}\" lies in here", body.name));
+    throw valueError(scene, line, kRegions, fmt::format("no surface node of body \"{}\" lies in here", body.name));
   return nodes;
 }
 
@@ -75,7 +83,7 @@ static void resolvePatches(const Scene& scene, SceneBody& body) {
   std::vector<std::vector<int>> asked, known;
   for (const SceneFix& fix : body.fixes) {
     if (fix.freedom != FixedFreedom::all)
-      throw inputError(scene.path, fix.line,
+      throw valueError(scene, fix.line, {"dof"},
                        fmt::format("body \"{}\" has identified links, which its patches hold wholly: expected "
                                    "dof=\"all\"",
                                    body.name));
@@ -84,7 +92,7 @@ static void resolvePatches(const Scene& scene, SceneBody& body) {
     body.fixedNodes.insert(body.fixedNodes.end(), asked.back().begin(), asked.back().end());
   }
   if (!body.fixed.empty())
-    throw inputError(scene.path, body.line,
+    throw valueError(scene, body.line, {"links"},
                      fmt::format("body \"{}\" has identified links and fixes spheres by number: expected parts of its "
                                  "surface",
                                  body.name));
@@ -93,8 +101,8 @@ static void resolvePatches(const Scene& scene, SceneBody& body) {
   std::sort(asked.begin(), asked.end());
   std::sort(known.begin(), known.end());
   if (model.identified && asked == known && std::abs(model.identified->poisson - body.tissue.poisson) < 1e-9) return;
-  throw inputError(
-      scene.path, body.line,
+  throw valueError(
+      scene, body.line, {"links", "model", "tissue"},
       fmt::format("body \"{}\" has identified links, and its model {}; run where its mesh lies, this would make it: {}",
                   body.name,
                   !model.identified ? "has none"
@@ -138,8 +146,8 @@ static void resolveFixes(const Scene& scene, SceneBody& body) {
   for (const int sphere : spheresHeldBy(model, whollyHeld)) fixSphere(body, sphere, FixedFreedom::all);
   // The nodes of a skin follow their spheres: where none is held, fixing them would do nothing.
   if (body.surface == SurfaceMode::skin && !body.fixes.empty() && body.fixed.empty())
-    throw inputError(
-        scene.path, body.fixes[0].line,
+    throw valueError(
+        scene, body.fixes[0].line, kRegions,
         fmt::format("nothing of body \"{}\" is held: its surface is a skin, and no filling sphere has half "
                     "of its surface in here; expected more of it, or spheres by number",
                     body.name));
@@ -151,7 +159,7 @@ static void requireDrivenFree(const Scene& scene, const SceneBody& body) {
     for (const FixedSphere& fixed : body.fixed)
       if (fixed.sphere == body.driven[k].sphere)
         throw valueError(
-            scene, body.drivenAt[k], "sphere",
+            scene, body.drivenAt[k], {"sphere"},
             fmt::format("body \"{}\" drives sphere {}, which a <fix> of its surface holds: expected one of the two",
                         body.name, fixed.sphere));
 }
@@ -162,7 +170,7 @@ static void requireSteeredLinks(const Scene& scene, const SceneBody& body) {
     const std::optional<Region>& where = body.steered[k].where;
     const auto lies = [&](const Eigen::Vector3d& middle) { return contains(*where, middle); };
     if (where && std::none_of(middles.begin(), middles.end(), lies))
-      throw inputError(scene.path, body.steeredAt[k],
+      throw valueError(scene, body.steeredAt[k], kRegions,
                        fmt::format("no link of body \"{}\" has its middle in here", body.name));
   }
 }
@@ -189,7 +197,7 @@ static void requireSphere(const Scene& scene, const SceneBody& body, int line, c
   const int spheres = static_cast<int>(body.model->spheres.size());
   if (sphere >= spheres)
     throw valueError(
-        scene, line, attribute,
+        scene, line, {attribute},
         fmt::format("body \"{}\" {} sphere {}, its model has spheres 0 to {}", body.name, verb, sphere, spheres - 1));
 }
 
@@ -217,7 +225,7 @@ static void loadModels(Scene& scene) {
 static void requireLook(const Scene& scene, int line, const std::string& look) {
   const std::vector<std::string> known = lookNames();
   if (std::find(known.begin(), known.end(), look) != known.end()) return;
-  throw valueError(scene, line, "look", fmt::format("unknown look \"{}\": expected {}", look, joined(known, ", ")));
+  throw valueError(scene, line, {"look"}, fmt::format("unknown look \"{}\": expected {}", look, joined(known, ", ")));
 }
 
 static Trajectory loadTrajectory(const Scene& scene, SceneTool& tool) {
@@ -235,7 +243,7 @@ static void requireNearby(const Scene& scene, const SceneStatic& item, const Tri
   double most = 0;
   for (const Eigen::Vector3d& x : mesh.vertices) most = std::max(most, x.lpNorm<Eigen::Infinity>());
   if (most <= kAnyPlace.most) return;
-  throw valueError(scene, item.line, "mesh",
+  throw valueError(scene, item.line, {"mesh", "unit"},
                    fmt::format("{} reaches {:.3g} m from its origin, expected at most {} m; is its unit right?",
                                item.meshPath, most, kAnyPlace.most));
 }

@@ -25,7 +25,7 @@ class PngFolder {
     bool resume = false;      // takes over what an ended run left of the same pictures, and leaves its own
   };
   // Throws std::runtime_error where the folder cannot be made or written, where a folder has the name of a picture,
-  // where another process is at this slice, and where what is to be resumed belongs to another run.
+  // where another process of this machine is at this slice (other machines see no lock), and where what is to be resumed belongs to another run.
   PngFolder(const std::string& path, const Slice& slice);
   ~PngFolder();
   PngFolder(const PngFolder&) = delete;

@@ -23,7 +23,12 @@ Progress::Progress(std::string what, double total, std::string unit)
       last_(start_) {}
 
 Progress::~Progress() {
+  end();
+}
+
+void Progress::end() {
   if (drawn_ && terminal_) std::fputs("\r\x1b[K", stderr);
+  drawn_ = false;
 }
 
 std::string Progress::text(double done, double elapsed) const {

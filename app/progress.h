@@ -14,6 +14,7 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
   void update(double done);
+  void end();  // takes the bar off its line, for what is told next
 
  private:
   std::string text(double done, double elapsed) const;

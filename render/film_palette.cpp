@@ -7,10 +7,14 @@ extern "C" {
 #include <libavutil/frame.h>
 }
 
+#include <unistd.h>
+
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 #include <vector>
 
@@ -48,10 +52,17 @@ struct CloseFile {
 using FilePointer = std::unique_ptr<std::FILE, CloseFile>;
 
 // Without a name from here on: it goes with its last handle, whatever fails.
-FilePointer openScratch(const std::string& path) {
-  FilePointer file(std::fopen(path.c_str(), "w+bx"));
-  if (!file) throw std::runtime_error(std::strerror(errno));
-  std::remove(path.c_str());
+FilePointer openScratch(const std::filesystem::path& folder) {
+  std::string path = folder / ".pictures-XXXXXX";
+  const int descriptor = ::mkstemp(path.data());
+  if (descriptor < 0) throw std::runtime_error(std::strerror(errno));
+  ::unlink(path.c_str());
+  FilePointer file(::fdopen(descriptor, "w+b"));
+  if (!file) {
+    const int error = errno;
+    ::close(descriptor);
+    throw std::runtime_error(std::strerror(error));
+  }
   return file;
 }
 
@@ -112,8 +123,8 @@ struct FilmPalette::Data {
   std::size_t bytes;  // of a picture
   int pictures = 0;
 
-  Data(const AVFrame& frame, const std::string& scratch)
-      : waiting(openScratch(scratch)),
+  Data(const AVFrame& frame, const std::string& folder)
+      : waiting(openScratch(folder)),
         generator("palettegen", "stats_mode=diff", {&frame}),
         bytes(std::size_t(frame.width) * frame.height * 3 / 2) {
     checkedAv(av_frame_copy_props(like.get(), &frame));
@@ -145,8 +156,8 @@ struct FilmPalette::Data {
   }
 };
 
-FilmPalette::FilmPalette(const AVFrame& frame, const std::string& scratch)
-    : data_(std::make_unique<Data>(frame, scratch)) {}
+FilmPalette::FilmPalette(const AVFrame& frame, const std::string& folder)
+    : data_(std::make_unique<Data>(frame, folder)) {}
 FilmPalette::~FilmPalette() = default;
 
 void FilmPalette::add(AVFrame& frame) {

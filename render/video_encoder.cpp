@@ -7,6 +7,7 @@ extern "C" {
 }
 
 #include <cassert>
+#include <filesystem>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -115,7 +116,7 @@ void VideoEncoder::Data::open() {
   frame = existing(av_frame_alloc(), "no memory for a picture");
   describeFrame(*frame);
   if (format == VideoFormat::gif)
-    palette.emplace(*frame, partial + "-pictures");
+    palette.emplace(*frame, std::filesystem::path(partial).parent_path());
   else
     openCodec(AV_PIX_FMT_YUV420P);
 }

@@ -78,6 +78,34 @@ TEST_F(BadInput, CheckWarnsOfWhatRunsWarnOf) {
   EXPECT_TRUE(found[2].starts_with("note: surface=\"contact\" is \"full\"")) << found[2];
 }
 
+// Where bodies settle first nothing is known yet of what they have settled to.
+TEST_F(BadInput, CheckWarnsOfABuriedToolOnlyWhereBodiesDoNotSettle) {
+  folder.write(
+      "own/organ.csv",
+      "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,-0.0525,-0.0385,0.02,1,0,0,0,0\n0.4,-0.0525,-0.0385,0.02,1,0,0,0,0\n");
+  const std::string at = "warning: tool 'probe' reaches ";
+  EXPECT_EQ(run({"check", "own/organ.xml"}).err.substr(0, at.size()), at);
+  EXPECT_EQ(run({"check", "own/organ.xml", "--set", "clock.settle=0.1"}).err, "");
+  EXPECT_EQ(run({"replay", "own/organ.xml", "--set", "clock.settle=0.1"}).err.substr(0, at.size()), at);
+}
+
+TEST_F(BadInput, WhatAnOverrideMakesImpossibleIsSaidOfIt) {
+  const std::string text = read("own/organ.xml"), fix = "<fix spheres=\"1\"/>";
+  std::string changed = text;
+  changed.replace(text.find(fix), fix.size(),
+                  "<fix box='-1 -1 -1 1 1 1'/><load force='0 0 1' plane='0 0 1 0.04'/><links torsion='2'/>");
+  folder.write("own/organ.xml", changed);
+  for (const auto& [path, value, words] :
+       {std::array{"fix.box", "2 2 2 3 3 3", "no surface node of body \"organ\" lies in here"},
+        {"load.plane", "0 0 1 -9", "no surface node of body \"organ\" lies in here"},
+        {"links.box", "2 2 2 3 3 3", "no link of body \"organ\" has its middle in here"},
+        {"links", "identified", "body \"organ\" has identified links, and its model "}}) {
+    const std::string option = fmt::format("body.organ.{}", path);
+    expectRefused(run({"check", "own/organ.xml", "--set", option + "=" + value}),
+                  fmt::format("medulla: --set {}: {}", option, words));
+  }
+}
+
 TEST_F(BadInput, ATissueTooStiffForAnyStepIsRefusedWithItsScene) {
   write({.young = "1e20"});
   expectRefused(run({"check", "own/organ.xml"}), "own/organ.xml: the stable substep is ");
@@ -91,6 +119,11 @@ TEST_F(BadInput, ResultsThatCannotBeWrittenFailTheRun) {
         {"info", "own/organ.xml"},
         {"render", "own/organ.xml", "--still", "0", "--size", "64x48", "--quality", "draft"}})
     expectRefused(run(words, full), "standard output cannot be written");
+  const std::string mesh = MEDULLA_SOURCE_DIR "/assets/gallbladder/gallbladder.obj";
+  const ProgramResult made = run({"new", mesh, "--spheres", "5", "-o", "begun"}, full);
+  EXPECT_EQ(made.exitCode, 1);
+  EXPECT_NE(made.err.find("standard output cannot be written"), std::string::npos) << made.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "begun"));
 }
 
 TEST_F(BadInput, APipeThatNobodyFillsEndsAtAnInterrupt) {

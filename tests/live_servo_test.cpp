@@ -89,6 +89,8 @@ TEST(RealtimeCommand, AlsoOfASceneWithoutTools) {
   const ProgramResult run =
       runProgram({"replay", kScenes + "dolphin.xml", "--set", "clock.duration=0.2", "--realtime"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_EQ(valueOf(run.out, "simulated"), "0.2 s");
+  EXPECT_EQ(valueOf(run.out, "servo_ticks"), "5");
 }
 
 // The rest that the servo hands over before the motion begins is no part of it.

@@ -172,6 +172,17 @@ TEST_F(Outputs, FoldersThatAreMissingAreMade) {
     EXPECT_TRUE(fs::is_regular_file(folder / name)) << name;
 }
 
+TEST_F(Outputs, ANameMayBeAsLongAsNamesMayBe) {
+  for (const std::string ending : {".gif", ".mp4", ".webp"}) {
+    const std::string name = std::string(255 - ending.size(), 'n') + ending;
+    EXPECT_EQ(render({"--size", "64x48", "--frames", "0:2", "-o", name}).exitCode, 0) << ending;
+    EXPECT_TRUE(fs::is_regular_file(folder / name)) << ending;
+  }
+  int entries = 0;
+  for (const auto& entry : fs::directory_iterator(folder.path())) entries += entry.exists();
+  EXPECT_EQ(entries, 1 + 3);
+}
+
 TEST_F(Outputs, AStillIsThePictureOfItsTimeAndAveragesFourTimesThePixels) {
   ASSERT_EQ(render({"-o", "frames", "--frames", "8:9"}).exitCode, 0);
   ASSERT_EQ(render({"--still", "0.32", "--quality", "standard", "-o", "a.png"}).exitCode, 0);

@@ -29,7 +29,7 @@ inline std::vector<std::string> complaints(const ProgramResult& r) {
   std::vector<std::string> out;
   std::istringstream lines(r.err);
   for (std::string line; std::getline(lines, line);)
-    if (line.find("s left") == std::string::npos) out.push_back(line);
+    if (!line.ends_with(" s left")) out.push_back(line);
   return out;
 }
 

@@ -287,7 +287,8 @@ TEST(Program, RepairsAreToldInOneLine) {
 TEST(Program, HelpAndVersion) {
   EXPECT_EQ(runProgram({"--help"}).exitCode, 0);
   EXPECT_NE(runProgram({"--help"}).out.find("render"), std::string::npos);
-  for (const char* verb : {"render", "replay", "build", "new", "check", "info", "golden"})
+  for (const char* verb :
+       {"render", "replay", "build", "new", "check", "info", "golden", "compare", "plot", "chart", "stability"})
     EXPECT_EQ(runProgram({verb, "--help"}).exitCode, 0);
   const ProgramResult version = runProgram({"--version"});
   for (const char* name : {"medulla", "compiler", "embree", "renderer"})

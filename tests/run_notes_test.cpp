@@ -1,3 +1,5 @@
+#include "app/commands/run_notes.h"
+
 #include <array>
 
 #include "tests/own_scene.h"
@@ -84,6 +86,20 @@ TEST_F(RunNotes, AToolThatPressesASkinFeelsItTooHard) {
             Notes{"note: tools acted on body 'organ', whose surface=\"skin\" does not yield by itself: "
                   "they feel it too hard; \"contact\" or \"full\" does"});
   EXPECT_EQ(notesOf("contact"), Notes{});
+}
+
+TEST_F(RunNotes, AToolThatSurfacesLeaveNoRoomFor) {
+  LoadedScene loaded;
+  loaded.scene.servoRate = 1000;
+  loaded.scene.tools.resize(2);
+  loaded.scene.tools[1].name = "probe";
+  RunTotals totals;
+  totals.squeezedTicks = {49, 60};
+  testing::internal::CaptureStderr();
+  printNotes(loaded, totals, {});
+  const std::string told = testing::internal::GetCapturedStderr();
+  EXPECT_TRUE(told.starts_with("note: for 0.06 s surfaces left tool 'probe' less than half of its radius: ")) << told;
+  EXPECT_EQ(std::count(told.begin(), told.end(), '\n'), 1);
 }
 
 TEST_F(RunNotes, ACameraThatSeesNoBody) {

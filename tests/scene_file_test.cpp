@@ -212,6 +212,14 @@ TEST_F(SceneFile, MistakesInTheStructureNameTheLineAndWhatWasExpected) {
   });
 }
 
+TEST_F(SceneFile, NamesAreNoLongerThanFilesCanBeNamedAfter) {
+  const auto named = [&](int letters) {
+    return edited("name=\"grasper\"", "name=\"" + std::string(letters, 'g') + "\"");
+  };
+  EXPECT_NO_THROW(read(named(200)));
+  EXPECT_NE(complaint(named(201)).find(": expected at most 200 letters"), std::string::npos);
+}
+
 // What single precision, or a product of two, would make infinity of.
 TEST_F(SceneFile, NumbersBeyondWhatCanBeDrawnOrSimulatedAreRefused) {
   expectComplaints({

@@ -33,6 +33,15 @@ TEST_F(Surroundings, NotesDoNotGoIntoAFileWhereStandardErrorIsClosed) {
   EXPECT_EQ(shell("$M check own/organ.xml >&-"), 1);
 }
 
+// A run long enough for one, on a terminal.
+TEST_F(Surroundings, ABarLeavesItsLineBeforeAnythingElseIsTold) {
+  EXPECT_EQ(shell("script -qec \"$M replay own/organ.xml --set clock.duration=120\" terminal"), 0);
+  const std::string told = read("terminal"), bar = " s left";
+  ASSERT_NE(told.find(bar), std::string::npos) << told;
+  for (std::size_t at = told.find(bar); at != std::string::npos; at = told.find(bar, at + 1))
+    EXPECT_EQ(told.substr(at + bar.size(), 4), "\r\x1b[K") << told.substr(at, 60);
+}
+
 TEST_F(Surroundings, NotesThatCannotBeWrittenAreLostAndNothingElse) {
   folder.write("none.csv", "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,1,1,1,1,0,0,0,0\n0.1,1,1,1,1,0,0,0,0\n");
   EXPECT_EQ(shell("$M replay own/organ.xml --trajectory none.csv 2> /dev/full > results"), 0);

@@ -249,8 +249,7 @@ void Artist::finish() {
   changed_.notify_all();
   thread_.join();
   rethrow();
-  if (drawn_ > 0 && !sawBody_ && !loaded_->scene.bodies.empty())
-    tell("note: no body is in sight of the camera in any picture\n");
+  if (drawn_ > 0 && !sawBody_) tell("note: no body is in sight of the camera in any picture\n");
   for (const std::string& note : notes_) tell("note: {}\n", note);  // now that no bar is in the way
 }
 

@@ -278,6 +278,7 @@ void identifyModel(const BuildOptions& options, BuildJob& job) {
   };
   job.model.identified = naming(job.meshPath, [&] {
     const Identification found = identifyNetwork(job.model, job.held, options.identification, tick);
+    progress.end();
     auto network = std::make_shared<IdentifiedNetwork>(found.network);
     chooseFormulasIfBetter(job, *network, found);
     if (!network->usesFormulas) shareOutMassByLayer(network->layer, job.settings.surfaceMassFraction, job.model);

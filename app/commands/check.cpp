@@ -5,7 +5,7 @@
 
 namespace medulla {
 
-// Everything that a run does before its first step: reading, looking up, laying out.
+// Everything that a run does before its first step: reading, looking up, laying out. Not settling, which takes long.
 int runCheck(const RunOptions& options) {
   const LoadedScene loaded = loadRun(options);
   printWarnings(loaded, options, makeWorld(loaded));

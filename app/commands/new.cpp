@@ -52,12 +52,13 @@ int runNew(const NewOptions& options) {
       writeTextFile(path, text);
       written.push_back(path);
     }
+    fmt::print("scene {}\n", scenePath);
+    flushResults();
   } catch (...) {
     std::error_code missing;
     for (const std::string& path : written) fs::remove(path, missing);
     throw;
   }
-  fmt::print("scene {}\n", scenePath);
   tell("next: medulla render {}\n", shellWord(scenePath));
   return 0;
 }

@@ -27,7 +27,7 @@ void applyPictureOptions(const RenderOptions& options, Scene& scene) {
     if (!valid(scene.width) || !valid(scene.height))
       throw std::runtime_error(fmt::format("--size {}x{}: expected {}numbers from {} to {}{}", scene.width,
                                            scene.height, video ? "even " : "", kPictureSideMin, kPictureSideMax,
-                                           video ? " (video needs them even)" : ""));
+                                           video ? ", for a video" : ""));
   }
   if (options.fps) scene.fps = *options.fps;
 }

@@ -32,7 +32,7 @@ int runReplay(const RunOptions& options) {
     advance = [&] { live->advanceFrame(); };
   }
   const std::vector<Result> forces = runToEnd(
-      loaded, options, simulation, [&] { progress.update(simulation.time()); }, {}, advance);
+      loaded, options, simulation, [&] { progress.update(simulation.time()); }, [&] { progress.end(); }, advance);
   const double wall = wallSeconds() - start;
   std::vector<Result> results = runResults(simulation, processCpuSeconds() - cpuStart, wall);
   if (options.untilRest) results.insert(results.begin(), {"rest_at", fmt::format("{:.6g}", simulation.time()), "s"});

@@ -61,6 +61,7 @@ static double reachInto(const TriangleMesh& surface, const Eigen::Vector3d& cent
 
 // The tissue pushes such a tool out at once, with all the force of its spring. A closed one holds what it is in.
 static void printBuriedTools(const LoadedScene& loaded, const World& world) {
+  if (world.time() < 0) return;  // bodies are about to settle: where they lie at 0, a run tells
   constexpr double kLeast = 0.01;  // of the tool's radius: one that just touches
   DynamicsFrame frame;
   world.readFrame(frame);

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "app/files/log_file.h"
+#include "app/files/number_text.h"
 #include "app/files/output_file.h"
 #include "app/files/state_cache.h"
 #include "app/files/surface_file.h"
@@ -139,8 +140,10 @@ class FrameTimesRecorder {
   void afterFrame(const Simulation& simulation) {
     if (!file_) return;
     const FrameTimes& times = simulation.times();
-    file_->write(fmt::format("{:.6g},{:.4g},{:.4g},{:.4g}\n", simulation.time(), 1e3 * times.servo,
-                             1e3 * times.dynamics, 1e3 * times.surface));
+    std::string row;
+    appendNumber(row, simulation.time());
+    row += fmt::format(",{:.4g},{:.4g},{:.4g}\n", 1e3 * times.servo, 1e3 * times.dynamics, 1e3 * times.surface);
+    file_->write(row);
   }
   void commit() {
     if (file_) file_->commit();

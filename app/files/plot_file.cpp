@@ -183,7 +183,7 @@ std::string quotedName(const std::string& name) {
 std::string block(const std::string& name, const Series& time, const Series& values) {
   constexpr std::size_t kBins = 1000;
   std::string rows;
-  const auto add = [&](std::size_t k) { rows += fmt::format("{:.6g} {:.5g}\n", time[k], values[k]); };
+  const auto add = [&](std::size_t k) { rows += fmt::format("{:.10g} {:.5g}\n", time[k], values[k]); };
   const std::size_t width = time.size() > 2 * kBins ? (time.size() + kBins - 1) / kBins : 1;
   for (std::size_t k = 0; k < time.size(); k += width) {
     const auto first = values.begin() + static_cast<std::ptrdiff_t>(k),
@@ -270,7 +270,7 @@ std::string plotScript(const LogTable& log, const LogTable* frameTimes, const st
       "set border 3 lc '{}'\nset tics nomirror out scale 0.6\nunset mytics\nset grid lc '#d4d4d4' lt 1 lw 0.6\n"
       "set key at graph 1.015, graph 1.05 left top Left reverse vertical maxrows 8 samplen 1.6 spacing {} "
       "noautotitle\n"
-      "set xrange [{:.6g}:{:.6g}]\nset lmargin at screen 0.065\nset rmargin at screen 0.85\n"
+      "set xrange [{:.10g}:{:.10g}]\nset lmargin at screen 0.065\nset rmargin at screen 0.85\n"
       "set multiplot\nset label 1 {} noenhanced at screen 0.065, screen {:.5f} left font ',16'\n",
       kGrey, format == PlotFormat::svg ? 0.95 : 1.2, begin, end, quotedName(title), 1 - 0.36 * kHead / height);
   for (std::size_t p = 0; p < panels.size(); ++p) {
