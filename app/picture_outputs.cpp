@@ -52,7 +52,8 @@ PngFolder::PngFolder(const std::string& path, const Slice& slice)
       made_(path),
       folder_(path),
       collecting_(folder_ / fmt::format("{}-{}.part", slice.first, slice.last)),
-      keep_(slice.resume) {
+      keep_(slice.resume),
+      queue_([this](PictureQueue::Entry& entry) { encode(entry); }) {
   requireReplaceable();
   std::error_code error;
   fs::create_directory(collecting_, error);
@@ -102,6 +103,7 @@ void PngFolder::takeOver() const {
 }
 
 PngFolder::~PngFolder() {
+  queue_.stop();
   if (keep_) return;
   std::error_code ignored;
   for (fs::directory_iterator entry(collecting_, ignored), end; entry != end; entry.increment(ignored))
@@ -113,11 +115,23 @@ bool PngFolder::has(int number) const {
   return fs::exists(collecting_ / pngName(number));
 }
 
-void PngFolder::write(int number, const Image& image) const {
-  writePng((collecting_ / pngName(number)).string(), image);
+void PngFolder::encode(PictureQueue::Entry& entry) const {
+  Image image{entry.width, entry.height, std::move(entry.bytes)};
+  writePng((collecting_ / pngName(entry.number)).string(), image);
+  entry.bytes = std::move(image.pixels);
+}
+
+void PngFolder::write(int number, const Image& image) {
+  queue_.push([&](PictureQueue::Entry& entry) {
+    entry.number = number;
+    entry.width = image.width;
+    entry.height = image.height;
+    entry.bytes = image.pixels;  // into memory of its own
+  });
 }
 
 int PngFolder::finish() {
+  queue_.finish();
   std::vector<fs::path> pictures;
   for (const auto& entry : fs::directory_iterator(collecting_))
     if (isPicture(entry.path())) pictures.push_back(entry.path());
@@ -173,11 +187,12 @@ void PictureOutputs::write(int number, const Image& image) {
 
 StageTimes::Stage PictureOutputs::encoding() const {
   StageTimes::Stage sum{"encode", 0, 0};
-  for (const VideoWriter& video : videos_) {
-    const StageTimes::Stage one = video.encoding();
+  const auto add = [&sum](const StageTimes::Stage& one) {
     sum.wall += one.wall;
     sum.cpu += one.cpu;
-  }
+  };
+  for (const VideoWriter& video : videos_) add(video.encoding());
+  for (const auto& folder : folders_) add(folder->encoding());
   return sum;
 }
 

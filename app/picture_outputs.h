@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app/files/output_file.h"
+#include "render/picture_queue.h"
 #include "render/video_writer.h"
 
 namespace medulla {
@@ -25,17 +26,20 @@ class PngFolder {
     bool resume = false;      // takes over what an ended run left of the same pictures, and leaves its own
   };
   // Throws std::runtime_error where the folder cannot be made or written, where a folder has the name of a picture,
-  // where another process of this machine is at this slice (other machines see no lock), and where what is to be resumed belongs to another run.
+  // where another process of this machine is at this slice (other machines see no lock), and where what is to be
+  // resumed belongs to another run.
   PngFolder(const std::string& path, const Slice& slice);
   ~PngFolder();
   PngFolder(const PngFolder&) = delete;
   PngFolder& operator=(const PngFolder&) = delete;
   std::string path() const { return folder_.string(); }
-  bool has(int number) const;  // drawn before, and whole
-  void write(int number, const Image& image) const;
-  int finish();  // how many pictures of an earlier run are gone
+  bool has(int number) const;                  // drawn before, and whole
+  void write(int number, const Image& image);  // throws for an earlier one that could not be written
+  int finish();                                // how many pictures of an earlier run are gone
+  StageTimes::Stage encoding() const { return queue_.encoding(); }
 
  private:
+  void encode(PictureQueue::Entry& entry) const;
   void requireReplaceable() const;
   bool isPicture(const std::filesystem::path& path) const;  // of the slice, by its name
   bool isOurs(const std::filesystem::path& path) const;
@@ -47,6 +51,7 @@ class PngFolder {
   std::filesystem::path folder_, collecting_;
   bool keep_;
   std::optional<FolderLock> lock_;
+  PictureQueue queue_;
 };
 
 // Where pictures go: any number of videos and folders of numbered PNG files; of a still, PNG files. Folders that are
@@ -65,7 +70,7 @@ class PictureOutputs {
   void write(int number, const Image& image);
   void finish();                                                    // throws Interrupted too
   const std::vector<std::string>& notes() const { return notes_; }  // after finish(): what users may not expect
-  StageTimes::Stage encoding() const;                               // of all videos, in threads of their own
+  StageTimes::Stage encoding() const;  // of all videos and folders, in threads of their own
 
  private:
   void makeParent(const std::string& path);

@@ -61,7 +61,7 @@ void drawCaption(const std::string& text, int width, Image& image) {
   const glm::vec2 low(margin), high = low + size + 2 * kPad * height;
   if (text.empty() || high.x > float(width) || high.y > std::max(kHighest * float(image.height), low.y + 3 * height))
     return;
-  Ink ink(image);
+  Ink ink(image, low, high);
   ink.fill(low, high);
   ink.apply(kPaper, 0.72f);
   for (std::size_t k = 0; k < lines.size(); ++k)

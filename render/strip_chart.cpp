@@ -68,8 +68,17 @@ void drawCurve(const StripChart& chart, const StripCurve& curve, const Layout& l
   const auto point = [&](std::size_t k) {
     return layout.at(float(k) / float(count - 1), glm::clamp(curve.values[k] / chart.range, 0.f, 1.f));
   };
-  for (std::size_t k = 1; k < count; ++k) ink.stroke(point(k - 1), point(k), 2.2f * layout.thin);
-  ink.stroke(point(count - 1), point(count - 1), 6 * layout.thin);
+  // A tick after the other they would be sixteen strokes to a pixel and more.
+  constexpr float kShortest = 0.25f;  // px
+  const vec2 last = point(count - 1);
+  vec2 from = point(0);
+  for (std::size_t k = 1; k < count; ++k) {
+    const vec2 to = k + 1 < count ? point(k) : last;
+    if (k + 1 < count && glm::distance(from, to) < kShortest) continue;
+    ink.stroke(from, to, 2.2f * layout.thin);
+    from = to;
+  }
+  ink.stroke(last, last, 6 * layout.thin);
   ink.apply(glm::vec3(curve.colour), 1);
 }
 
@@ -110,7 +119,7 @@ void writeLabels(const StripChart& chart, const Layout& layout, Ink& ink) {
 void drawStripChart(const StripChart& chart, Image& image) {
   if (chart.curves.empty()) return;
   const Layout layout(image);
-  Ink ink(image);
+  Ink ink(image, layout.low, layout.high);
   ink.fill(layout.low, layout.high);
   ink.apply(kPaper, 0.72f);
   drawGrid(chart, layout, ink);

@@ -7,25 +7,37 @@ namespace medulla {
 
 using glm::vec2;
 
-Ink::Ink(Image& image) : image_(image), cover_(std::size_t(image.width) * image.height, 0.f) {}
+Ink::Ink(Image& image, vec2 low, vec2 high)
+    : image_(image),
+      low_(glm::max(glm::ivec2(low), 0)),
+      size_(glm::max(glm::min(glm::ivec2(glm::ceil(high)), {image.width, image.height}) - low_, 0)),
+      cover_(std::size_t(size_.x) * size_.y, 0.f) {}
 
-void Ink::stroke(vec2 a, vec2 b, float radius) {
-  const vec2 low = glm::min(a, b) - radius - 1.f, high = glm::max(a, b) + radius + 1.f;
-  const vec2 along = b - a;
-  const float length2 = glm::dot(along, along);
-  const int x0 = std::max(0, int(low.x)), x1 = std::min(image_.width - 1, int(high.x));
-  const int y0 = std::max(0, int(low.y)), y1 = std::min(image_.height - 1, int(high.y));
-  for (int y = y0; y <= y1; ++y)
-    for (int x = x0; x <= x1; ++x) {
-      const vec2 p = vec2(float(x) + 0.5f, float(y) + 0.5f) - a;
-      const float u = length2 > 0 ? glm::clamp(glm::dot(p, along) / length2, 0.f, 1.f) : 0.f;
-      add(x, y, glm::clamp(radius + 0.5f - glm::length(p - u * along), 0.f, 1.f));
+template <class Share>
+void Ink::cover(vec2 low, vec2 high, const Share& shareAt) {
+  const glm::ivec2 from = glm::max(glm::ivec2(low) - low_, 0), end = glm::min(glm::ivec2(high) - low_, size_);
+  for (int y = from.y; y < end.y; ++y)
+    for (int x = from.x; x < end.x; ++x) {
+      const float share = shareAt(low_.x + x, low_.y + y);
+      if (share <= 0) continue;
+      const std::size_t i = std::size_t(y) * size_.x + x;
+      if (cover_[i] == 0) touched_.push_back(i);
+      cover_[i] = std::max(cover_[i], share);
     }
 }
 
+void Ink::stroke(vec2 a, vec2 b, float radius) {
+  const vec2 along = b - a;
+  const float length2 = glm::dot(along, along);
+  cover(glm::min(a, b) - radius - 1.f, glm::max(a, b) + radius + 2.f, [&](int x, int y) {
+    const vec2 p = vec2(float(x) + 0.5f, float(y) + 0.5f) - a;
+    const float u = length2 > 0 ? glm::clamp(glm::dot(p, along) / length2, 0.f, 1.f) : 0.f;
+    return glm::clamp(radius + 0.5f - glm::length(p - u * along), 0.f, 1.f);
+  });
+}
+
 void Ink::fill(vec2 low, vec2 high) {
-  for (int y = std::max(0, int(low.y)); y < std::min(image_.height, int(high.y)); ++y)
-    for (int x = std::max(0, int(low.x)); x < std::min(image_.width, int(high.x)); ++x) add(x, y, 1);
+  cover(low, high, [](int, int) { return 1.f; });
 }
 
 void Ink::apply(glm::vec3 colour, float opacity) {
@@ -33,20 +45,13 @@ void Ink::apply(glm::vec3 colour, float opacity) {
   for (int c = 0; c < 3; ++c) shown[c] = 255 * float(srgbFromLight(colour[c]));
   for (const std::size_t i : touched_) {
     const float share = opacity * cover_[i];
-    for (std::size_t c = 0; c < 3; ++c) {
-      std::uint8_t& pixel = image_.pixels[4 * i + c];
-      pixel = std::uint8_t(std::lround(float(pixel) + share * (shown[int(c)] - float(pixel))));
-    }
+    const std::size_t x = low_.x + i % size_.x, y = low_.y + i / size_.x;
+    std::uint8_t* pixel = &image_.pixels[4 * (y * image_.width + x)];
+    for (int c = 0; c < 3; ++c)
+      pixel[c] = std::uint8_t(std::lround(float(pixel[c]) + share * (shown[c] - float(pixel[c]))));
     cover_[i] = 0;
   }
   touched_.clear();
-}
-
-void Ink::add(int x, int y, float share) {
-  if (share <= 0) return;
-  float& cover = cover_[std::size_t(y) * image_.width + x];
-  if (cover == 0) touched_.push_back(std::size_t(y) * image_.width + x);
-  cover = std::max(cover, share);
 }
 
 namespace {

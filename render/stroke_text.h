@@ -12,15 +12,18 @@ namespace medulla {
 // What is drawn with one colour: how much of each pixel it covers. Strokes that cross cover a pixel once.
 class Ink {
  public:
-  explicit Ink(Image& image);
+  Ink(Image& image, glm::vec2 low, glm::vec2 high);     // px; what lies outside of these corners is cut off
   void stroke(glm::vec2 a, glm::vec2 b, float radius);  // px; with round ends, a dot where both ends are one
   void fill(glm::vec2 low, glm::vec2 high);             // px
   void apply(glm::vec3 colour, float opacity);          // linear RGB; puts it on the picture and starts anew
 
  private:
-  void add(int x, int y, float share);
+  // Calls `shareAt(x, y)` for the pixels of this box that lie in the ink's.
+  template <class Share>
+  void cover(glm::vec2 low, glm::vec2 high, const Share& shareAt);
 
   Image& image_;
+  glm::ivec2 low_, size_;     // px
   std::vector<float> cover_;  // 0..1 per pixel
   std::vector<std::size_t> touched_;
 };

@@ -2,22 +2,16 @@
 
 #include <algorithm>
 #include <cassert>
-#include <condition_variable>
-#include <deque>
 #include <filesystem>
-#include <mutex>
 #include <stdexcept>
-#include <thread>
 
 #include "render/partial_file.h"
+#include "render/picture_queue.h"
 #include "render/video_encoder.h"
 #include "render/yuv.h"
 
 namespace medulla {
 namespace {
-
-// Enough that neither side waits for the other's jitter; more only costs memory (1.4 MB each at 720p).
-constexpr std::size_t kQueuedPictures = 3;
 
 struct FormatName {
   const char* extension;
@@ -45,17 +39,6 @@ VideoFormat checkedFormat(const std::string& path, int width, int height, double
   return format->format;
 }
 
-// What the encoder complains of, if it does.
-template <class F>
-std::string reasonOf(const F& encode) {
-  try {
-    encode();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "";
-}
-
 VideoEncoder openEncoder(const std::string& path, const PartialFile& partial, int width, int height, double fps) {
   const VideoFormat format = checkedFormat(path, width, height, fps);
   try {
@@ -67,64 +50,29 @@ VideoEncoder openEncoder(const std::string& path, const PartialFile& partial, in
 
 }  // namespace
 
-// The caller queues pictures; one thread encodes them, so that encoding overlaps drawing.
 struct VideoWriter::Data {
   std::string path;
   PartialFile partial;
   int width, height;
   VideoEncoder encoder;
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::deque<std::vector<std::uint8_t>> waiting, spare;  // 4:2:0 planes
-  bool ended = false, abandoned = false;
-  std::string failure;                         // why it stopped; empty: it has not
-  StageTimes::Stage encoding{"encode", 0, 0};  // up to the last picture
-  std::thread feeder;
+  PictureQueue queue;  // of 4:2:0 planes; before what it encodes with goes
 
   Data(const std::string& p, int w, int h, double fps)
-      : path(p), partial(p), width(w), height(h), encoder(openEncoder(p, partial, w, h, fps)), spare(kQueuedPictures) {
-    feeder = std::thread([this] { feed(); });
-  }
+      : path(p),
+        partial(p),
+        width(w),
+        height(h),
+        encoder(openEncoder(p, partial, w, h, fps)),
+        queue([this](PictureQueue::Entry& entry) { encoder.write(entry.bytes); }) {}
 
-  ~Data() {
-    {
-      const std::lock_guard lock(mutex);
-      abandoned = true;  // such a film is not encoded to its end
+  // What the encoder complains of is the file's.
+  template <class F>
+  void named(const F& work) const {
+    try {
+      work();
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(path + ": cannot be written: " + error.what());
     }
-    end();
-  }
-
-  void end() {
-    {
-      const std::lock_guard lock(mutex);
-      ended = true;
-    }
-    changed.notify_all();
-    if (feeder.joinable()) feeder.join();
-  }
-
-  void feed() {
-    for (;;) {
-      std::unique_lock lock(mutex);
-      changed.wait(lock, [this] { return ended || !waiting.empty(); });
-      if (waiting.empty() || abandoned || !failure.empty()) return;
-      std::vector<std::uint8_t> planes = std::move(waiting.front());
-      waiting.pop_front();
-      lock.unlock();
-      const double start = wallSeconds();
-      const std::string reason = reasonOf([&] { encoder.write(planes); });
-      lock.lock();
-      encoding.wall += wallSeconds() - start;
-      encoding.cpu = threadCpuSeconds();
-      spare.push_back(std::move(planes));
-      failure = reason;
-      lock.unlock();
-      changed.notify_all();
-    }
-  }
-
-  [[noreturn]] void fail(const std::string& reason) const {
-    throw std::runtime_error(path + ": cannot be written: " + reason);
   }
 };
 
@@ -140,33 +88,18 @@ VideoWriter::VideoWriter(VideoWriter&&) noexcept = default;
 
 void VideoWriter::write(const Image& image) {
   assert(image.width == data_->width && image.height == data_->height);
-  std::unique_lock lock(data_->mutex);
-  assert(!data_->ended);
-  data_->changed.wait(lock, [this] { return !data_->failure.empty() || !data_->spare.empty(); });
-  if (!data_->failure.empty()) data_->fail(data_->failure);
-  std::vector<std::uint8_t> planes = std::move(data_->spare.front());
-  data_->spare.pop_front();
-  lock.unlock();
-  rgbaToI420(image, planes);
-  lock.lock();
-  data_->waiting.push_back(std::move(planes));
-  lock.unlock();
-  data_->changed.notify_all();
+  data_->named([&] { data_->queue.push([&](PictureQueue::Entry& entry) { rgbaToI420(image, entry.bytes); }); });
 }
 
 StageTimes::Stage VideoWriter::encoding() const {
-  const std::lock_guard lock(data_->mutex);
-  return data_->encoding;
+  return data_->queue.encoding();
 }
 
 void VideoWriter::finish(const std::function<void()>& goOn) {
-  data_->end();
-  try {
-    if (data_->failure.empty()) data_->encoder.finish(goOn);
-  } catch (const std::runtime_error& error) {
-    data_->failure = error.what();
-  }
-  if (!data_->failure.empty()) data_->fail(data_->failure);
+  data_->named([&] {
+    data_->queue.finish();
+    data_->encoder.finish(goOn);
+  });
   data_->partial.commit();
 }
 

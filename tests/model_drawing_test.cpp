@@ -227,7 +227,7 @@ TEST(StrokeText, EveryLetterDiffersFromTheOthersAndFromAMissingOne) {
   std::vector<std::vector<std::uint8_t>> seen;
   for (const char c : letters + "\x01") {
     Image image = blackImage(40, 60);
-    Ink ink(image);
+    Ink ink(image, {0, 0}, {image.width, image.height});
     writeText(std::string(1, c), {4, 4}, 36, ink);
     ink.apply({1, 1, 1}, 1);
     EXPECT_EQ(std::count(seen.begin(), seen.end(), image.pixels), 0) << c;
