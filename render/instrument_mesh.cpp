@@ -13,14 +13,14 @@ namespace {
 using glm::vec3;
 
 // Tool frame, m: the tip of the closed jaws at the origin, shaft along +z, jaws open about x at the hinge.
-constexpr float kHinge = 0.0200f, kShaftStart = 0.0275f;
+constexpr float kShaftStart = 0.0275f;
 constexpr float kJawHalfWidth = 0.0021f, kJawHeight = 0.0021f;
 // Height above the bite's plane: of ridges and valleys, and of the rim that the outer side ends at. The rim lies above
 // the valleys, or the flank between them folds over and leaves holes.
 constexpr float kRidge = 0.00008f, kValley = 0.00055f, kJawRim = 0.0006f;
 constexpr int kTeeth = 13;
 constexpr float kTau = 2 * std::numbers::pi_v<float>;
-constexpr vec3 kSteel(0.50f, 0.50f, 0.52f), kSheath(0.020f, 0.020f, 0.022f);
+constexpr vec3 kSteel(0.50f, 0.50f, 0.52f), kBite = 1.2f * kSteel, kSheath(0.020f, 0.020f, 0.022f);
 
 // How finely round things are cut. A circle of n sides strays from the round one by pi^2 / 2n^2 of its radius: for the
 // same share of a pixel n grows with the root of the picture's height. Up to 720 lines it is as it was made for them.
@@ -200,17 +200,17 @@ void addBite(Builder& b, float side, float angle, float teeth, int perTooth) {
                q0 = place(-j1.halfWidth, c1.x, j1.z), q1 = place(j1.halfWidth, c1.x, j1.z);
     const std::array<float, 2> open{c0.y, c1.y};
     if (side > 0)
-      b.face({p0, q0, q1, p1}, 0.5f * kSteel, {open[0], open[1], open[1], open[0]});
+      b.face({p0, q0, q1, p1}, kBite, {open[0], open[1], open[1], open[0]});
     else
-      b.face({p0, p1, q1, q0}, 0.5f * kSteel, {open[0], open[0], open[1], open[1]});
+      b.face({p0, p1, q1, q0}, kBite, {open[0], open[0], open[1], open[1]});
     // Flank between the outer side's rim and the ridge.
     for (const float x : {-1.f, 1.f}) {
       const vec3 a = place(x * j0.halfWidth, kJawRim, j0.z), d = place(x * j1.halfWidth, kJawRim, j1.z);
       const vec3 e = x < 0 ? p0 : p1, f = x < 0 ? q0 : q1;
       if ((side > 0) == (x > 0))
-        b.face({a, e, f, d}, 0.8f * kSteel, {0.85f, open[0], open[1], 0.85f});
+        b.face({a, e, f, d}, kSteel, {0.85f, open[0], open[1], 0.85f});
       else
-        b.face({a, d, f, e}, 0.8f * kSteel, {0.85f, 0.85f, open[1], open[0]});
+        b.face({a, d, f, e}, kSteel, {0.85f, 0.85f, open[1], open[0]});
     }
   }
 }

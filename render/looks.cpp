@@ -45,10 +45,10 @@ Look gallbladder() {
   l.wrap = {0.34f, 0.22f, 0.12f};
   l.glow = {0.16f, 0.155f, 0.045f};
   l.glowDepth = 0.006f;
-  l.blood = 0.8f;
-  l.bloodless = {0.36f, 0.33f, 0.19f};
+  l.blood = 0.6f;
+  l.bloodless = {0.30f, 0.34f, 0.17f};
   l.roughness = 0.37f;
-  l.wetRoughness = 0.17f;
+  l.wetRoughness = 0.14f;
   l.mottle = 1.0f;
   l.vessels = 0.85f;
   l.vesselTint = {1.25f, 0.26f, 0.30f};
@@ -134,7 +134,7 @@ Look fat() {
   l.mottle = 0.75f;
   l.vessels = 0.55f;
   l.vesselTint = {0.75f, 0.16f, 0.20f};
-  l.bump = 0.85f;
+  l.bump = 0.6f;
   l.specular = 1.3f;
   l.detailScale = 12;
   l.unrollRadius = 0.006f;
@@ -150,7 +150,7 @@ Look wall() {
   l.albedoLow = {0.36f, 0.085f, 0.065f};
   l.albedoHigh = {0.60f, 0.22f, 0.16f};
   l.mottleFrequency = 22;
-  l.patches[0] = {{0.88f, 0.58f, 0.20f}, 11, 2, 1, {}, 0.50f, 0.66f, 0.8f, 0.9f};
+  l.patches[0] = {{0.88f, 0.58f, 0.20f}, 11, 2, 1, {}, 0.53f, 0.63f, 0.42f, 0.9f};
   l.wrap = {0.40f, 0.16f, 0.10f};
   l.roughness = 0.42f;
   l.wetRoughness = 0.19f;

@@ -299,7 +299,7 @@ void ModelView::drawBallsSeenThrough(bool hide) const {
 void ModelView::drawFaint(const Viewpoint& view) const {
   if (faintRods_.empty()) return;
   // They run along a skin, now before it, now behind: hidden by it they would break into pieces.
-  constexpr float kNearer = 0.015f;
+  constexpr float kNearer = 0.06f;
   setCamera(view, kNearer);
   glEnable(GL_CULL_FACE);
   startBlending();

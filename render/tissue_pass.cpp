@@ -208,7 +208,7 @@ void TissuePass::drawRuns(const SceneMesh& mesh, const DrawLists& lists, const s
     if (!last || last->part != run.part || last->variant != run.variant) {
       const Program& p = programs_[static_cast<std::size_t>(run.variant)];
       const GlossLobes lobes = glossLobes(look);
-      const float bleed = std::clamp(4 * (look.wrap.r - look.wrap.b), 0.f, 1.f);
+      const float bleed = std::clamp(2 * (look.wrap.r - look.wrap.b), 0.f, 1.f);
       glUseProgram(p.id);
       glUniformMatrix4fv(p.clipFromWorld, 1, GL_FALSE, glm::value_ptr(view.clipFromWorld));
       glUniformMatrix4fv(p.shadowFromWorld, 1, GL_FALSE, glm::value_ptr(lightView.clipFromWorld));

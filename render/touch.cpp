@@ -116,7 +116,10 @@ void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
 void shadeAround(const Instrument& instrument, SceneMesh& mesh) {
   const float length = kShaftEnd * instrument.scale, radius = kShaftRadius * instrument.scale,
               farthest = 0.05f * instrument.scale;  // m
-  const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, 1), start = instrument.tip + radius * axis;
+  // Open jaws stand aside of the axis, and nothing shades what lies between them.
+  const float open = glm::clamp((instrument.jawAngle - 0.05f) / 0.2f, 0.f, 1.f);
+  const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, 1),
+                  start = instrument.tip + glm::mix(radius, kHinge * instrument.scale, open) * axis;
   for (const MeshPart& part : mesh.parts) {
     if (part.instrument) continue;
     for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {

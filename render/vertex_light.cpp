@@ -124,7 +124,9 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
 // the model the grey of a studio.
 void lightMetal(const Shading& v, vec3 tangent, const Surroundings& s, LitVertex& out) {
   const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
-  const vec3 mirrored = 2.f * v.normal * facing - v.toEye;
+  // The outline's vertices look away by up to an edge; as they are, they would mirror what is behind them, black.
+  const vec3 normal = facing < 0 ? glm::normalize(v.normal - facing * v.toEye) : v.normal;
+  const vec3 mirrored = 2.f * std::max(facing, 0.f) * normal - v.toEye;
   const float above = mirrored.y * 0.5f + 0.5f, toLamp = glm::dot(mirrored, v.toLight);
   const float lamp = 0.9f * smoothStep(0.75f, 0.99f, toLamp) + 0.22f * smoothStep(-0.2f, 0.5f, toLamp);
   const float gap = 1 - 0.75f * smoothStep(0.35f, 0.05f, std::abs(mirrored.y + 0.25f));
@@ -137,11 +139,11 @@ void lightMetal(const Shading& v, vec3 tangent, const Surroundings& s, LitVertex
   // Brushed or drawn along its length, it shows the lamp as a streak (Kajiya and Kay 1989).
   const vec3 along = glm::cross(v.normal, tangent), halfway = glm::normalize(v.toLight + v.toEye);
   const vec3 across = halfway - along * glm::dot(halfway, along);
-  const float streak = smoothStep(0.90f, 1.0f, glm::dot(v.normal, across) / std::max(glm::length(across), 1e-3f));
+  const float streak = smoothStep(0.955f, 1.0f, glm::dot(normal, across) / std::max(glm::length(across), 1e-3f));
   const float edge = facing < 0 ? 0.f : fresnelEdge(v);
   out.direct = v.albedo * (std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 0.10f * visible);
   const vec3 mirror = v.albedo * 1.15f + 0.022f + 0.10f * edge;
-  const vec3 shine = mirror * vec3(0.60f, 0.58f, 0.55f) * lamp + (0.45f * v.albedo + 0.09f) * streak;
+  const vec3 shine = mirror * vec3(0.60f, 0.58f, 0.55f) * lamp + (0.60f * v.albedo + 0.20f) * streak;
   out.ambient = (mirror * around + s.lamp * shine * lit) * (v.openness * visible);
 }
 

@@ -14,9 +14,10 @@ struct Lobule {
   double radius;
 };
 
-// Higher at the flanks and behind.
+// Higher at the flanks, behind, and around the duodenum, which would stand in it as a bare pipe.
 static double bedHeight(double x, double z) {
-  return -118 + 0.0011 * (x + 15) * (x + 15) + 16 * noise({x, 0, z}, 55) - 0.22 * (z - 30);
+  const double dx = x + 31, dz = z + 20, heap = std::max(0.0, 1 - (dx * dx + dz * dz) / (55 * 55));
+  return -118 + 0.0011 * (x + 15) * (x + 15) + 16 * noise({x, 0, z}, 55) - 0.22 * (z - 30) + 34 * heap * heap;
 }
 
 // Jittered grid rather than free random places: no bare spots.
