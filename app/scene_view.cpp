@@ -40,6 +40,17 @@ void drawnPositions(const SceneBody& body, const SurfaceSmoothing& smoothing, co
     evaluateRenderSurface(surface, smoothed(smoothing, nodes), out);
 }
 
+// The filling spheres' balls.
+void ballsOf(const SoftBodyModel& model, const BodyFrame& frame, std::vector<ShadeBall>& out) {
+  out.clear();
+  for (std::size_t i = 0; i < model.spheres.size(); ++i) {
+    const FillingSphere& sphere = model.spheres[i];
+    const auto& pose = frame.spheres[i];
+    out.push_back({toGlm(pose.position + pose.worldFromSphere * (sphere.restBallCentre - sphere.restFrame)),
+                   float(sphere.radius)});
+  }
+}
+
 void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& state, Picture& picture) {
   Instrument instrument;
   instrument.worldFromTool = toGlm(input.worldFromTool);
@@ -138,6 +149,7 @@ SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Rende
     smoothings_.push_back(body.links == LinkModel::identified ? SurfaceSmoothing{} : makeSurfaceSmoothing(*body.model));
     SurfaceShape shape = shapeOf(body.model->renderSurface.triangles, body.look);
     drawnPositions(body, smoothings_[b], rest.bodies[b].nodes, shape.restPositions);
+    ballsOf(*body.model, rest.bodies[b], shape.restBalls);
     shape.travels = body.fixed.empty() && body.fixedNodes.empty();
     renderer.addSurface(std::move(shape));
   }
@@ -166,6 +178,7 @@ void SceneView::compose(const PictureState& state, ViewKind view, const Shown& s
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyFrame& frame = state.frame.bodies[b];
     drawnPositions(scene.bodies[b], smoothings_[b], frame.nodes, picture.surfaces[b].positions);
+    ballsOf(*scene.bodies[b].model, frame, picture.surfaces[b].balls);
     if (view != ViewKind::tissue)
       drawBodyModel(scene.bodies[b], frame, shown, heightAtTarget(picture.camera), picture.model);
   }

@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "render/ball_shade.h"
 #include "render/gl_context.h"
 #include "render/haze.h"
 #include "render/instrument_mesh.h"
@@ -120,9 +121,11 @@ struct Renderer::Data {
   std::deque<bool> begun;  // of pictures not yet taken, the oldest first: whether they are round
   Image held;              // the older of two, read back
 
-  SceneMesh mesh;   // surfaces at their place in this picture, then instruments
-  SceneMesh rest;   // surfaces at rest, baked
-  SceneMesh finer;  // `mesh` for a picture that is too large or too near for it
+  SceneMesh mesh;  // surfaces at their place in this picture, then instruments
+  SceneMesh rest;  // surfaces at rest, baked
+  BallShade ballShade;
+  std::vector<std::vector<ShadeBall>> restBalls;  // per surface
+  SceneMesh finer;                                // `mesh` for a picture that is too large or too near for it
   bool isFiner = false;
   bool baked = true;
   std::optional<HazeField> haze;
@@ -177,6 +180,9 @@ void Renderer::Data::bake() {
     tissue.addLook(*part.look);
   }
   bakeOpenness(rest);
+  BallShade::Balls atRest;
+  for (const std::vector<ShadeBall>& balls : restBalls) atRest.push_back(&balls);
+  ballShade.bake(rest, atRest);
   mesh = rest;
   baked = true;
 }
@@ -185,6 +191,7 @@ void Renderer::Data::placeSurfaces(const Picture& picture) {
   removeInstruments(mesh);
   std::fill(mesh.blanch.begin(), mesh.blanch.end(), 0.f);
   std::copy(rest.openness.begin(), rest.openness.end(), mesh.openness.begin());
+  BallShade::Balls balls;
   for (std::size_t p = 0; p < mesh.parts.size(); ++p) {
     MeshPart& part = mesh.parts[p];
     const auto first = std::ptrdiff_t(part.firstVertex), last = first + std::ptrdiff_t(part.vertexCount);
@@ -203,7 +210,9 @@ void Renderer::Data::placeSurfaces(const Picture& picture) {
       std::copy(rest.tangent.begin() + first, rest.tangent.begin() + last, mesh.tangent.begin() + first);
       std::copy(rest.area.begin() + first, rest.area.begin() + last, mesh.area.begin() + first);
     }
+    balls.push_back(given ? &picture.surfaces[p].balls : &restBalls[p]);
   }
+  ballShade.apply(balls, picture.camera.position, mesh);
 }
 
 void Renderer::Data::placeInstruments(const Picture& picture, const Viewpoint& view) {
@@ -276,6 +285,7 @@ void Renderer::addSurface(SurfaceShape shape) {
   MeshPart part;
   part.look = &findLook(shape.look);
   part.travels = shape.travels;
+  data_->restBalls.push_back(std::move(shape.restBalls));
   part.firstVertex = std::uint32_t(m.position.size());
   part.vertexCount = std::uint32_t(shape.restPositions.size());
   part.firstIndex = std::uint32_t(m.index.size());

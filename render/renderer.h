@@ -15,17 +15,25 @@
 // Draws one picture from plain arrays. Knows looks, light and pixels; knows nothing of bodies and physics.
 namespace medulla {
 
+// Of those that fill a body, as its surfaces' neighbours feel its nearness: they are darker beside it.
+struct ShadeBall {
+  glm::vec3 centre{0};  // m, world
+  float radius = 0;     // m
+};
+
 // A surface as it is at rest; given once. Textures, colour variation and ambient occlusion are baked from it.
 struct SurfaceShape {
   std::string look;                                     // a name of lookNames()
   std::vector<glm::vec3> restPositions;                 // m, world at the start of the run
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
-  bool travels = false;  // leaves the place that it has at rest: ambient occlusion is its own alone
+  bool travels = false;              // leaves the place that it has at rest: ambient occlusion is its own alone
+  std::vector<ShadeBall> restBalls;  // none: it shades only what is baked
 };
 
 // The same surface in one picture. Static surfaces leave `positions` empty and are drawn as at rest.
 struct SurfaceState {
   std::vector<glm::vec3> positions;  // m, world
+  std::vector<ShadeBall> balls;      // as at rest, where they are now
 };
 
 struct Camera {

@@ -102,7 +102,7 @@ TEST(Renderer, AnArrowIsSeenThroughWhatLiesBeforeIt) {
   settings.height = 200;
   settings.antialias = false;
   Renderer renderer(settings);
-  SurfaceShape wall{"wall", {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+  SurfaceShape wall{"wall", {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, false, {}};
   renderer.addSurface(wall);
   Picture picture;
   picture.endoscopeMask = false;

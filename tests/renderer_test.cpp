@@ -435,7 +435,7 @@ TEST(Renderer, MovingSkinIsSeenThroughInBothAndStaticSkinIsNot) {
   };
   p.view = ViewKind::both;
   EXPECT_LT(redness(), 10);  // static: opaque
-  p.surfaces = {{skin.restPositions}};
+  p.surfaces = {{skin.restPositions, {}}};
   const int both = redness();
   p.view = ViewKind::model;
   const int model = redness();
