@@ -115,6 +115,7 @@ TEST(IdentifiedLink, TurnedTooFarLetsGoOfAWholeTurn) {
     runStage(d, evaluateLinks);
     const double before = world.energies().elastic;
     dropCostlyTurns(d);
+    EXPECT_TRUE(world.hasTurnedOver(0));
     const bool far = degrees > 232;
     EXPECT_NEAR(turnAgainstNext(d, 1), (far ? 360 - degrees : degrees) / 180 * std::numbers::pi, 1e-6) << degrees;
     EXPECT_NEAR(turnAgainstNext(d, 2), 0, 1e-6);
@@ -122,6 +123,17 @@ TEST(IdentifiedLink, TurnedTooFarLetsGoOfAWholeTurn) {
     if (far) {
       EXPECT_LT(world.energies().elastic, before) << degrees;
     }
+  }
+}
+
+TEST(IdentifiedLink, WhatTurnsOverIsNoted) {
+  for (const double degrees : {80.0, 95.0}) {
+    World world(weightless(), {chain(SurfaceMode::skin, false)});
+    for (int i = 2; i < 5; ++i) turnBy(world.data(), i, degrees / 180 * std::numbers::pi * Vector3d::UnitX());
+    runStage(world.data(), evaluateLinks);
+    EXPECT_FALSE(world.hasTurnedOver(0));
+    world.advance({});
+    EXPECT_EQ(world.hasTurnedOver(0), degrees > 90);
   }
 }
 

@@ -150,6 +150,7 @@ TEST(MeshRepair, FarVertexIsRefusedAndNamed) {
   mesh = sphere();
   mesh.vertices.emplace_back(0, -30, 0);  // even where no triangle uses it: the file is not what it seems
   EXPECT_CONTAINS(refusal(mesh), "vertex 258 at (0 -30 0) m lies");
+  EXPECT_CONTAINS(refusal(mesh), "of the mesh; no triangle uses it");
 }
 
 TEST(MeshRepair, LongMeshedLimbIsNoFarVertex) {

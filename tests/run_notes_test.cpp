@@ -96,7 +96,7 @@ TEST_F(RunNotes, AToolThatSurfacesLeaveNoRoomFor) {
   RunTotals totals;
   totals.squeezedTicks = {49, 60};
   testing::internal::CaptureStderr();
-  printNotes(loaded, totals, {});
+  printNotes(loaded, totals, World({}, {}, {}));
   const std::string told = testing::internal::GetCapturedStderr();
   EXPECT_TRUE(told.starts_with("note: for 0.06 s surfaces left tool 'probe' less than half of its radius: ")) << told;
   EXPECT_EQ(std::count(told.begin(), told.end(), '\n'), 1);

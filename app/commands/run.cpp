@@ -89,7 +89,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   }
   if (finish) finish();
   recorders.commit(simulation);
-  printNotes(loaded, simulation.totals(), simulation.world().creep());
+  printNotes(loaded, simulation.totals(), simulation.world());
   return recorders.forceResults();
 }
 

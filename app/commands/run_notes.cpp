@@ -61,7 +61,7 @@ static double reachInto(const TriangleMesh& surface, const Eigen::Vector3d& cent
 
 // The tissue pushes such a tool out at once, with all the force of its spring. A closed one holds what it is in.
 static void printBuriedTools(const LoadedScene& loaded, const World& world) {
-  if (world.time() < 0) return;  // bodies are about to settle: where they lie at 0, a run tells
+  if (world.time() < 0) return;    // bodies are about to settle: where they lie at 0, a run tells
   constexpr double kLeast = 0.01;  // of the tool's radius: one that just touches
   DynamicsFrame frame;
   world.readFrame(frame);
@@ -200,7 +200,7 @@ static void printSqueezed(const LoadedScene& loaded, const RunTotals& totals) {
 }
 
 // What a run came to that was hardly meant. A run that ends before a tool's motion does says nothing of the tool.
-void printNotes(const LoadedScene& loaded, const RunTotals& totals, const CreepReport& creep) {
+void printNotes(const LoadedScene& loaded, const RunTotals& totals, const World& world) {
   for (std::size_t k = 0; k < loaded.trajectories.size(); ++k) {
     if (motionEnd(loaded.trajectories[k]) > totals.simulated + 1e-9) continue;
     const std::string& name = loaded.scene.tools[k].name;
@@ -230,6 +230,13 @@ void printNotes(const LoadedScene& loaded, const RunTotals& totals, const CreepR
         "note: a body was blown up to {:.3g} times its volume: its tissue is too soft for what acts on it, or a "
         "step too long\n",
         totals.volumeRatioMax);
+  for (std::size_t b = 0; b < loaded.scene.bodies.size(); ++b)
+    if (world.hasTurnedOver(static_cast<int>(b)))
+      tell(
+          "note: cells of body '{}' turned over against their neighbours: pulled or pressed further than identified "
+          "links follow, or a step too long\n",
+          loaded.scene.bodies[b].name);
+  const CreepReport& creep = world.creep();
   if (creep.substeps == 0) return;
   std::vector<std::string> names;
   for (std::size_t b = 0; b < creep.bodies.size(); ++b)

@@ -7,6 +7,6 @@ namespace medulla {
 
 void printWarnings(const LoadedScene& loaded, const RunOptions& options, const World& world);  // before it
 
-void printNotes(const LoadedScene& loaded, const RunTotals& totals, const CreepReport& creep);  // after it
+void printNotes(const LoadedScene& loaded, const RunTotals& totals, const World& world);  // after it
 
 }  // namespace medulla

@@ -126,6 +126,7 @@ struct IdentifiedBody {              // nothing of others
   int firstFrame = 0, endFrame = 0;  // the spheres' first, in their order
   int firstLinkGroup = 0, endLinkGroup = 0;
   bool hasStrains = false;
+  bool turnedOver = false;  // linked frames were more than 90 degrees apart at the beginning of some frame
 };
 
 struct Identified {

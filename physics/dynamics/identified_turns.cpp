@@ -24,12 +24,17 @@ void visitLinks(const Identified& s, const IdentifiedBody& body, const Visit& vi
         visit(s.links[g].frame0[lane], s.links[g].frame1[lane]);
 }
 
+// Of half the largest angle between linked frames.
+double leastCosine(const Identified& s, const IdentifiedBody& body) {
+  double least = 1;
+  visitLinks(s, body, [&](auto a, auto b) { least = std::min(least, cosineOfHalf(s, a, b)); });
+  return least;
+}
+
 // On the ridge itself, from either side, a body is pushed both ways, and no implicit step leaves it.
-bool anyTurnedTooFar(const Identified& s, const IdentifiedBody& body) {
+bool isTooFar(double cosine) {
   constexpr double kRidge = 1e-3;  // of the cosine: a tenth of a degree
-  bool any = false;
-  visitLinks(s, body, [&](auto a, auto b) { any = any || cosineOfHalf(s, a, b) < kFoldCosine + kRidge; });
-  return any;
+  return cosine < kFoldCosine + kRidge;
 }
 
 struct TurnedLink {
@@ -88,13 +93,17 @@ void alignSigns(WorldData& d, const IdentifiedBody& body, bool whateverItLeaves)
 }  // namespace
 
 void dropCostlyTurns(WorldData& d) {
-  for (const IdentifiedBody& body : d.identified.bodies)
-    if (anyTurnedTooFar(d.identified, body)) alignSigns(d, body, false);
+  constexpr double kHalfOf90 = 0.7071067811865476;
+  for (IdentifiedBody& body : d.identified.bodies) {
+    const double cosine = leastCosine(d.identified, body);
+    body.turnedOver = body.turnedOver || cosine < kHalfOf90;
+    if (isTooFar(cosine)) alignSigns(d, body, false);
+  }
 }
 
 void dropWholeTurns(WorldData& d, int body) {
   const IdentifiedBody& of = d.identified.bodies[body];
-  if (anyTurnedTooFar(d.identified, of)) alignSigns(d, of, true);
+  if (isTooFar(leastCosine(d.identified, of))) alignSigns(d, of, true);
 }
 
 }  // namespace medulla

@@ -368,6 +368,10 @@ const CreepReport& World::creep() const {
   return data_->creep;
 }
 
+bool World::hasTurnedOver(int body) const {
+  return data_->identified.bodies.at(body).turnedOver;
+}
+
 std::uint64_t World::stateHash() const {
   const WorldData& d = *data_;
   NumberHash hash;

@@ -152,6 +152,10 @@ class World {
   PenetrationReport penetration() const;
   const std::vector<BodyOverlap>& startOverlaps() const;
   const CreepReport& creep() const;
+  // Whether cells of identified links that lie side by side have ever been turned against each other by more than 90
+  // degrees: no tissue's are. Links and skin are fitted to small turns, and let a cell go over under loads beyond some
+  // tenths of Young's modulus over its surface.
+  bool hasTurnedOver(int body) const;
   std::uint64_t stateHash() const;  // FNV-1a over every state variable's bits
 
   WorldData& data() { return *data_; }  // for tortures, tests and benchmarks: states that no scene can reach

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -111,8 +112,9 @@ void requireNoFarVertex(const TriangleMesh& input) {
   const double usual = quantile(distances, 0.9), medianEdge = quantile(std::move(lengths), 0.5);
   for (std::size_t v = 0; v < input.vertices.size(); ++v) {
     if (distances[v] <= kFarFromMiddle * usual || shortest[v] <= kFarFromNeighbours * medianEdge) continue;
-    throw std::runtime_error(fmt::format("vertex {} at {} lies {:.3g} times further out than the rest of the mesh", v,
-                                         place(input.vertices[v]), distances[v] / usual));
+    const char* unused = std::isinf(shortest[v]) ? "; no triangle uses it" : "";
+    throw std::runtime_error(fmt::format("vertex {} at {} lies {:.3g} times further out than the rest of the mesh{}", v,
+                                         place(input.vertices[v]), distances[v] / usual, unused));
   }
 }
 
