@@ -183,6 +183,7 @@ void drawBodyModel(const SceneBody& body, const BodyFrame& frame, const Shown& s
   if (shown.skeleton) drawSkeleton(model, frame, height, out);
   if (shown.spheres) drawSpheres(body, frame, out);
   if (shown.buckets) drawBuckets(model, frame, out);
+  if (!shown.links && !shown.frames && !shown.attachments) return;
   const std::vector<CarriedLink> links = carriedLinks(body, frame);
   for (const CarriedLink& link : links) {
     if (shown.links)

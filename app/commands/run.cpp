@@ -55,6 +55,7 @@ int pictureCount(const Scene& scene) {
 
 std::vector<double> pictureTimes(const Scene& scene, int first, int last) {
   std::vector<double> times;
+  times.reserve(std::max(0, last - first));
   for (int k = first; k < last; ++k) times.push_back(k / scene.fps);
   return times;
 }

@@ -49,14 +49,15 @@ class SurfaceRecorder {
 
 class CacheRecorder {
  public:
-  CacheRecorder(const LoadedScene& loaded, const RunOptions& options)
-      : pictures_(pictureTimes(loaded.scene, 0, pictureCount(loaded.scene)), 0) {
-    if (!options.cacheToWrite.empty()) file_.emplace(options.cacheToWrite, cacheLayout(loaded));
+  CacheRecorder(const LoadedScene& loaded, const RunOptions& options) {
+    if (options.cacheToWrite.empty()) return;
+    file_.emplace(options.cacheToWrite, cacheLayout(loaded));
+    pictures_.emplace(pictureTimes(loaded.scene, 0, pictureCount(loaded.scene)), 0);
   }
   void afterFrame(const Simulation& simulation) {
     if (!file_) return;
-    pictures_.afterFrame(simulation,
-                         [&](int, const PictureState& state) { file_->write(state, simulation.world().stateHash()); });
+    pictures_->afterFrame(simulation,
+                          [&](int, const PictureState& state) { file_->write(state, simulation.world().stateHash()); });
   }
   void commit(const Simulation& simulation) {
     if (file_) file_->commit(simulation.world().stateHash());
@@ -64,7 +65,7 @@ class CacheRecorder {
 
  private:
   std::optional<CacheWriter> file_;
-  PictureTimes pictures_;
+  std::optional<PictureTimes> pictures_;
 };
 
 class LogRecorder {

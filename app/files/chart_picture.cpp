@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "app/files/chart_labels.h"
 #include "app/files/chart_style.h"
@@ -21,11 +22,20 @@ constexpr double kRowHeight = 17, kFirstRow = 12;  // of the rim
 struct Curve {
   std::string name;
   std::string colour;
+  int symbol = 0;        // gnuplot's
   bool isOther = false;  // of the reference's own program
   int row = -1;          // on the rim; -1: nothing of it failed
 };
 
+// A method looks the same in every chart; curves of several models are told apart by their order.
+std::size_t styleOf(const std::string& name, std::size_t place) {
+  constexpr std::string_view methods[] = {"full", "contact", "skin", "springs", "implicit", "implicit_2", "identified"};
+  const auto* known = std::find(std::begin(methods), std::end(methods), name);
+  return known != std::end(methods) ? static_cast<std::size_t>(known - methods) : place;
+}
+
 std::vector<Curve> curvesOf(const std::vector<ChartPoint>& points) {
+  constexpr int kFilled[] = {5, 7, 9, 11, 13}, kPentagon = 15;
   std::vector<Curve> out;
   std::size_t own = 0;
   int rows = 0;
@@ -33,7 +43,9 @@ std::vector<Curve> curvesOf(const std::vector<ChartPoint>& points) {
     auto curve = std::find_if(out.begin(), out.end(), [&](const Curve& c) { return c.name == p.curve; });
     if (curve == out.end()) {
       const bool other = p.nodes > 0;
-      out.push_back({p.curve, other ? kBlack : kCurveColours[own % std::size(kCurveColours)], other});
+      const std::size_t style = styleOf(p.curve, own);
+      out.push_back({p.curve, other ? kBlack : kCurveColours[style % std::size(kCurveColours)],
+                     other ? kPentagon : kFilled[style % std::size(kFilled)], other});
       own += other ? 0 : 1;
       curve = out.end() - 1;
     }
@@ -165,7 +177,7 @@ std::string chartScript(const std::string& title, const std::vector<ChartPoint>&
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const ChartPoint& a, const ChartPoint& b) { return a.cpu < b.cpu; });
   out += block("front", sorted, {}, frame, [](const ChartPoint& p) { return p.onFront; });
-  plot += "$front using 1:2 with lines lw 9 lc '#e8e2c8' title 'Pareto front'";
+  plot += "$front using 1:2 with steps lw 9 lc '#e8e2c8' title 'Pareto front'";
   for (std::size_t k = 0; k < curves.size(); ++k) {
     const std::string name = fmt::format("c{}", k);
     const auto blockOf = [&](const std::string& called, bool failed) {
@@ -177,7 +189,7 @@ std::string chartScript(const std::string& title, const std::vector<ChartPoint>&
         ", \\\n  NaN with linespoints lw 2 pt {2} ps 0.7 lc '{1}' title '{3}'"  // in the key even if all failed
         ", \\\n  ${0} using 1:2 with linespoints lw 2 pt {2} ps 0.7 lc '{1}' notitle"
         ", \\\n  ${0}failed using 1:2 with points pt 2 ps 0.8 lw 2 lc '{1}' notitle",
-        name, curves[k].colour, 5 + 2 * (k % 5), spaced(curves[k].name));
+        name, curves[k].colour, curves[k].symbol, spaced(curves[k].name));
   }
   const bool others = std::any_of(curves.begin(), curves.end(), [](const Curve& c) { return c.isOther; });
   out += fmt::format("set label 'numbers: substep, ms{}' at graph 1.02, graph 0 left tc '#888888' font ',11'\n",
