@@ -79,6 +79,7 @@ TEST(SurfaceSmoothing, AStepBetweenHostsIsASlopeInThePicture) {
   PictureState state;
   state.frame.bodies.resize(1);
   state.frame.bodies[0].nodes = model->restNodes;
+  state.frame.bodies[0].spheres.resize(model->spheres.size());
   Renderer renderer(rendererSettings(32, 32, "auto", Quality::draft));
   const SceneView view(loaded, state.frame, renderer);
   const Points stepped = thinnedBeyond(0.08, model->restNodes);
