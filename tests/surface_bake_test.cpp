@@ -22,7 +22,7 @@ TEST(SurfaceBake, ADolphinHasAnEyeOnEachSideOfItsHead) {
   for (std::size_t i = 0; i < mesh.position.size(); ++i) {
     if (mesh.albedo[i].r > 0.04f) continue;
     ++dark[mesh.position[i].z > 0];
-    EXPECT_NEAR(mesh.position[i].x, 0.97f, 0.05f);
+    EXPECT_NEAR(mesh.position[i].x, 0.905f, 0.05f);  // where the shape has its eyeballs
   }
   for (const int vertices : dark) {
     EXPECT_GE(vertices, 2);

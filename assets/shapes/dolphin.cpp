@@ -71,16 +71,15 @@ static double trunk(const Vector3d& p) {
 }
 
 // Rostrum with the mouth line, eyes and blowhole. The small blend keeps the crease in front of the melon.
-static double withHead(double d, const Vector3d& p) {
+static double withHead(double d, const Vector3d& p, const DolphinMouth& mouth) {
   const Vector3d q(p.x(), p.y(), 0.8 * p.z());
   const double upper = roundCone(q, {snout - 25, -3, 0}, {snout - 270, 14, 0}, 24, 54);
   const double lower = roundCone(q, {snout - 17, -20, 0}, {snout - 270, -34, 0}, 22, 58);
   d = smoothMin(d, smoothMin(upper, lower, 10), 22);
   const double behind = snout - p.x();
-  // As wide as what is drawn can follow: between vertices 15 mm apart a narrow crease is a row of blotches.
-  const double fromMouth = (p.y() + 12 - 26 * smoothStep(160, 290, behind)) / 18;
+  const double fromMouth = (p.y() + 12 - 26 * smoothStep(160, 290, behind)) / mouth.halfWidth;
   const double lips = std::max(1 - fromMouth * fromMouth, 0.0);
-  d += 3 * lips * lips * (1 - smoothStep(275, 305, behind));
+  d += mouth.depth * lips * lips * (1 - smoothStep(275, 305, behind));
   d = smoothMin(d, (Vector3d(p.x(), p.y(), std::abs(p.z())) - Vector3d(snout - 345, 24, 122)).norm() - 13, 7);
   return smoothMax(d, -roundCone(p, {snout - 366, 172, -12}, {snout - 366, 172, 12}, 9, 9), 8);
 }
@@ -133,8 +132,8 @@ static double pectoralFin(const Vector3d& p, double rim) {
   return fin({q.dot(back), span, q.dot(back.cross(out))}, outline, 0.16, rim);
 }
 
-double dolphin(const Vector3d& p, double finRim) {
-  double d = withHead(trunk(p), p);
+double dolphin(const Vector3d& p, double finRim, const DolphinMouth& mouth) {
+  double d = withHead(trunk(p), p, mouth);
   d = smoothMin(d, dorsalFin(p, finRim), 45);
   d = smoothMin(d, flukes(p, finRim), 40);
   return smoothMin(d, pectoralFin(p, finRim), 45);

@@ -33,8 +33,8 @@ static std::vector<MeshRecipe> recipes() {
   const Box liverBox{{-160, -85, -100}, {100, 125, 60}}, stomachBox{{-60, -140, -110}, {155, 130, 75}};
   const Box colonBox{{-165, -315, -110}, {185, 30, 90}}, intestineBox{{-130, -300, -60}, {150, -110, 100}};
   const Box dolphinBox{{-1290, -480, -520}, {1290, 480, 520}};
-  const auto thinFins = [](const Eigen::Vector3d& p) { return dolphin(p, 6); };
-  const auto thickFins = [](const Eigen::Vector3d& p) { return dolphin(p, 20); };
+  const auto thinFins = [](const Eigen::Vector3d& p) { return dolphin(p, 6, {18, 3}); };
+  const auto thickFins = [](const Eigen::Vector3d& p) { return dolphin(p, 20, {8, 6}); };
   return {{"gallbladder", "gallbladder", gallbladder, gallbladderBox, 1.0, {466, 15, 0.4}},
           {"gallbladder", "gallbladder_fine", gallbladder, gallbladderBox, 0.8, {20000, 15, 0.4}},
           {"liver", "liver", liver, liverBox, 2.5, {2000, 40, 0.4}},

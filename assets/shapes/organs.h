@@ -33,7 +33,11 @@ double cavity(const Eigen::Vector3d& p);
 
 // A bottlenose dolphin, 2.5 m, in a frame of its own: +x towards the snout, +y dorsal, +z its right; origin half way
 // along it. `finRim` is half the thickness of the fins' rims in mm: thin for the picture, thicker where few triangles
-// have to carry it.
-double dolphin(const Eigen::Vector3d& p, double finRim);
+// have to carry it. `mouth`: of the crease between the lips, mm; for the picture as wide as vertices 15 mm apart can
+// follow, or it would be a row of blotches.
+struct DolphinMouth {
+  double halfWidth, depth;
+};
+double dolphin(const Eigen::Vector3d& p, double finRim, const DolphinMouth& mouth);
 
 }  // namespace medulla
