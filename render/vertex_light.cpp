@@ -125,7 +125,8 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
 void lightMetal(const Shading& v, vec3 tangent, const Surroundings& s, LitVertex& out) {
   const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
   // The outline's vertices look away by up to an edge; as they are, they would mirror what is behind them, black.
-  const vec3 normal = facing < 0 ? glm::normalize(v.normal - facing * v.toEye) : v.normal;
+  const vec3 bent = v.normal - facing * v.toEye;
+  const vec3 normal = facing < 0 ? bent / std::max(glm::length(bent), 0.1f) : v.normal;
   const vec3 mirrored = 2.f * std::max(facing, 0.f) * normal - v.toEye;
   const float above = mirrored.y * 0.5f + 0.5f, toLamp = glm::dot(mirrored, v.toLight);
   const float lamp = 0.9f * smoothStep(0.75f, 0.99f, toLamp) + 0.22f * smoothStep(-0.2f, 0.5f, toLamp);
