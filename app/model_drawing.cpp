@@ -130,8 +130,7 @@ void drawSpheres(const SceneBody& body, const BodyFrame& frame, Drawing& out) {
   const glm::vec4 colour = glm::mix(kSphereColour, own, kOwn);
   for (std::size_t i = 0; i < model.spheres.size(); ++i) {
     const FillingSphere& sphere = model.spheres[i];
-    const SpherePose& pose = frame.spheres[i];
-    const Vector3d centre = pose.position + pose.worldFromSphere * (sphere.restBallCentre - sphere.restFrame);
+    const Vector3d centre = ballCentre(sphere, frame.spheres[i]);
     const bool fixed = std::any_of(body.fixed.begin(), body.fixed.end(),
                                    [&](const FixedSphere& f) { return f.sphere == static_cast<int>(i); });
     out.balls.push_back({toGlm(centre), float(sphere.radius), fixed ? kFixedSphereColour : colour});
@@ -176,6 +175,10 @@ void drawFrames(const CarriedLink& link, float length, Drawing& out) {
 }
 
 }  // namespace
+
+Eigen::Vector3d ballCentre(const FillingSphere& sphere, const SpherePose& pose) {
+  return pose.position + pose.worldFromSphere * (sphere.restBallCentre - sphere.restFrame);
+}
 
 void drawBodyModel(const SceneBody& body, const BodyFrame& frame, const Shown& shown, float height, Drawing& out) {
   const SoftBodyModel& model = *body.model;

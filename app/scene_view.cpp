@@ -45,9 +45,7 @@ void ballsOf(const SoftBodyModel& model, const BodyFrame& frame, std::vector<Sha
   out.clear();
   for (std::size_t i = 0; i < model.spheres.size(); ++i) {
     const FillingSphere& sphere = model.spheres[i];
-    const auto& pose = frame.spheres[i];
-    out.push_back({toGlm(pose.position + pose.worldFromSphere * (sphere.restBallCentre - sphere.restFrame)),
-                   float(sphere.radius)});
+    out.push_back({toGlm(ballCentre(sphere, frame.spheres[i])), float(sphere.radius)});
   }
 }
 

@@ -73,7 +73,7 @@ void drawCurve(const StripChart& chart, const StripCurve& curve, const Layout& l
   const vec2 last = point(count - 1);
   vec2 from = point(0);
   for (std::size_t k = 1; k < count; ++k) {
-    const vec2 to = k + 1 < count ? point(k) : last;
+    const vec2 to = point(k);
     if (k + 1 < count && glm::distance(from, to) < kShortest) continue;
     ink.stroke(from, to, 2.2f * layout.thin);
     from = to;
