@@ -63,15 +63,14 @@ void pushFrame(WorldData& d, int frame, Lanes force, Lanes torque) {
 void pushFrames(WorldData& d, const LoadedHost& loaded) {
   Identified& s = d.identified;
   const SkinHost& host = s.hosts[loaded.host];
-  const HomeFrame home = homeFrame(s, host);
   SkinTermState* states = s.termStates.data() + host.firstTerms;
-  seeFrames<false>(s, host, home, states);
+  const HostFrame own = seeFrames<false>(s, host, states);
   std::fill_n(s.termLoads.begin(), 4 * (host.endTerms - host.firstTerms), SkinTermLoad{});
   Lanes3 sum = zeroVectors(), moment = sum;
   for (int k = loaded.first; k < loaded.end; ++k) {
     const SkinGroup& g = s.skin[s.ofNodeGroup[d.skinLoads.groups[k].group]];
     const SkinPlace place = placeSkin<false>(s, g, states);
-    const Lanes3 force = rotateBack(home.rotation, d.skinLoads.groups[k].force);
+    const Lanes3 force = rotateBack(own.rotation, d.skinLoads.groups[k].force);
     sum = sum + force;
     moment = moment + cross(place.offset, force);
     giveToTerms(s, g, place.turn, force, s.termLoads.data());
@@ -82,8 +81,7 @@ void pushFrames(WorldData& d, const LoadedHost& loaded) {
     storeFour(torque, torques, 0);
     for (int l = 0; l < 4; ++l) pushFrame(d, static_cast<int>(frames[l]), load(forces[l]), load(torques[l]));
   };
-  const HomeLoad own = giveToFrames(s, host, home.rotation, states, s.termLoads.data(), sum, moment, give);
-  pushFrame(d, host.home, own.force, own.moment);
+  giveToFrames(s, host, own, states, s.termLoads.data(), sum, moment, give);
 }
 
 void pushLink(WorldData& d, const LoadedHost& loaded) {

@@ -74,25 +74,26 @@ struct StrainedLinkState {
   LinkMeasures6 damped;
 };
 
-// ---- Nodes: those of one sphere are seen from its frame, their home, and so are the other frames that any of them
-// hangs on.
+// ---- Nodes: those of one sphere, their home, are seen from a frame that stands there and is turned as the frames they
+// hang on are in the mean. So are these frames, home first.
 
-struct SkinTerms {  // four of those frames; a host's last are filled up with its home
+struct SkinTerms {  // four of those frames; a host's last are filled up with its home, without a share
   std::uint32_t frame[4];
+  Lanes share;                  // in how the host's own frame is turned; 1 in sum over a host's
   Lanes3 restPlace;             // m, from the home's
   Lanes3 axis;                  // unit: along that line; 0 of home
   Lanes length, inverseLength;  // m, 1/m, of it; 0 of home
 };
 
-// The frames as they are seen from home; four at a time, so that number i of the one in a lane is 4 i + lane doubles
-// from the beginning.
+// The frames as they are seen from the host's own; four at a time, so that number i of the one in a lane is 4 i + lane
+// doubles from the beginning.
 struct SkinTermState {
   Lanes3 way, turn;          // m, how far they are from where they are at rest; twice their quaternion's vector part
   Lanes3 wayRate, turnRate;  // m/s, 1/s
   Lanes3 spare, spareRate;   // m, m/s: the part of the way along the axis beyond what thins the body
   Lanes3 place;              // m, from home
   Lanes cosine;              // of half the angle
-  Lanes spareSlope;          // of the spare part, by the way along the axis
+  Lanes3 spareRow;           // 1: of the spare part, by the way
 };
 
 struct SkinHost {
@@ -110,12 +111,13 @@ struct alignas(16) SkinShare {
   std::int32_t term, state;  // the frame's number among its host's, and its first number's in SkinTermState, in doubles
 };
 
-struct SkinGroup {  // four nodes
+struct alignas(32) SkinGroup {          // four nodes
+  float homeTurn[9][4], homeWeight[4];  // as SkinShare, of home, which is always where it is at rest
   int host;
-  int firstShare, endShare;
-  Lanes3 restOffset;   // m, from home
-  Lanes3 lever;        // m: what turns with the nodes' own frames to second order
-  Lanes normalExcess;  // N/m5: what the attachment is stiffer along the node's area, over that area's square
+  int firstShare, endShare;  // of the host's other frames
+  Lanes3 restOffset;         // m, from home
+  Lanes3 lever;              // m: what turns with the nodes' own frames to second order
+  Lanes normalExcess;        // N/m5: what the attachment is stiffer along the node's area, over that area's square
 };
 
 struct SkinTermLoad {  // of one frame, per node in each lane: on way, turn and spare
@@ -145,7 +147,7 @@ struct Identified {
   std::vector<SkinTermLoad> termLoads;    // of one host, while its nodes return theirs
   std::vector<SkinShare> shares;
   std::vector<SkinGroup> skin;
-  std::vector<Lanes3> turns;     // per SkinGroup: of its nodes' own frames against home; of the current substep
+  std::vector<Lanes3> turns;     // per SkinGroup: of its nodes' own frames against the host's; of the current substep
   std::vector<int> ofNodeGroup;  // per group of nodes: in `skin`, -1 of others
 };
 

@@ -222,13 +222,12 @@ void setIdentifiedFrameRates(WorldData& d, const Motion& motion) {
 void carryOnFrames(WorldData& d, const HostRange& range, std::vector<Quad>& carried) {
   Identified& s = d.identified;
   const SkinHost& host = s.hosts[s.skin[s.ofNodeGroup[range.firstGroup]].host];
-  const HomeFrame home = homeFrame(s, host);
   SkinTermState* states = &s.termStates[host.firstTerms];
-  seeFrames<true>(s, host, home, states);
+  const HostFrame own = seeFrames<true>(s, host, states);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const SkinPlace place = placeSkin<true>(s, s.skin[s.ofNodeGroup[g]], states);
-    const Lanes3 along = cross(home.omega, rotate(home.rotation, place.offset));
-    storeFour(home.velocity + along + rotate(home.rotation, place.offsetRate), carried, 4 * g);
+    const Lanes3 along = cross(own.omega, rotate(own.rotation, place.offset));
+    storeFour(own.velocity + along + rotate(own.rotation, place.offsetRate), carried, 4 * g);
   }
 }
 

@@ -5,14 +5,18 @@
 #include <cstddef>
 #include <map>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "physics/dynamics/identified_measures.h"
 #include "physics/dynamics/identified_mechanics.h"
+#include "physics/dynamics/skin_map.h"
 
 namespace medulla {
 
 namespace {
 
+using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // One body's frames: its spheres', and the points of held patches that links and nodes ask for, each once.
@@ -115,6 +119,8 @@ class HostTerms {
   HostTerms(Identified& s, int home, const Vector3d& homePlace, double poisson) : s_(&s), homePlace_(homePlace) {
     host_ = static_cast<int>(s.hosts.size());
     s.hosts.push_back({home, static_cast<int>(s.terms.size()), static_cast<int>(s.terms.size()), thinningOf(poisson)});
+    of(home, homePlace);
+    weights_[0] = 0;
   }
   int host() const { return host_; }
   const Vector3d& homePlace() const { return homePlace_; }
@@ -140,24 +146,49 @@ class HostTerms {
     }
     return found->second;
   }
+  // A node has so much of a frame. What is held is turned nowhere, wherever a patch is seen from: one frame stands for
+  // all.
+  void weigh(int term, double weight) {
+    if (s_->carried[frameOf(*s_, s_->hosts[host_], term)].sphere < 0) held_ = term = held_ < 0 ? term : held_;
+    weights_[term] += weight;
+  }
+  // How the host's own frame is turned: home counts three times as much as all of the six frames together that the
+  // nodes have most of. With these alone bodies that bend swell, as blends of rotations let them; with home alone they
+  // shrink (tests/accuracy/limits.md).
+  void setShares() const {
+    constexpr double kHome = 3;
+    std::vector<std::pair<int, double>> most(weights_.begin(), weights_.end());
+    const auto isBefore = [](const auto& a, const auto& b) { return a.second > b.second; };
+    std::stable_sort(most.begin() + 1, most.end(), isBefore);
+    most.resize(std::min<std::size_t>(most.size(), kSkinFrames));
+    double sum = 0;
+    for (const auto& [term, weight] : most) sum += weight;
+    for (const auto& [term, weight] : most) {
+      const double all = sum > 0 ? weight / sum : 1, ofHome = term == 0 ? kHome : 0;
+      s_->terms[s_->hosts[host_].firstTerms + term / 4].share[term % 4] = (all + ofHome) / (1 + kHome);
+    }
+  }
 
  private:
   Identified* s_;
   Vector3d homePlace_;
   int host_;
   std::map<int, int> number_;
+  std::map<int, double> weights_;  // by term, home first
+  int held_ = -1;                  // a term
 };
+
+void setColumns(const Matrix3d& map, int lane, float (*columns)[4]) {
+  for (int j = 0; j < 3; ++j)
+    for (int i = 0; i < 3; ++i) columns[3 * j + i][lane] = static_cast<float>(map(i, j));
+}
 
 // `axis`: from home to the frame.
 void setMap(SkinShare& share, int lane, const SkinRow& row, double weight, const Vector3d& axis) {
   share.weight[lane] = static_cast<float>(weight);
   share.along[lane] = static_cast<float>(axis.dot(row.onWay * axis));
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      share.map[3 * j + i][lane] = static_cast<float>(row.onWay(i, j));
-      share.map[9 + 3 * j + i][lane] = static_cast<float>(row.onTurn(i, j));
-    }
-  }
+  setColumns(row.onWay, lane, share.map);
+  setColumns(row.onTurn, lane, share.map + 9);
 }
 
 // Four nodes, -1 on pads.
@@ -175,9 +206,14 @@ void addSkin(WorldData& d, int body, const BodyMechanics& mechanics, const std::
     const std::vector<SkinRow> rows = skinRows(m, skin, nodes[l]);
     for (std::size_t k = 0; k < skin.size() && mechanics.nodeMoves[nodes[l]]; ++k) {
       const int frame = frames.of(skin[k].frame, skin[k].restPoint);
-      if (frame == s.hosts[terms.host()].home) continue;
       const Vector3d place = frames.restPoint(skin[k].frame, skin[k].restPoint);
       const int term = terms.of(frame, place);
+      terms.weigh(term, skin[k].weight);
+      if (term == 0) {
+        setColumns(rows[k].onTurn, l, group.homeTurn);
+        group.homeWeight[l] = static_cast<float>(skin[k].weight);
+        continue;
+      }
       SkinShare& share = shares[term];
       constexpr int kDoubles = sizeof(SkinTermState) / sizeof(double);
       share.term = term;
@@ -211,6 +247,7 @@ void addSkins(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
         addSkin(d, body, mechanics, {nodeAt[4 * g], nodeAt[4 * g + 1], nodeAt[4 * g + 2], nodeAt[4 * g + 3]}, terms,
                 frames);
       }
+      terms.setShares();
     }
   }
 }

@@ -4,10 +4,12 @@
 
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/pair_numbers.h"
+#include "physics/dynamics/skin_map.h"
 #include "physics/model/cross_matrix.h"
 
-// What the spheres of an identified body feel of the nodes' masses, J^T m J, between all frames of a node. Seen from
-// home (skin_map.h) a node's velocity is, but for the second order and what stretch thins,
+// What the spheres of an identified body feel of the nodes' masses, J^T m J, between all frames of a node. Seen in the
+// host's frame (skin_map.h) a node's velocity is, but for the second order, what stretch thins, and how that frame
+// turns while frames are turned against each other,
 //   v + omega x offset + sum map_k (v_k - v - omega x place_k, omega_k - omega),
 // with maps that never change. So the sum over a host's nodes is taken once, in the motions of home and of the frames
 // against it; where the frames are by now enters with their places. Node by node it took longer than all else of a
@@ -61,7 +63,7 @@ std::vector<NodeMap> mapsOf(const Identified& s, const SkinGroup& g, int lane) {
   return out;
 }
 
-// kg, in the home frame.
+// kg, in the host's frame.
 Matrix3d massOf(const WorldData& d, const ImplicitData& s, int node) {
   const Vector3d area = vectorOf(d.nodes.groups[node / 4].restArea, node % 4);
   return s.carriedMass[node] * Matrix3d::Identity() + s.carriedNormal[node] * area * area.transpose();
@@ -85,8 +87,7 @@ void layOutHost(const WorldData& d, const HostRange& range, PairNumbers& pairs, 
     }
   }
   const auto sphereOf = [&](int term) {
-    const int frame =
-        term < 0 ? host.home : static_cast<int>(identified.terms[host.firstTerms + term / 4].frame[term % 4]);
+    const int frame = term < 0 ? host.home : frameOf(identified, host, term);
     return identified.carried[frame].sphere;
   };
   CarriedHost out{number, static_cast<int>(s.carriedBlocks.size()), 0};
@@ -100,11 +101,13 @@ void layOutHost(const WorldData& d, const HostRange& range, PairNumbers& pairs, 
   s.homeColumn.resize(std::max<std::size_t>(s.homeColumn.size(), 1 + 4 * (host.endTerms - host.firstTerms)));
 }
 
-// The host's frames as they stand, in its home frame.
+// The host's frames as they stand, seen in its own.
 class PlacedFrames {
  public:
-  PlacedFrames(const Identified& s, const SkinHost& host)
-      : s_(&s), host_(&host), rotation_(quaternionOf(s.frames[host.home].orientation).toRotationMatrix()) {}
+  PlacedFrames(const Identified& s, const SkinHost& host) : s_(&s), host_(&host) {
+    const Rotation r = hostFrame(s, host).rotation;
+    rotation_ << vectorOf(r.x, 0), vectorOf(r.y, 0), vectorOf(r.z, 0);
+  }
   Vector3d place(int term) const { return vectorOf(s_->termStates[host_->firstTerms + term / 4].place, term % 4); }
   // Block of the spheres' own motions, in the world's frame.
   Block6 ofSpheres(const CarriedBlock& b, const Block6& ofFrames) const {
@@ -114,8 +117,7 @@ class PlacedFrames {
 
  private:
   Vector3d arm(int term) const {
-    const auto frame =
-        term < 0 ? host_->home : static_cast<int>(s_->terms[host_->firstTerms + term / 4].frame[term % 4]);
+    const int frame = term < 0 ? host_->home : frameOf(*s_, *host_, term);
     return rotation_.transpose() * vectorOf(s_->carried[frame].worldArm);
   }
 

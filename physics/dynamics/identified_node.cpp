@@ -1,4 +1,5 @@
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <vector>
 
 #include "physics/dynamics/identified_stages.h"
@@ -15,24 +16,47 @@ namespace {
 
 // A host's frames as they are, without a world to write to; up to the thread's next call.
 struct SeenHost {
-  HomeFrame home;
+  HostFrame own;
   const SkinTermState* states;
 };
 
 SeenHost see(const Identified& s, const SkinHost& host) {
   thread_local std::vector<SkinTermState> room;  // kept: tools ask in every substep
   room.resize(host.endTerms - host.firstTerms);
-  const SeenHost out{homeFrame(s, host), room.data()};
-  seeFrames<false>(s, host, out.home, room.data());
-  return out;
+  const HostFrame own = seeFrames<false>(s, host, room.data());
+  return {own, room.data()};
 }
 
 void add(HostPoint& p, const CarriedFrame& frame, const Matrix3d& force, const Matrix3d& torque) {
   if (frame.sphere < 0) return;
-  p.spheres[p.count] = frame.sphere;
-  p.force[p.count] = force;
-  p.torque[p.count] = torque + crossMatrix(vectorOf(frame.worldArm)) * force;
-  ++p.count;
+  const auto known = std::find(p.spheres.begin(), p.spheres.begin() + p.count, frame.sphere);
+  const auto k = known - p.spheres.begin();
+  if (k == p.count) {
+    ++p.count;
+    p.spheres[k] = frame.sphere;
+    p.force[k].setZero();
+    p.torque[k].setZero();
+  }
+  p.force[k] += force;
+  p.torque[k] += torque + crossMatrix(vectorOf(frame.worldArm)) * force;
+}
+
+Matrix3d matrixOf(const Rotation& r) {
+  Matrix3d out;
+  out << vectorOf(r.x, 0), vectorOf(r.y, 0), vectorOf(r.z, 0);
+  return out;
+}
+
+Matrix3d transposed(const float (*columns)[4], int lane) {
+  Matrix3d out;
+  for (int j = 0; j < 3; ++j)
+    for (int i = 0; i < 3; ++i) out(j, i) = columns[3 * j + i][lane];
+  return out;
+}
+
+// Columns: as torqueOnFrame() of skin_map.h.
+Matrix3d torqueOnFrame(const SkinTermState& at, int lane, const Matrix3d& onTurn) {
+  return at.cosine[lane] * onTurn + 0.5 * crossMatrix(vectorOf(at.turn, lane)) * onTurn;
 }
 
 }  // namespace
@@ -42,7 +66,7 @@ Vector3d positionOnFrames(const WorldData& d, int node) {
   const SkinGroup& g = s.skin[s.ofNodeGroup[node / 4]];
   const SeenHost seen = see(s, s.hosts[g.host]);
   const SkinPlace place = placeSkin<false>(s, g, seen.states);
-  return vectorOf(seen.home.position + rotate(seen.home.rotation, place.offset), node % 4);
+  return vectorOf(seen.own.position + rotate(seen.own.rotation, place.offset), node % 4);
 }
 
 // The transpose of the rates in skin_map.h for one node, column by column of its force.
@@ -53,37 +77,39 @@ HostPoint hostPointOnFrames(const WorldData& d, int node) {
   const SeenHost seen = see(s, host);
   const int lane = node % 4;
   const SkinPlace place = placeSkin<false>(s, g, seen.states);
-  const Matrix3d r = quaternionOf(s.frames[host.home].orientation).toRotationMatrix();
+  const Matrix3d r = matrixOf(seen.own.rotation);
   const Vector3d turn = vectorOf(place.turn, lane), lever = vectorOf(g.lever, lane);
-  // Of the second order by the turn of the node's own frame: (s.P) / 2 + s P^T / 2 - P s^T.
+  // Of the second order by the turn of the node's own frame: (s.P) / 2 + s P^T / 2 - P s^T; transposed.
   const Matrix3d second =
-      0.5 * turn.dot(lever) * Matrix3d::Identity() + 0.5 * turn * lever.transpose() - lever * turn.transpose();
+      0.5 * turn.dot(lever) * Matrix3d::Identity() + 0.5 * lever * turn.transpose() - turn * lever.transpose();
   HostPoint p;
   Matrix3d force = r.transpose(), moment = crossMatrix(vectorOf(place.offset, lane)) * r.transpose();
+  const auto give = [&](int term, const Matrix3d& onWay, const Matrix3d& onTurn) {
+    const SkinTermState& at = seen.states[term / 4];
+    const Matrix3d f = onWay * r.transpose(), torque = torqueOnFrame(at, term % 4, onTurn * r.transpose());
+    force -= f;
+    moment -= torque + crossMatrix(vectorOf(at.place, term % 4)) * f;
+    add(p, s.carried[frameOf(s, host, term)], r * f, r * torque);
+  };
+  give(0, Matrix3d::Zero(), transposed(g.homeTurn, lane) + static_cast<double>(g.homeWeight[lane]) * second);
   for (int k = g.firstShare; k < g.endShare; ++k) {
     const SkinShare& share = s.shares[k];
-    Matrix3d onWay, onTurn;
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        onWay(j, i) = share.map[3 * j + i][lane];
-        onTurn(j, i) = share.map[9 + 3 * j + i][lane];
-      }
-    }
+    Matrix3d onWay = transposed(share.map, lane);
+    const Matrix3d onTurn = transposed(share.map + 9, lane);
     if (onWay.isZero(0) && onTurn.isZero(0) && share.weight[lane] == 0) continue;  // another node's
-    onTurn += static_cast<double>(share.weight[lane]) * second.transpose();
-    const SkinTermState& at = seen.states[share.term / 4];
-    const SkinTerms& term = s.terms[host.firstTerms + share.term / 4];
-    const int l = share.term % 4;
-    const Vector3d axis = vectorOf(term.axis, l);
+    const int t = share.term / 4, l = share.term % 4;
+    const Vector3d axis = vectorOf(s.terms[host.firstTerms + t].axis, l);
     const double along = share.along[lane];
-    onWay += at.spareSlope[l] * axis * (along * axis - onWay.transpose() * axis).transpose();
-    const Matrix3d f = onWay * r.transpose(), t = onTurn * r.transpose();
-    const Matrix3d torque = at.cosine[l] * t + 0.5 * crossMatrix(vectorOf(at.turn, l)) * t;
-    force -= f;
-    moment -= torque + crossMatrix(vectorOf(at.place, l)) * f;
-    add(p, s.carried[term.frame[l]], r * f, r * torque);
+    onWay += vectorOf(seen.states[t].spareRow, l) * (along * axis - onWay.transpose() * axis).transpose();
+    give(share.term, onWay, onTurn + static_cast<double>(share.weight[lane]) * second);
   }
-  add(p, s.carried[host.home], r * force, r * moment);
+  add(p, s.carried[host.home], r * force, Matrix3d::Zero());
+  for (int term = 0; term < 4 * (host.endTerms - host.firstTerms); ++term) {
+    const double share = s.terms[host.firstTerms + term / 4].share[term % 4] * seen.own.inverseLength[0];
+    if (share == 0) continue;
+    const Matrix3d torque = torqueOnFrame(seen.states[term / 4], term % 4, share * moment);
+    add(p, s.carried[frameOf(s, host, term)], Matrix3d::Zero(), r * torque);
+  }
   return p;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "physics/dynamics/point_spring.h"
+#include "physics/dynamics/skin_map.h"
 #include "physics/dynamics/world_data.h"
 
 // The stages of a substep on bodies with LinkModel::identified; each is called by its counterpart in stages.h.
@@ -36,8 +37,8 @@ class FrameReturn {
  private:
   WorldData* d_;
   const SkinHost* host_;
-  Rotation rotation_;
-  Lanes3 force_, moment_;  // in the home frame
+  HostFrame own_;
+  Lanes3 force_, moment_;  // seen in it
 };
 
 // identified_node.cpp

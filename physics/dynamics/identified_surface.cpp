@@ -19,21 +19,13 @@ SkinTermState* statesOf(Identified& s, const SkinHost& host) {
   return s.termStates.data() + host.firstTerms;
 }
 
-// The host's frames, seen from its home.
-template <bool withRates>
-MEDULLA_INLINE HomeFrame seeHost(Identified& s, const SkinHost& host) {
-  const HomeFrame home = homeFrame(s, host);
-  seeFrames<withRates>(s, host, home, statesOf(s, host));
-  return home;
-}
-
 }  // namespace
 
 void pullOnFrames(WorldData& d, const HostRange& range) {
   Nodes& n = d.nodes;
   Identified& s = d.identified;
   const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
-  const HomeFrame home = seeHost<true>(s, host);
+  const HostFrame own = seeFrames<true>(s, host, statesOf(s, host));
   const NodeGroup* constants = constantsOf(n, range);
   const Lanes relaxation = splat(range.relaxation);
   Lanes volume = splat(0);
@@ -42,10 +34,9 @@ void pullOnFrames(WorldData& d, const HostRange& range) {
     const SkinPlace place = placeSkin<true>(s, s.skin[skin], statesOf(s, host));
     put(place.turn, s.turns[skin]);
     const NodeGroup& group = constants[g];
-    const Lanes3 offset = rotate(home.rotation, place.offset), area = rotate(home.rotation, group.restArea);
-    const Lanes3 lever = n.position[g] - home.position, displaced = lever - offset;
-    const Lanes3 rate =
-        home.velocity + cross(home.omega, lever) + rotate(home.rotation, place.offsetRate) - n.velocity[g];
+    const Lanes3 offset = rotate(own.rotation, place.offset), area = rotate(own.rotation, group.restArea);
+    const Lanes3 lever = n.position[g] - own.position, displaced = lever - offset;
+    const Lanes3 rate = own.velocity + cross(own.omega, lever) + rotate(own.rotation, place.offsetRate) - n.velocity[g];
     const Lanes lifted = dot(displaced, area), lifting = dot(rate, area), excess = s.skin[skin].normalExcess;
     volume = volume + lifted;
     const Lanes3 pull = fnma(group.stiffness, displaced, (group.stiffness * relaxation) * rate);
@@ -78,34 +69,32 @@ void placeOnFrames(WorldData& d, const HostRange& range) {
   Nodes& n = d.nodes;
   Identified& s = d.identified;
   const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
-  const HomeFrame home = seeHost<true>(s, host);
+  const HostFrame own = seeFrames<true>(s, host, statesOf(s, host));
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const SkinPlace place = placeSkin<true>(s, s.skin[s.ofNodeGroup[g]], statesOf(s, host));
-    const Lanes3 offset = rotate(home.rotation, place.offset);
+    const Lanes3 offset = rotate(own.rotation, place.offset);
     put(place.turn, s.turns[s.ofNodeGroup[g]]);
     put(offset, n.offset[g]);
-    put(home.position + offset + gatherFour(n.displaced, 4 * g), n.position[g]);
-    const Lanes3 velocity = home.velocity + cross(home.omega, offset) + rotate(home.rotation, place.offsetRate);
+    put(own.position + offset + gatherFour(n.displaced, 4 * g), n.position[g]);
+    const Lanes3 velocity = own.velocity + cross(own.omega, offset) + rotate(own.rotation, place.offsetRate);
     put(velocity, n.velocity[g]);
-    put(rotate(home.rotation, n.groups[g].restArea), n.area[g]);
+    put(rotate(own.rotation, n.groups[g].restArea), n.area[g]);
   }
 }
 
 void placeSkinOnFrames(WorldData& d, const HostRange& range) {
   Identified& s = d.identified;
   const SkinHost& host = s.hosts[hostOf(d, range.firstGroup)];
-  const HomeFrame home = seeHost<false>(s, host);
+  const HostFrame own = seeFrames<false>(s, host, statesOf(s, host));
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const SkinPlace place = placeSkin<false>(s, s.skin[s.ofNodeGroup[g]], statesOf(s, host));
-    put(home.position + rotate(home.rotation, place.offset), d.nodes.position[g]);
+    put(own.position + rotate(own.rotation, place.offset), d.nodes.position[g]);
   }
 }
 
 FrameReturn::FrameReturn(WorldData& d, const HostRange& range)
     : d_(&d), host_(&d.identified.hosts[hostOf(d, range.firstGroup)]) {
-  const Identified& s = d.identified;
-  const FrameState& home = s.frames[host_->home];
-  rotation_ = rotationOf(splat(home.orientation), splat(home.orientation.v[3]));
+  own_ = hostFrame(d.identified, *host_);
   force_ = moment_ = zeroVectors();
   std::fill_n(d.identified.termLoads.begin(), 4 * (host_->endTerms - host_->firstTerms), SkinTermLoad{});
 }
@@ -113,22 +102,19 @@ FrameReturn::FrameReturn(WorldData& d, const HostRange& range)
 void FrameReturn::add(int g, const Lanes3& force, const Lanes3& moment) {
   Identified& s = d_->identified;
   const int skin = s.ofNodeGroup[g];
-  const Lanes3 f = rotateBack(rotation_, force);
+  const Lanes3 f = rotateBack(own_.rotation, force);
   put(force_ + f, force_);
-  put(moment_ + rotateBack(rotation_, moment + cross(d_->nodes.offset[g], force)), moment_);
+  put(moment_ + rotateBack(own_.rotation, moment + cross(d_->nodes.offset[g], force)), moment_);
   giveToTerms(s, s.skin[skin], s.turns[skin], f, s.termLoads.data());
 }
 
 void FrameReturn::finish() {
   Identified& s = d_->identified;
-  const HomeLoad own = giveToFrames(s, *host_, rotation_, statesOf(s, *host_), s.termLoads.data(), force_, moment_,
-                                    [&](const std::uint32_t* frames, const Lanes3& force, const Lanes3& torque) {
-                                      addFour(force, s.loads.data(), frames, &FrameLoad::force);
-                                      addFour(torque, s.loads.data(), frames, &FrameLoad::torque);
-                                    });
-  FrameLoad& home = s.loads[host_->home];
-  addTo(home.force, own.force);
-  addTo(home.torque, own.moment);
+  giveToFrames(s, *host_, own_, statesOf(s, *host_), s.termLoads.data(), force_, moment_,
+               [&](const std::uint32_t* frames, const Lanes3& force, const Lanes3& torque) {
+                 addFour(force, s.loads.data(), frames, &FrameLoad::force);
+                 addFour(torque, s.loads.data(), frames, &FrameLoad::torque);
+               });
 }
 
 double normalEnergy(const WorldData& d, int node) {

@@ -71,7 +71,7 @@ struct CarriedBlock {
   int term0, term1;      // of the host's terms, not in falling order; -1: home
   int sphere0, sphere1;  // that carry these frames; -1: held
   int pair;              // in ImplicitData::pairs where they are two; -1 - k: the other way round
-  Block6 mass;           // kg, kg m, kg m2: in the home frame, of home's motion and of the others' against it
+  Block6 mass;           // kg, kg m, kg m2: seen in the host's frame, of home's motion and of the others' against it
 };
 struct CarriedHost {
   int host;        // in Identified::hosts

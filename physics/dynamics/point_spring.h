@@ -15,8 +15,9 @@ struct WorldData;
 // velocities are to it.
 struct HostPoint {
   int count = 0;  // of spheres; 0: the node has a mass of its own, or is a held one of a skin
-  std::array<int, kSkinFrames> spheres{};
-  std::array<Eigen::Matrix3d, kSkinFrames> force, torque;  // 1, m
+  static constexpr int kMost = 2 * kSkinFrames;  // those it hangs on, and those that turn its host's frame
+  std::array<int, kMost> spheres{};
+  std::array<Eigen::Matrix3d, kMost> force, torque;  // 1, m
 };
 
 // The common form of what tools do: ToolSpring and HeldNode.

@@ -3,68 +3,110 @@
 #include "physics/dynamics/frame_turn.h"
 #include "physics/dynamics/world_data.h"
 
-// How nodes follow the frames they hang on (physics/model/identified_network.h), seen from the frame of their home
-// sphere: with e_k and s_k how far frame k is from its place at rest and twice the vector part of its quaternion, both
-// in the home frame,
+// How nodes follow the frames they hang on (physics/model/identified_network.h), seen from their host's own frame: it
+// stands where the home sphere's does and is turned as the host's frames are in the mean (identified_data.h),
+//   R = Q / |Q|,   Q = sum share_k q_k.
+// With e_k and s_k how far frame k is from its place at rest and twice the vector part of its quaternion, both seen
+// from there,
 //   node = home + R (restOffset + sum (map_k (e_k - g_k, s_k) + along_k g_k) + s x (s x lever) / 2),
 //   s = sum weight_k s_k.
-// The maps are the skin's first derivatives, the last term what turning adds to second order. Stretch thins by
-// thinness(y) of thinning.h, not by 1 - nu y: with a the line between the two frames at rest, l its length and y =
-// a.e_k / l,
-//   g_k = a l (y - (1 - thinness(y)) / nu),   along_k = a.map_k a,
-// keeps what a way along the line does along that line, and takes from what it does across. Rates and the transpose are
-// exact:
-//   e_k' = R^T (v_k - v - omega x (x_k - home)),   s_k' = c_k D + D x s_k / 2,   D = R^T (omega_k - omega).
+// The maps are the skin's first derivatives, the last term what turning adds to second order. With a the line between
+// the two frames at rest, l its length, and y by how much it is longer now (stretchOf() of thinning.h),
+//   g_k = a (a.e_k - l (1 - thinness(y)) / nu),   along_k = a.map_k a,
+// keeps what a way along the line does along that line, and takes from what it does across: stretch thins by thinness,
+// not in proportion. Why it is measured so, and from there: physics/equations/links.md.
+// Rates and the transpose are exact; with (c_k, s_k / 2) the quaternion of frame k against R, all seen in R,
+//   e_k' = v_k - v - omega x (x_k - home),   s_k' = c_k D + D x s_k / 2,   D = omega_k - omega,
+//   omega = sum share_k (c_k omega_k + omega_k x s_k / 2) / |Q|,   |Q| = sum share_k c_k.
 namespace medulla {
 
-struct HomeFrame {  // the same in all lanes
+struct HostFrame {  // the same in all lanes
   Lanes3 position, q;
   Lanes w;
-  Lanes3 velocity, omega;
+  Lanes3 velocity, omega;  // m/s, rad/s; where rates are asked for
   Rotation rotation;
+  Lanes inverseLength;  // of Q
 };
 
-MEDULLA_INLINE HomeFrame homeFrame(const Identified& s, const SkinHost& host) {
-  const FrameState& f = s.frames[host.home];
-  HomeFrame out;
-  put(splat(f.position), out.position);
-  put(splat(f.orientation), out.q);
-  out.w = splat(f.orientation.v[3]);
-  put(splat(f.velocity), out.velocity);
-  put(splat(f.angularVelocity), out.omega);
+// Without rates. Frames that are turned by a whole turn against each other have no mean: Q's length is floored.
+MEDULLA_INLINE HostFrame hostFrame(const Identified& s, const SkinHost& host) {
+  Lanes sum = splat(0);
+  for (int t = host.firstTerms; t < host.endTerms; ++t)
+    for (int l = 0; l < 4; ++l)
+      sum = fma(splat(s.terms[t].share[l]), load(s.frames[s.terms[t].frame[l]].orientation), sum);
+  Quad q;
+  store(q, sum);
+  HostFrame out;
+  out.inverseLength = splat(1) / larger(squareRoot(splat(sumOfLanes(sum * sum))), splat(1e-3));
+  put(out.inverseLength * splat(q), out.q);
+  out.w = out.inverseLength * splat(q.v[3]);
+  put(splat(s.frames[host.home].position), out.position);
   out.rotation = rotationOf(out.q, out.w);
   return out;
 }
 
+inline int frameOf(const Identified& s, const SkinHost& host, int term) {
+  return static_cast<int>(s.terms[host.firstTerms + term / 4].frame[term % 4]);
+}
+
+// With the quaternion (c, turn / 2): c a + a x turn / 2 of a rate, and the transpose of a torque.
+MEDULLA_INLINE Lanes3 rateOfTurn(const SkinTermState& at, const Lanes3& a) {
+  return fma(at.cosine, a, splat(0.5) * cross(a, at.turn));
+}
+MEDULLA_INLINE Lanes3 torqueOnFrame(const SkinTermState& at, const Lanes3& onTurn) {
+  return fma(at.cosine, onTurn, splat(0.5) * cross(at.turn, onTurn));
+}
+
+// After seeFrames(): the rates of its states, and the host's own.
+MEDULLA_INLINE void seeRates(const Identified& s, const SkinHost& host, SkinTermState* states, HostFrame& to) {
+  const SkinTerms* terms = s.terms.data() + host.firstTerms;
+  const int count = host.endTerms - host.firstTerms;
+  Lanes3 sum = zeroVectors();
+  for (int t = 0; t < count; ++t) {
+    const Lanes3 spin =
+        rotateBack(to.rotation, gatherQuads(s.frames.data(), terms[t].frame, &FrameState::angularVelocity));
+    put(spin, states[t].turnRate);
+    put(fma(terms[t].share, rateOfTurn(states[t], spin), sum), sum);
+  }
+  Quad mean;
+  store(mean, sumOfLanes(to.inverseLength * sum));
+  const Lanes3 omega = splat(mean);
+  put(rotate(to.rotation, omega), to.omega);
+  put(splat(s.frames[host.home].velocity), to.velocity);
+  for (int t = 0; t < count; ++t) {
+    SkinTermState& at = states[t];
+    const Lanes3 velocity = gatherQuads(s.frames.data(), terms[t].frame, &FrameState::velocity) - to.velocity;
+    const Lanes3 wayRate = rotateBack(to.rotation, velocity) - cross(omega, at.place);
+    put(rateOfTurn(at, at.turnRate - omega), at.turnRate);
+    const Lanes3 beyond = dot(wayRate, at.spareRow) * terms[t].axis;
+    put(beyond, at.spareRate);
+    put(wayRate - beyond, at.wayRate);
+  }
+}
+
 // Sets the host's SkinTermStates, of the rates where they are asked for; `states` has one for each of its terms.
 template <bool withRates>
-MEDULLA_INLINE void seeFrames(const Identified& s, const SkinHost& host, const HomeFrame& home, SkinTermState* states) {
-  const Lanes half = splat(0.5);
-  for (int t = host.firstTerms; t < host.endTerms; ++t, ++states) {
+MEDULLA_INLINE HostFrame seeFrames(const Identified& s, const SkinHost& host, SkinTermState* states) {
+  HostFrame own = hostFrame(s, host);
+  SkinTermState* state = states;
+  for (int t = host.firstTerms; t < host.endTerms; ++t, ++state) {
     const SkinTerms& terms = s.terms[t];
     const FrameLanes frames = gatherFrames(s.frames.data(), terms.frame);
-    const RelativeTurn r = turnBetween(home.q, home.w, frames.q, frames.w);
-    states->cosine = r.cosine;
-    const Lanes3 turn = splat(2) * r.v;
-    put(turn, states->turn);
-    const Lanes3 from = frames.position - home.position, place = rotateBack(home.rotation, from);
-    put(place, states->place);
+    const RelativeTurn r = turnBetween(own.q, own.w, frames.q, frames.w);
+    state->cosine = r.cosine;
+    put(splat(2) * r.v, state->turn);
+    const Lanes3 place = rotateBack(own.rotation, frames.position - own.position);
+    put(place, state->place);
     const Lanes3 way = place - terms.restPlace;
-    const Spare spare = spareOf(host.thinning, terms.inverseLength * dot(way, terms.axis));
-    states->spareSlope = spare.slope;
-    const Lanes3 beyond = (terms.length * spare.value) * terms.axis;
-    put(beyond, states->spare);
-    put(way - beyond, states->way);
-    if (!withRates) continue;
-    const Lanes3 velocity = gatherQuads(s.frames.data(), terms.frame, &FrameState::velocity) - home.velocity;
-    const Lanes3 wayRate = rotateBack(home.rotation, velocity - cross(home.omega, from));
-    const Lanes3 apart =
-        rotateBack(home.rotation, gatherQuads(s.frames.data(), terms.frame, &FrameState::angularVelocity) - home.omega);
-    put(fma(r.cosine, apart, half * cross(apart, turn)), states->turnRate);
-    const Lanes3 beyondRate = (spare.slope * dot(wayRate, terms.axis)) * terms.axis;
-    put(beyondRate, states->spareRate);
-    put(wayRate - beyondRate, states->wayRate);
+    const PlaceStretch stretch = stretchOf(terms.inverseLength * place);
+    const Spare spare = spareOf(host.thinning, stretch.value);
+    put(fma(spare.slope - splat(1), stretch.slope, terms.axis), state->spareRow);
+    const Lanes3 beyond = fma(terms.length, spare.value - stretch.value, dot(way, terms.axis)) * terms.axis;
+    put(beyond, state->spare);
+    put(way - beyond, state->way);
   }
+  if (withRates) seeRates(s, host, states, own);
+  return own;
 }
 
 MEDULLA_INLINE Lanes shareEntry(const float (&four)[4]) {
@@ -74,7 +116,7 @@ MEDULLA_INLINE Lanes3 broadcastThree(const double* p) {
   return {_mm256_broadcast_sd(p), _mm256_broadcast_sd(p + 4), _mm256_broadcast_sd(p + 8)};
 }
 
-struct SkinPlace {  // in the home frame: of the nodes, and how their own frames are turned against it
+struct SkinPlace {  // seen in the host's frame: of the nodes from home, and how their own frames are turned against it
   Lanes3 offset, turn;
   Lanes3 offsetRate;
 };
@@ -111,6 +153,8 @@ MEDULLA_INLINE SkinPlace placeSkin(const Identified& s, const SkinGroup& g, cons
   const Lanes3 none = zeroVectors();
   const double* numbers = reinterpret_cast<const double*>(states);
   ColumnSums ways{g.restOffset, none}, spares{none, none}, turns{none, none}, own{none, none};
+  addColumns<withRates>(g.homeTurn, numbers + 12, numbers + 36, turns);
+  addScaled<withRates>(g.homeWeight, numbers + 12, numbers + 36, own);
   for (int k = g.firstShare; k < g.endShare; ++k) {
     const SkinShare& share = s.shares[k];
     const double* at = numbers + share.state;
@@ -137,7 +181,7 @@ MEDULLA_INLINE SkinPlace placeSkin(const Identified& s, const SkinGroup& g, cons
   return out;
 }
 
-// Forces (N) at the nodes' places, in the home frame, added to the loads on the host's other frames.
+// Forces (N) at the nodes' places, seen in the host's frame, added to the loads on the frames it sees.
 MEDULLA_INLINE void giveToTerms(const Identified& s, const SkinGroup& g, const Lanes3& turn, const Lanes3& force,
                                 SkinTermLoad* loads) {
   const Lanes half = splat(0.5);
@@ -148,6 +192,9 @@ MEDULLA_INLINE void giveToTerms(const Identified& s, const SkinGroup& g, const L
     return fma(shareEntry(column[2]), force.z,
                fma(shareEntry(column[1]), force.y, fma(shareEntry(column[0]), force.x, sum)));
   };
+  const Lanes homeWeight = shareEntry(g.homeWeight);
+  for (int j = 0; j < 3; ++j)
+    loads->onTurn[j] = timesColumn(g.homeTurn + 3 * j, fma(homeWeight, own[j], loads->onTurn[j]));
   for (int k = g.firstShare; k < g.endShare; ++k) {
     const SkinShare& share = s.shares[k];
     SkinTermLoad& to = loads[share.term];
@@ -160,34 +207,46 @@ MEDULLA_INLINE void giveToTerms(const Identified& s, const SkinGroup& g, const L
   }
 }
 
-struct HomeLoad {
-  Lanes force, moment;  // N, N m, in the world's frame, as quads
-};
-
-// What nodes get in sum, forces and moments about home, in the home frame and node by node in the lanes, and the loads
-// that giveToTerms() left: to the frames. `give(frames, forces, torques)` has four of them in the world's frame; home's
-// own is returned.
+// What nodes get in sum, forces and moments about home, seen in the host's frame and node by node in the lanes, and the
+// loads that giveToTerms() left, where sums replace them: to the frames. `give(frames, forces, torques)` has four of
+// them in the world's frame. Home, the first, bears what force the others do not, and all bear the moment by their
+// shares in how the host is turned.
 template <class Give>
-MEDULLA_INLINE HomeLoad giveToFrames(const Identified& s, const SkinHost& host, const Rotation& rotation,
-                                     const SkinTermState* states, const SkinTermLoad* loads, Lanes3 force,
-                                     Lanes3 moment, const Give& give) {
-  for (int t = host.firstTerms; t < host.endTerms; ++t, ++states, loads += 4) {
+MEDULLA_INLINE void giveToFrames(const Identified& s, const SkinHost& host, const HostFrame& own,
+                                 const SkinTermState* states, SkinTermLoad* loads, Lanes3 force, Lanes3 moment,
+                                 const Give& give) {
+  const SkinTerms* terms = s.terms.data() + host.firstTerms;
+  const int count = host.endTerms - host.firstTerms;
+  for (int t = 0; t < count; ++t) {
+    SkinTermLoad* four = loads + 4 * t;
     const auto sums = [&](const Lanes(SkinTermLoad::*on)[3]) {
       const auto sum = [&](int j) {
-        return sumsOfLanes((loads[0].*on)[j], (loads[1].*on)[j], (loads[2].*on)[j], (loads[3].*on)[j]);
+        return sumsOfLanes((four[0].*on)[j], (four[1].*on)[j], (four[2].*on)[j], (four[3].*on)[j]);
       };
       return Lanes3{sum(0), sum(1), sum(2)};
     };
     Lanes3 onWay = sums(&SkinTermLoad::onWay);
     const Lanes3 onTurn = sums(&SkinTermLoad::onTurn), onSpare = sums(&SkinTermLoad::onSpare);
-    const Lanes3& axis = s.terms[t].axis;
-    put(fma(states->spareSlope * dot(onSpare - onWay, axis), axis, onWay), onWay);
-    const Lanes3 torque = fma(states->cosine, onTurn, splat(0.5) * cross(states->turn, onTurn));
+    put(fma(dot(onSpare - onWay, terms[t].axis), states[t].spareRow, onWay), onWay);
+    const Lanes3 torque = torqueOnFrame(states[t], onTurn);
     force = force - onWay;
-    moment = moment - torque - cross(states->place, onWay);
-    give(s.terms[t].frame, rotate(rotation, onWay), rotate(rotation, torque));
+    moment = moment - torque - cross(states[t].place, onWay);
+    const auto keep = [](const Lanes3& v, Lanes(&to)[3]) { to[0] = v.x, to[1] = v.y, to[2] = v.z; };
+    keep(onWay, four->onWay);
+    keep(torque, four->onTurn);
   }
-  return {sumOfLanes(rotate(rotation, force)), sumOfLanes(rotate(rotation, moment))};
+  Quad forceLeft, momentLeft;
+  store(forceLeft, sumOfLanes(force));
+  store(momentLeft, sumOfLanes(own.inverseLength * moment));
+  for (int k = 0; k < 3; ++k) loads->onWay[k][0] += forceLeft.v[k];
+  const Lanes3 left = splat(momentLeft);
+  for (int t = 0; t < count; ++t) {
+    const SkinTermLoad& four = loads[4 * t];
+    const Lanes3 onWay{four.onWay[0], four.onWay[1], four.onWay[2]},
+        torque{four.onTurn[0], four.onTurn[1], four.onTurn[2]};
+    const Lanes3 whole = fma(terms[t].share, torqueOnFrame(states[t], left), torque);
+    give(terms[t].frame, rotate(own.rotation, onWay), rotate(own.rotation, whole));
+  }
 }
 
 }  // namespace medulla

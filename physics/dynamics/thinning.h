@@ -25,6 +25,18 @@ inline Thinning thinningOf(double poisson) {  // 0 <= nu < 0.5
   return {k, k + b, first, 0.5 * first * (1 + k) - k};
 }
 
+// Of a line that has gone from length 1 to `line`: y, and its slope. Below kStraightBelow straight in the square of the
+// length, since lines have no direction where they vanish.
+struct PlaceStretch {
+  Lanes value;
+  Lanes3 slope;
+};
+MEDULLA_INLINE PlaceStretch stretchOf(const Lanes3& line) {
+  const Lanes square = dot(line, line), r = squareRoot(larger(square, splat(kStraightBelow * kStraightBelow)));
+  const Lanes inverse = splat(1) / r;
+  return {fma(splat(0.5), fma(square, inverse, r), splat(-1)), inverse * line};
+}
+
 // y - (1 - thinness(y)) / nu, and its slope: what a stretch does less across than in proportion. With D = (1 + k y)
 // (1 + y) and r = thinness D they are y - y (2 + first y) / (D + r) and 1 - (1 + first y + second y^2) / (r D).
 // Straight below kStraightBelow.

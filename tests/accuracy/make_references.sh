@@ -7,7 +7,8 @@ usage() {
 usage: make_references.sh [BODY[_CASE]...]
 
 Makes the FEM references of tests/accuracy/results/ with CalculiX, on one processor: all of them, or those of the bodies
-(cylinder, gallbladder, gallbladder_halved, gallbladder_doubled, liver, liver_stretched, stomach, kidney) or cases
+(cylinder, gallbladder, gallbladder_halved, gallbladder_doubled, liver, liver_stretched, stomach, kidney,
+cube) or cases
 (gallbladder_axial, liver_modes, ...) named. A file is replaced when its case is solved. Prints a row per case for the README's table.
 END
 }

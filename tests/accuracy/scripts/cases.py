@@ -229,7 +229,20 @@ def kidney():
                 kept={"root": 1}, modes=0)
 
 
+def cube():
+    # As bulky as bodies get, under loads of half of Young's modulus and of once and a half over the middle of a side.
+    middle = lambda axis: box(*(tuple(a if k == axis else b for k in range(3)) for a, b in ((29.9, 8.9), (31, 21.1))))
+    regions = {"root": box((-1, -99, -99), (0.1, 99, 99)), "end": middle(0)}
+    cases = [
+        Case("pull", "root", Load("end", (1500, 0, 0)), 4),
+        Case("pull_far", "root", Load("end", (4000, 0, 0)), 4),
+        Case("shear", "root", Load("end", (0, 2000, 0)), 4),
+    ]
+    return Body("cube", "tests/accuracy/cube.obj", 20e3, 1000, regions, cases, grids={"root": grids(1, 0, 1, 2)},
+                kept={"root": 1}, modes=0)
+
+
 def bodies():
     remeshed = [gallbladder_remeshed("gallbladder_halved", grids(2, 4, 3, 4)),
                 gallbladder_remeshed("gallbladder_doubled", grids(1, 4, 2, 4))]
-    return [cylinder(), gallbladder(), liver(), stomach(), liver_stretched(), *remeshed, kidney()]
+    return [cylinder(), gallbladder(), liver(), stomach(), liver_stretched(), *remeshed, kidney(), cube()]

@@ -1,5 +1,5 @@
-"""Meshes that the program's own shapes do not come in: an organ stretched, one of twice and half the triangles, and a
-body of formulas. Vertices in mm, triangles from 0."""
+"""Meshes that the program's own shapes do not come in: an organ stretched, one of twice and half the triangles, and two
+bodies of formulas. Vertices in mm, triangles from 0."""
 
 import os
 
@@ -54,6 +54,32 @@ def kidney():
     return points, triangles
 
 
+def cube():
+    """30 mm wide, 10 by 10 squares a side, their diagonals turning from each to the next."""
+    count, width = 10, 30
+    index, points, triangles = {}, [], []
+
+    def vertex(axis, level, i, j):
+        at = [0, 0, 0]
+        at[axis], at[(axis + 1) % 3], at[(axis + 2) % 3] = level, i, j
+        if tuple(at) not in index:
+            index[tuple(at)] = len(points)
+            points.append([x * width / count for x in at])
+        return index[tuple(at)]
+
+    for axis in range(3):
+        for level in (0, count):
+            for i in range(count):
+                for j in range(count):
+                    ring = [vertex(axis, level, i + a, j + b) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+                    if level == 0:
+                        ring.reverse()
+                    if (i + j) % 2:
+                        ring = ring[1:] + ring[:1]
+                    triangles += [ring[:3], [ring[0], ring[2], ring[3]]]
+    return np.array(points), np.array(triangles)
+
+
 def write_missing(project):
     """A minute for the gallbladder's two."""
     makers = {
@@ -61,6 +87,7 @@ def write_missing(project):
         "gallbladder_halved": lambda: gallbladder_decimated(project, 232),
         "gallbladder_doubled": lambda: gallbladder_decimated(project, 932),
         "kidney": kidney,
+        "cube": cube,
     }
     for name, make in makers.items():
         path = os.path.join(project, "tests/accuracy", name + ".obj")
