@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <numbers>
 
+#include "app/files/model_file.h"
 #include "tests/dynamics_states.h"
 #include "tests/synthetic_model.h"
 
@@ -27,6 +29,24 @@ TEST(Conservation, MomentaOfAFreeBodyStayWhileItIsDamped) {
 TEST(Conservation, EnergyOfAnUndampedBodyDoesNotDrift) {
   World world(weightless(200), {freeTube(0)});
   expectEnergyStays(world);
+}
+
+// At the step that it chooses, too, with all its modes swinging: ten seconds of what else grows until nothing is
+// finite.
+TEST(Conservation, AnUndampedBodyKeepsItsEnergyAtItsOwnStep) {
+  BodyDescription body;
+  body.name = "gallbladder";
+  body.model =
+      std::make_shared<SoftBodyModel>(readModel(MEDULLA_SOURCE_DIR "/assets/gallbladder/gallbladder.model.xml"));
+  body.tissue = {.young = 9e3, .density = 1040, .damping = 0};
+  for (const double share : {0.3, 1.0}) {
+    World world(weightless(), {body});
+    shake(world.data(), 5, 0.1 * share, 0.0005 * share, 0.05 * share);
+    const auto total = [&] { return world.energies().kinetic + world.energies().elastic; };
+    const double start = total();
+    while (world.time() < 10) world.advance({});
+    EXPECT_NEAR(total(), start, 0.05 * start);  // an Euler step's energy comes and goes by 2 %
+  }
 }
 
 TEST(Conservation, DampingTakesEnergyInEveryFrame) {
