@@ -143,7 +143,9 @@ void ModelView::drawInstances(const UnitMesh& mesh, const std::vector<Instance>&
   glDrawElementsInstanced(GL_TRIANGLES, mesh.indexCount, GL_UNSIGNED_INT, nullptr, int(instances.size()));
 }
 
-void ModelView::setCamera(const Viewpoint& v, float nearer) const {
+void ModelView::setCamera(const Viewpoint& v, bool lines) const {
+  // Lines run along a skin, now before it, now behind: hidden by it they would break into pieces.
+  constexpr float kNearer = 0.06f;
   glUseProgram(program_);
   const auto uniform = [this](const char* name) { return glGetUniformLocation(program_, name); };
   glUniformMatrix4fv(uniform("clipFromWorld"), 1, GL_FALSE, glm::value_ptr(v.clipFromWorld));
@@ -151,7 +153,8 @@ void ModelView::setCamera(const Viewpoint& v, float nearer) const {
   glUniform3fv(uniform("right"), 1, glm::value_ptr(v.right));
   glUniform3fv(uniform("up"), 1, glm::value_ptr(v.up));
   glUniform3fv(uniform("back"), 1, glm::value_ptr(v.back));
-  glUniform1f(uniform("nearer"), nearer);
+  glUniform1f(uniform("nearer"), lines ? kNearer : 0);
+  glUniform1i(uniform("lines"), lines);
 }
 
 static glm::vec4 rowOf(int k, glm::vec3 x, glm::vec3 y, glm::vec3 z, glm::vec3 origin) {
@@ -298,9 +301,7 @@ void ModelView::drawBallsSeenThrough(bool hide) const {
 
 void ModelView::drawFaint(const Viewpoint& view) const {
   if (faintRods_.empty()) return;
-  // They run along a skin, now before it, now behind: hidden by it they would break into pieces.
-  constexpr float kNearer = 0.06f;
-  setCamera(view, kNearer);
+  setCamera(view, true);
   glEnable(GL_CULL_FACE);
   startBlending();
   drawInstances(cylinder_, faintRods_);

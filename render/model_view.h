@@ -59,8 +59,8 @@ class ModelView {
   float atLeast(const Viewpoint& viewpoint, float depth, float radius) const;
   void drawInstances(const UnitMesh& mesh, const std::vector<Instance>& instances) const;
   void drawBallsSeenThrough(bool hide) const;
-  // nearer: share of the way to the eye by which all is moved: it looks the same, but less lies before it.
-  void setCamera(const Viewpoint& viewpoint, float nearer = 0) const;
+  // Lines: lit as if they faced the eye, and moved some way towards it: they look the same, but less lies before them.
+  void setCamera(const Viewpoint& viewpoint, bool lines = false) const;
 
   float pixel_;  // of the picture's height
   unsigned program_ = 0, backdropProgram_ = 0, emptyArray_ = 0;

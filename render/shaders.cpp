@@ -226,21 +226,23 @@ void main() {
 }
 )";
 
-// Studio light: a large key from above the camera, a cool fill from below, a soft highlight and a darker outline.
+// Studio light: a large key from above the camera, a cool fill from below, a soft highlight and a darker outline. Lines
+// of a pixel face the eye: a pixel sees now one, now another side of such a rod, and it would be dotted.
 const char* const kModelFragmentShader = R"(
 in vec3 vNormal;
 in vec3 vPosition;
 flat in vec4 vColour;
 out vec4 pixel;
 uniform vec3 eye, right, up, back;
+uniform bool lines;
 void main() {
-  vec3 n = normalize(vNormal), v = normalize(eye - vPosition);
+  vec3 v = normalize(eye - vPosition), n = lines ? v : normalize(vNormal);
   vec3 key = normalize(.45 * up - .35 * right + .8 * back);
   float wrap = max((dot(n, key) + .35) / 1.35, 0.);
   float facing = max(dot(n, v), 0.);
   vec3 fill = mix(vec3(.13, .14, .17), vec3(.27, .27, .26), dot(n, up) * .5 + .5);
   float gloss = pow(max(dot(n, normalize(key + v)), 0.), 60.);
-  float outline = smoothstep(0., .55, facing);
+  float outline = lines ? .4 : smoothstep(0., .55, facing);  // of a line both its sides and its middle
   vec3 c = vColour.rgb * (fill + .55 * wrap * wrap) * mix(.5, 1., outline) + .16 * gloss;
   pixel = vec4(toneCurve(c), mix(min(1., vColour.a * 1.8), vColour.a, outline));
 }
