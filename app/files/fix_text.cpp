@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "app/files/number_text.h"
+#include "app/files/text.h"
 #include "app/files/vertex_file.h"
 
 namespace medulla {
@@ -17,11 +18,6 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& text, const std::string& expected) {
   throw std::runtime_error(fmt::format("--fix {}: expected {}", text, expected));
-}
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(' '), last = text.find_last_not_of(' ');
-  return first == text.npos ? std::string_view() : text.substr(first, last - first + 1);
 }
 
 // Numbers between commas, blanks around them or not; none at all where one of them is no number.

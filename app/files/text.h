@@ -19,6 +19,9 @@ std::string plainName(std::string_view text);
 // As an attribute's value, or between tags.
 std::string escapedXml(std::string_view text);
 
+// Without the blanks, tabs and carriage returns at its ends.
+std::string_view trimmed(std::string_view text);
+
 // Letters of ASCII alone, whatever the locale.
 std::string lowered(std::string_view text);
 
