@@ -153,8 +153,8 @@ class World {
   const std::vector<BodyOverlap>& startOverlaps() const;
   const CreepReport& creep() const;
   // Whether cells of identified links that lie side by side have ever been turned against each other by more than 90
-  // degrees: no tissue's are. Links and skin are fitted to small turns, and let a cell go over under loads beyond some
-  // tenths of Young's modulus over its surface.
+  // degrees: no tissue's are. Links and skin are fitted to small turns, and let a cell go over under loads of more than
+  // Young's modulus over its surface.
   bool hasTurnedOver(int body) const;
   std::uint64_t stateHash() const;  // FNV-1a over every state variable's bits
 
