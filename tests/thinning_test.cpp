@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+
 #include <cmath>
 
 // How skins thin: against the neo-Hookean bar, solved by bisection.
@@ -46,18 +48,19 @@ TEST(Thinning, SlopesAreThoseOfTheValues) {
   for (const double stretch : {-0.2, 0.3, 2.}) EXPECT_NEAR(spareAt(0, stretch).value[0], 0, 1e-12) << "nothing thins";
 }
 
-// Of the line to a frame, whichever way it points; smooth where it vanishes.
-TEST(Thinning, StretchIsThatOfTheLengthWhicheverWayALinePoints) {
-  const Eigen::Vector3d way = Eigen::Vector3d(0.3, -0.8, 0.4).normalized();
-  const auto stretchAt = [](const Eigen::Vector3d& line) {
-    return stretchOf({splat(line.x()), splat(line.y()), splat(line.z())});
-  };
+// Of the line to a frame: whole along its direction, half of it aside; smooth where it vanishes.
+TEST(Thinning, StretchIsHalfOfLengthAndHalfOfWhatLiesAlong) {
+  const Eigen::Vector3d way = Eigen::Vector3d(0.3, -0.8, 0.4).normalized(), aside = way.unitOrthogonal();
+  const auto lanes = [](const Eigen::Vector3d& a) { return Lanes3{splat(a.x()), splat(a.y()), splat(a.z())}; };
+  const auto stretchAt = [&](const Eigen::Vector3d& line) { return stretchOf(lanes(line), lanes(way)); };
   for (const double length : {0.8, 1., 1.7}) EXPECT_NEAR(stretchAt(length * way).value[0], length - 1, 1e-15);
+  EXPECT_NEAR(stretchAt(std::cos(0.5) * way + std::sin(0.5) * aside).value[0], 0.5 * (std::cos(0.5) - 1), 1e-15);
+  EXPECT_NEAR(stretchAt(way + 0.5 * aside).value[0], 0.5 * (std::sqrt(1.25) - 1), 1e-15);
   EXPECT_LT(stretchAt(0.5 * way).value[0], -0.25);
   constexpr double step = 1e-6;
   for (const double length : {0., 0.4, 0.75, 0.8, 1.7}) {
     for (int k = 0; k < 3; ++k) {
-      const Eigen::Vector3d at = length * way, to = step * Eigen::Vector3d::Unit(k);
+      const Eigen::Vector3d at = length * (way + 0.3 * aside), to = step * Eigen::Vector3d::Unit(k);
       const double rate = (stretchAt(at + to).value[0] - stretchAt(at - to).value[0]) / (2 * step);
       EXPECT_NEAR(vectorOf(stretchAt(at).slope, 0)[k], rate, 1e-6) << length;
     }

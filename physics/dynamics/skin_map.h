@@ -98,7 +98,7 @@ MEDULLA_INLINE HostFrame seeFrames(const Identified& s, const SkinHost& host, Sk
     const Lanes3 place = rotateBack(own.rotation, frames.position - own.position);
     put(place, state->place);
     const Lanes3 way = place - terms.restPlace;
-    const PlaceStretch stretch = stretchOf(terms.inverseLength * place);
+    const PlaceStretch stretch = stretchOf(terms.inverseLength * place, terms.axis);
     const Spare spare = spareOf(host.thinning, stretch.value);
     put(fma(spare.slope - splat(1), stretch.slope, terms.axis), state->spareRow);
     const Lanes3 beyond = fma(terms.length, spare.value - stretch.value, dot(way, terms.axis)) * terms.axis;

@@ -25,16 +25,18 @@ inline Thinning thinningOf(double poisson) {  // 0 <= nu < 0.5
   return {k, k + b, first, 0.5 * first * (1 + k) - k};
 }
 
-// Of a line that has gone from length 1 to `line`: y, and its slope. Below kStraightBelow straight in the square of the
-// length, since lines have no direction where they vanish.
+// By how much a line that had length 1 and this direction, `axis`, is longer, and the slope: half by its length, half
+// by what lies along the direction. The first takes what is sheared for stretched, the second what turns for shortened.
+// The length is straight in its square below kStraightBelow, since lines have no direction where they vanish.
 struct PlaceStretch {
   Lanes value;
   Lanes3 slope;
 };
-MEDULLA_INLINE PlaceStretch stretchOf(const Lanes3& line) {
-  const Lanes square = dot(line, line), r = squareRoot(larger(square, splat(kStraightBelow * kStraightBelow)));
-  const Lanes inverse = splat(1) / r;
-  return {fma(splat(0.5), fma(square, inverse, r), splat(-1)), inverse * line};
+MEDULLA_INLINE PlaceStretch stretchOf(const Lanes3& line, const Lanes3& axis) {
+  const Lanes half = splat(0.5), square = dot(line, line);
+  const Lanes r = squareRoot(larger(square, splat(kStraightBelow * kStraightBelow))), inverse = splat(1) / r;
+  const Lanes length = half * fma(square, inverse, r);
+  return {fma(half, length + dot(line, axis), splat(-1)), half * fma(inverse, line, axis)};
 }
 
 // y - (1 - thinness(y)) / nu, and its slope: what a stretch does less across than in proportion. With D = (1 + k y)
