@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "physics/dynamics/simd.h"
 #include "physics/dynamics/thinning.h"
+#include "physics/model/identified_network.h"
 
 // Arrays of what was identified offline (physics/model/identified_network.h), in this world's units and for AVX2: links
 // and nodes four at a time, both between frames.
@@ -96,10 +98,16 @@ struct SkinTermState {
   Lanes3 spareRow;           // 1: of the spare part, by the way
 };
 
+struct TurnShare {
+  int frame;
+  double share;  // in how the host's own frame is turned; 1 in sum
+};
 struct SkinHost {
   int home;  // a frame
   int firstTerms, endTerms;
   Thinning thinning;
+  int turnShares;                                // so many; in the order of their terms
+  std::array<TurnShare, kSkinFrames> turnShare;  // the same as the terms' shares
 };
 
 // What one frame's way and turn do to four nodes' places, and its share of how far their own frames are turned.

@@ -118,7 +118,8 @@ class HostTerms {
  public:
   HostTerms(Identified& s, int home, const Vector3d& homePlace, double poisson) : s_(&s), homePlace_(homePlace) {
     host_ = static_cast<int>(s.hosts.size());
-    s.hosts.push_back({home, static_cast<int>(s.terms.size()), static_cast<int>(s.terms.size()), thinningOf(poisson)});
+    s.hosts.push_back(
+        {home, static_cast<int>(s.terms.size()), static_cast<int>(s.terms.size()), thinningOf(poisson), 0, {}});
     of(home, homePlace);
     weights_[0] = 0;
   }
@@ -163,9 +164,12 @@ class HostTerms {
     most.resize(std::min<std::size_t>(most.size(), kSkinFrames));
     double sum = 0;
     for (const auto& [term, weight] : most) sum += weight;
+    std::sort(most.begin(), most.end());
+    SkinHost& host = s_->hosts[host_];
     for (const auto& [term, weight] : most) {
-      const double all = sum > 0 ? weight / sum : 1, ofHome = term == 0 ? kHome : 0;
-      s_->terms[s_->hosts[host_].firstTerms + term / 4].share[term % 4] = (all + ofHome) / (1 + kHome);
+      const double all = sum > 0 ? weight / sum : 1, share = (all + (term == 0 ? kHome : 0)) / (1 + kHome);
+      s_->terms[host.firstTerms + term / 4].share[term % 4] = share;
+      host.turnShare[host.turnShares++] = {frameOf(*s_, host, term), share};
     }
   }
 

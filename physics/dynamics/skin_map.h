@@ -31,9 +31,8 @@ struct HostFrame {  // the same in all lanes
 // Without rates. Frames that are turned by a whole turn against each other have no mean: Q's length is floored.
 MEDULLA_INLINE HostFrame hostFrame(const Identified& s, const SkinHost& host) {
   Lanes sum = splat(0);
-  for (int t = host.firstTerms; t < host.endTerms; ++t)
-    for (int l = 0; l < 4; ++l)
-      sum = fma(splat(s.terms[t].share[l]), load(s.frames[s.terms[t].frame[l]].orientation), sum);
+  for (int k = 0; k < host.turnShares; ++k)
+    sum = fma(splat(host.turnShare[k].share), load(s.frames[host.turnShare[k].frame].orientation), sum);
   Quad q;
   store(q, sum);
   HostFrame out;
