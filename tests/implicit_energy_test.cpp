@@ -70,7 +70,8 @@ TEST(ImplicitEnergy, WhatFliesBesideAFailingBodyFliesOn) {
     const double expected = strayOf(alone, 0, velocity, 0.5);
     EXPECT_EQ(alone.creep().substeps, 0);
     constexpr int kPartsOfOrderOne = 8;
-    const double part = f.step / 64, allowed = expected + kPartsOfOrderOne * 0.5 * kGravity * part * part;
+    const double part = f.step / 64, gravity = settingsOf(f).gravity.norm();
+    const double allowed = expected + kPartsOfOrderOne * 0.5 * gravity * part * part;
     bool fails = false;
     for (const std::uint64_t end = f.seed + kTangles; !fails && f.seed < end; ++f.seed) {
       World beside(settingsOf(f), {tube(f.links), ball});
