@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-
 #include <cmath>
 
 // How skins thin: against the neo-Hookean bar, solved by bisection.

@@ -98,16 +98,11 @@ struct SkinTermState {
   Lanes3 spareRow;           // 1: of the spare part, by the way
 };
 
-struct TurnShare {
-  int frame;
-  double share;  // in how the host's own frame is turned; 1 in sum
-};
 struct SkinHost {
   int home;  // a frame
   int firstTerms, endTerms;
+  int turnShares;  // so many frames, the first, have a share
   Thinning thinning;
-  int turnShares;                                // so many; in the order of their terms
-  std::array<TurnShare, kSkinFrames> turnShare;  // the same as the terms' shares
 };
 
 // What one frame's way and turn do to four nodes' places, and its share of how far their own frames are turned.

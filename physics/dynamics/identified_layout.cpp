@@ -113,73 +113,77 @@ void addLinks(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
   }
 }
 
-// The host of a range of nodes, its frames numbered as the nodes ask for them.
+// The frames that the nodes of a host hang on: its home first, then those that turn its own frame, then all others.
 class HostTerms {
  public:
-  HostTerms(Identified& s, int home, const Vector3d& homePlace, double poisson) : s_(&s), homePlace_(homePlace) {
-    host_ = static_cast<int>(s.hosts.size());
-    s.hosts.push_back(
-        {home, static_cast<int>(s.terms.size()), static_cast<int>(s.terms.size()), thinningOf(poisson), 0, {}});
-    of(home, homePlace);
-    weights_[0] = 0;
-  }
-  int host() const { return host_; }
-  const Vector3d& homePlace() const { return homePlace_; }
-  int of(int frame, const Vector3d& restPlace) {
-    const auto [found, isNew] = number_.try_emplace(frame, static_cast<int>(number_.size()));
-    if (!isNew) return found->second;
-    SkinHost& host = s_->hosts[host_];
-    const int lane = found->second % 4;
-    if (lane == 0) {
-      SkinTerms terms{};
-      std::fill_n(terms.frame, 4, static_cast<std::uint32_t>(host.home));
-      s_->terms.push_back(terms);
-      ++host.endTerms;
-    }
-    SkinTerms& terms = s_->terms.back();
-    const Vector3d line = restPlace - homePlace_;
-    terms.frame[lane] = static_cast<std::uint32_t>(frame);
-    setLane(terms.restPlace, lane, line);
-    if (line.norm() > 0) {
-      setLane(terms.axis, lane, line.normalized());
-      terms.length[lane] = line.norm();
-      terms.inverseLength[lane] = 1 / line.norm();
-    }
-    return found->second;
-  }
+  HostTerms(int home, const Vector3d& homePlace) : frames_{{home, homePlace, 0}}, number_{{home, 0}} {}
+  const Vector3d& homePlace() const { return frames_.front().restPlace; }
+  int of(int frame) const { return number_.at(frame); }
+
   // A node has so much of a frame. What is held is turned nowhere, wherever a patch is seen from: one frame stands for
-  // all.
-  void weigh(int term, double weight) {
-    if (s_->carried[frameOf(*s_, s_->hosts[host_], term)].sphere < 0) held_ = term = held_ < 0 ? term : held_;
-    weights_[term] += weight;
+  // all in how the host's own is turned.
+  void weigh(const CarriedFrame& carried, int frame, const Vector3d& restPlace, double weight) {
+    int number = number_.try_emplace(frame, static_cast<int>(frames_.size())).first->second;
+    if (number == static_cast<int>(frames_.size())) frames_.push_back({frame, restPlace, 0});
+    if (carried.sphere < 0) held_ = number = held_ < 0 ? number : held_;
+    frames_[number].weight += weight;
+  }
+  // After all nodes: returns the new host.
+  int append(Identified& s, double poisson) {
+    const auto isBefore = [](const Hosted& a, const Hosted& b) { return a.weight > b.weight; };
+    std::stable_sort(frames_.begin() + 1, frames_.end(), isBefore);
+    SkinHost host{};
+    host.home = frames_.front().frame;
+    host.thinning = thinningOf(poisson);
+    host.firstTerms = static_cast<int>(s.terms.size());
+    host.turnShares = std::min(static_cast<int>(frames_.size()), kSkinFrames);
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      number_[frames_[k].frame] = static_cast<int>(k);
+      if (k % 4 == 0) appendEmptyTerms(s, host.home);
+      setTerm(frames_[k], static_cast<int>(k % 4), s.terms.back());
+    }
+    host.endTerms = static_cast<int>(s.terms.size());
+    setShares(host, s.terms);
+    s.hosts.push_back(host);
+    return static_cast<int>(s.hosts.size()) - 1;
+  }
+
+ private:
+  struct Hosted {
+    int frame;
+    Vector3d restPlace;
+    double weight;
+  };
+  static void appendEmptyTerms(Identified& s, int home) {
+    SkinTerms terms{};
+    std::fill_n(terms.frame, 4, static_cast<std::uint32_t>(home));
+    s.terms.push_back(terms);
+  }
+  void setTerm(const Hosted& of, int lane, SkinTerms& terms) const {
+    const Vector3d line = of.restPlace - homePlace();
+    terms.frame[lane] = static_cast<std::uint32_t>(of.frame);
+    setLane(terms.restPlace, lane, line);
+    if (line.norm() == 0) return;
+    setLane(terms.axis, lane, line.normalized());
+    terms.length[lane] = line.norm();
+    terms.inverseLength[lane] = 1 / line.norm();
   }
   // How the host's own frame is turned: home counts three times as much as all of the six frames together that the
   // nodes have most of. With these alone bodies that bend swell, as blends of rotations let them; with home alone they
   // shrink (tests/accuracy/limits.md).
-  void setShares() const {
+  void setShares(const SkinHost& host, std::vector<SkinTerms>& terms) const {
     constexpr double kHome = 3;
-    std::vector<std::pair<int, double>> most(weights_.begin(), weights_.end());
-    const auto isBefore = [](const auto& a, const auto& b) { return a.second > b.second; };
-    std::stable_sort(most.begin() + 1, most.end(), isBefore);
-    most.resize(std::min<std::size_t>(most.size(), kSkinFrames));
     double sum = 0;
-    for (const auto& [term, weight] : most) sum += weight;
-    std::sort(most.begin(), most.end());
-    SkinHost& host = s_->hosts[host_];
-    for (const auto& [term, weight] : most) {
-      const double all = sum > 0 ? weight / sum : 1, share = (all + (term == 0 ? kHome : 0)) / (1 + kHome);
-      s_->terms[host.firstTerms + term / 4].share[term % 4] = share;
-      host.turnShare[host.turnShares++] = {frameOf(*s_, host, term), share};
+    for (int k = 0; k < host.turnShares; ++k) sum += frames_[k].weight;
+    for (int k = 0; k < host.turnShares; ++k) {
+      const double all = sum > 0 ? frames_[k].weight / sum : k == 0 ? 1 : 0;
+      terms[host.firstTerms + k / 4].share[k % 4] = (all + (k == 0 ? kHome : 0)) / (1 + kHome);
     }
   }
 
- private:
-  Identified* s_;
-  Vector3d homePlace_;
-  int host_;
+  std::vector<Hosted> frames_;
   std::map<int, int> number_;
-  std::map<int, double> weights_;  // by term, home first
-  int held_ = -1;                  // a term
+  int held_ = -1;
 };
 
 void setColumns(const Matrix3d& map, int lane, float (*columns)[4]) {
@@ -196,12 +200,12 @@ void setMap(SkinShare& share, int lane, const SkinRow& row, double weight, const
 }
 
 // Four nodes, -1 on pads.
-void addSkin(WorldData& d, int body, const BodyMechanics& mechanics, const std::array<int, 4>& nodes, HostTerms& terms,
-             FrameNumbers& frames) {
+void addSkin(WorldData& d, int body, const BodyMechanics& mechanics, const std::array<int, 4>& nodes, int host,
+             const HostTerms& terms, FrameNumbers& frames) {
   Identified& s = d.identified;
   const SoftBodyModel& m = *d.bodies[body].model;
   SkinGroup group{};
-  group.host = terms.host();
+  group.host = host;
   group.firstShare = static_cast<int>(s.shares.size());
   std::map<int, SkinShare> shares;  // by the frame's number in the host
   for (int l = 0; l < 4; ++l) {
@@ -211,8 +215,7 @@ void addSkin(WorldData& d, int body, const BodyMechanics& mechanics, const std::
     for (std::size_t k = 0; k < skin.size() && mechanics.nodeMoves[nodes[l]]; ++k) {
       const int frame = frames.of(skin[k].frame, skin[k].restPoint);
       const Vector3d place = frames.restPoint(skin[k].frame, skin[k].restPoint);
-      const int term = terms.of(frame, place);
-      terms.weigh(term, skin[k].weight);
+      const int term = terms.of(frame);
       if (term == 0) {
         setColumns(rows[k].onTurn, l, group.homeTurn);
         group.homeWeight[l] = static_cast<float>(skin[k].weight);
@@ -234,24 +237,38 @@ void addSkin(WorldData& d, int body, const BodyMechanics& mechanics, const std::
   s.skin.push_back(group);
 }
 
+HostTerms termsOf(const WorldData& d, const BodyMechanics& mechanics, int home, const Vector3d& homePlace,
+                  std::span<const int> nodes, FrameNumbers& frames) {
+  HostTerms terms(home, homePlace);
+  for (const int node : nodes) {
+    if (node < 0 || !mechanics.nodeMoves[node]) continue;
+    for (const SkinFrame& f : mechanics.skin[node]) {
+      const int frame = frames.of(f.frame, f.restPoint);
+      terms.weigh(d.identified.carried[frame], frame, frames.restPoint(f.frame, f.restPoint), f.weight);
+    }
+  }
+  return terms;
+}
+
 void addSkins(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbers& frames) {
+  Identified& s = d.identified;
   std::vector<int> nodeAt(d.nodes.count, -1);
   for (std::size_t i = 0; i < d.ranges[body].node.size(); ++i) nodeAt[d.ranges[body].node[i]] = static_cast<int>(i);
   for (const std::vector<HostRange>* ranges : {&d.nodes.onSpheres, &d.nodes.skinOnSpheres}) {
     for (const HostRange& range : *ranges) {
       if (range.body != body) continue;
-      const int node = nodeAt[4 * range.firstGroup];
-      const SkinFrame& first = mechanics.skin[node].front();
+      const std::span<const int> nodes(nodeAt.data() + 4 * range.firstGroup, nodeAt.data() + 4 * range.endGroup);
+      const SkinFrame& first = mechanics.skin[nodes[0]].front();
       // Held nodes all hang on patches, which do not move against each other.
-      const int home = mechanics.nodeMoves[node] ? range.host - d.ranges[body].firstSphere : first.frame;
-      HostTerms terms(d.identified, frames.of(home, first.restPoint), frames.restPoint(home, first.restPoint),
-                      d.bodies[body].tissue.poisson);
+      const int home = mechanics.nodeMoves[nodes[0]] ? range.host - d.ranges[body].firstSphere : first.frame;
+      HostTerms terms = termsOf(d, mechanics, frames.of(home, first.restPoint), frames.restPoint(home, first.restPoint),
+                                nodes, frames);
+      const int host = terms.append(s, d.bodies[body].tissue.poisson);
       for (int g = range.firstGroup; g < range.endGroup; ++g) {
-        d.identified.ofNodeGroup[g] = static_cast<int>(d.identified.skin.size());
-        addSkin(d, body, mechanics, {nodeAt[4 * g], nodeAt[4 * g + 1], nodeAt[4 * g + 2], nodeAt[4 * g + 3]}, terms,
-                frames);
+        s.ofNodeGroup[g] = static_cast<int>(s.skin.size());
+        addSkin(d, body, mechanics, {nodeAt[4 * g], nodeAt[4 * g + 1], nodeAt[4 * g + 2], nodeAt[4 * g + 3]}, host,
+                terms, frames);
       }
-      terms.setShares();
     }
   }
 }

@@ -104,9 +104,8 @@ HostPoint hostPointOnFrames(const WorldData& d, int node) {
     give(share.term, onWay, onTurn + static_cast<double>(share.weight[lane]) * second);
   }
   add(p, s.carried[host.home], r * force, Matrix3d::Zero());
-  for (int term = 0; term < 4 * (host.endTerms - host.firstTerms); ++term) {
+  for (int term = 0; term < host.turnShares; ++term) {
     const double share = s.terms[host.firstTerms + term / 4].share[term % 4] * seen.own.inverseLength[0];
-    if (share == 0) continue;
     const Matrix3d torque = torqueOnFrame(seen.states[term / 4], term % 4, share * moment);
     add(p, s.carried[frameOf(s, host, term)], Matrix3d::Zero(), r * torque);
   }

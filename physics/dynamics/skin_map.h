@@ -30,9 +30,10 @@ struct HostFrame {  // the same in all lanes
 
 // Without rates. Frames that are turned by a whole turn against each other have no mean: Q's length is floored.
 MEDULLA_INLINE HostFrame hostFrame(const Identified& s, const SkinHost& host) {
+  const SkinTerms* terms = s.terms.data() + host.firstTerms;
   Lanes sum = splat(0);
   for (int k = 0; k < host.turnShares; ++k)
-    sum = fma(splat(host.turnShare[k].share), load(s.frames[host.turnShare[k].frame].orientation), sum);
+    sum = fma(splat(terms[k / 4].share[k % 4]), load(s.frames[terms[k / 4].frame[k % 4]].orientation), sum);
   Quad q;
   store(q, sum);
   HostFrame out;
@@ -56,17 +57,20 @@ MEDULLA_INLINE Lanes3 torqueOnFrame(const SkinTermState& at, const Lanes3& onTur
   return fma(at.cosine, onTurn, splat(0.5) * cross(at.turn, onTurn));
 }
 
+constexpr int kMostTurning = (kSkinFrames + 3) / 4;
+inline int turningTerms(const SkinHost& host) {
+  return (host.turnShares + 3) / 4;
+}
+
 // After seeFrames(): the rates of its states, and the host's own.
 MEDULLA_INLINE void seeRates(const Identified& s, const SkinHost& host, SkinTermState* states, HostFrame& to) {
   const SkinTerms* terms = s.terms.data() + host.firstTerms;
-  const int count = host.endTerms - host.firstTerms;
+  const int count = host.endTerms - host.firstTerms, turning = turningTerms(host);
+  const auto spinOf = [&](int t) {
+    return rotateBack(to.rotation, gatherQuads(s.frames.data(), terms[t].frame, &FrameState::angularVelocity));
+  };
   Lanes3 sum = zeroVectors();
-  for (int t = 0; t < count; ++t) {
-    const Lanes3 spin =
-        rotateBack(to.rotation, gatherQuads(s.frames.data(), terms[t].frame, &FrameState::angularVelocity));
-    put(spin, states[t].turnRate);
-    put(fma(terms[t].share, rateOfTurn(states[t], spin), sum), sum);
-  }
+  for (int t = 0; t < turning; ++t) put(fma(terms[t].share, rateOfTurn(states[t], spinOf(t)), sum), sum);
   Quad mean;
   store(mean, sumOfLanes(to.inverseLength * sum));
   const Lanes3 omega = splat(mean);
@@ -76,7 +80,7 @@ MEDULLA_INLINE void seeRates(const Identified& s, const SkinHost& host, SkinTerm
     SkinTermState& at = states[t];
     const Lanes3 velocity = gatherQuads(s.frames.data(), terms[t].frame, &FrameState::velocity) - to.velocity;
     const Lanes3 wayRate = rotateBack(to.rotation, velocity) - cross(omega, at.place);
-    put(rateOfTurn(at, at.turnRate - omega), at.turnRate);
+    put(rateOfTurn(at, spinOf(t) - omega), at.turnRate);
     const Lanes3 beyond = dot(wayRate, at.spareRow) * terms[t].axis;
     put(beyond, at.spareRate);
     put(wayRate - beyond, at.wayRate);
@@ -206,45 +210,54 @@ MEDULLA_INLINE void giveToTerms(const Identified& s, const SkinGroup& g, const L
   }
 }
 
+// What nodes have done to four frames, node by node in the lanes of `loads`: summed up, one frame per lane.
+struct TermLoads {
+  Lanes3 onWay, onTurn, onSpare;
+};
+MEDULLA_INLINE TermLoads sumOfNodes(const SkinTermLoad* four) {
+  const auto sums = [&](const Lanes(SkinTermLoad::*on)[3]) {
+    const auto sum = [&](int j) {
+      return sumsOfLanes((four[0].*on)[j], (four[1].*on)[j], (four[2].*on)[j], (four[3].*on)[j]);
+    };
+    return Lanes3{sum(0), sum(1), sum(2)};
+  };
+  return {sums(&SkinTermLoad::onWay), sums(&SkinTermLoad::onTurn), sums(&SkinTermLoad::onSpare)};
+}
+
 // What nodes get in sum, forces and moments about home, seen in the host's frame and node by node in the lanes, and the
-// loads that giveToTerms() left, where sums replace them: to the frames. `give(frames, forces, torques)` has four of
-// them in the world's frame. Home, the first, bears what force the others do not, and all bear the moment by their
-// shares in how the host is turned.
+// loads that giveToTerms() left: to the frames. `give(frames, forces, torques)` has four of them in the world's frame.
+// Home, the first, bears what force the others do not, and those that turn the host bear the moment that is left by
+// their shares in that: they come last.
 template <class Give>
 MEDULLA_INLINE void giveToFrames(const Identified& s, const SkinHost& host, const HostFrame& own,
-                                 const SkinTermState* states, SkinTermLoad* loads, Lanes3 force, Lanes3 moment,
+                                 const SkinTermState* states, const SkinTermLoad* loads, Lanes3 force, Lanes3 moment,
                                  const Give& give) {
   const SkinTerms* terms = s.terms.data() + host.firstTerms;
-  const int count = host.endTerms - host.firstTerms;
-  for (int t = 0; t < count; ++t) {
-    SkinTermLoad* four = loads + 4 * t;
-    const auto sums = [&](const Lanes(SkinTermLoad::*on)[3]) {
-      const auto sum = [&](int j) {
-        return sumsOfLanes((four[0].*on)[j], (four[1].*on)[j], (four[2].*on)[j], (four[3].*on)[j]);
-      };
-      return Lanes3{sum(0), sum(1), sum(2)};
-    };
-    Lanes3 onWay = sums(&SkinTermLoad::onWay);
-    const Lanes3 onTurn = sums(&SkinTermLoad::onTurn), onSpare = sums(&SkinTermLoad::onSpare);
-    put(fma(dot(onSpare - onWay, terms[t].axis), states[t].spareRow, onWay), onWay);
-    const Lanes3 torque = torqueOnFrame(states[t], onTurn);
-    force = force - onWay;
-    moment = moment - torque - cross(states[t].place, onWay);
-    const auto keep = [](const Lanes3& v, Lanes(&to)[3]) { to[0] = v.x, to[1] = v.y, to[2] = v.z; };
-    keep(onWay, four->onWay);
-    keep(torque, four->onTurn);
+  const int turning = turningTerms(host);
+  Lanes3 onFrame[kMostTurning], torques[kMostTurning];
+  for (int t = host.endTerms - host.firstTerms - 1; t >= 0; --t) {
+    TermLoads on = sumOfNodes(loads + 4 * t);
+    put(fma(dot(on.onSpare - on.onWay, terms[t].axis), states[t].spareRow, on.onWay), on.onWay);
+    const Lanes3 torque = torqueOnFrame(states[t], on.onTurn);
+    force = force - on.onWay;
+    moment = moment - torque - cross(states[t].place, on.onWay);
+    if (t >= turning) {
+      give(terms[t].frame, rotate(own.rotation, on.onWay), rotate(own.rotation, torque));
+    } else {
+      put(on.onWay, onFrame[t]);
+      put(torque, torques[t]);
+    }
   }
   Quad forceLeft, momentLeft;
   store(forceLeft, sumOfLanes(force));
   store(momentLeft, sumOfLanes(own.inverseLength * moment));
-  for (int k = 0; k < 3; ++k) loads->onWay[k][0] += forceLeft.v[k];
+  onFrame[0].x[0] += forceLeft.v[0];
+  onFrame[0].y[0] += forceLeft.v[1];
+  onFrame[0].z[0] += forceLeft.v[2];
   const Lanes3 left = splat(momentLeft);
-  for (int t = 0; t < count; ++t) {
-    const SkinTermLoad& four = loads[4 * t];
-    const Lanes3 onWay{four.onWay[0], four.onWay[1], four.onWay[2]},
-        torque{four.onTurn[0], four.onTurn[1], four.onTurn[2]};
-    const Lanes3 whole = fma(terms[t].share, torqueOnFrame(states[t], left), torque);
-    give(terms[t].frame, rotate(own.rotation, onWay), rotate(own.rotation, whole));
+  for (int t = 0; t < turning; ++t) {
+    const Lanes3 torque = fma(terms[t].share, torqueOnFrame(states[t], left), torques[t]);
+    give(terms[t].frame, rotate(own.rotation, onFrame[t]), rotate(own.rotation, torque));
   }
 }
 
