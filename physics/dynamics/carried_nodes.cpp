@@ -27,6 +27,19 @@ void placeOnSphere(WorldData& d, const HostRange& range) {
   for (int g = range.firstGroup; g < range.endGroup; ++g) place(d, anchorOnSphere(host, d.nodes.groups[g]), g);
 }
 
+// Nodes without mass: where they are is all that is asked.
+void placeSkinOnLink(WorldData& d, const HostRange& range) {
+  const LinkHost host = linkHost(d, range.host);
+  for (int g = range.firstGroup; g < range.endGroup; ++g)
+    put(positionOf(anchorOnLink(host, d.nodes.groups[g])), d.nodes.position[g]);
+}
+
+void placeSkinOnSphere(WorldData& d, const HostRange& range) {
+  const SphereHost host = sphereHost(d, range.host);
+  for (int g = range.firstGroup; g < range.endGroup; ++g)
+    put(positionOf(anchorOnSphere(host, d.nodes.groups[g])), d.nodes.position[g]);
+}
+
 // To where its nodes hang still from the anchors that place() has left them at, as they hung before.
 void hang(WorldData& d, const HostRange& range) {
   const double pressure = stillPressure(d, range.firstGroup, range.endGroup, d.surface.parts[range.part].heldBulk);
@@ -43,9 +56,9 @@ void hang(WorldData& d, const HostRange& range) {
 }  // namespace
 
 void placeCarriedNodes(WorldData& d) {
-  for (const HostRange& range : d.awake.skinOnLinks) placeOnLink(d, range);
+  for (const HostRange& range : d.awake.skinOnLinks) placeSkinOnLink(d, range);
   for (const HostRange& range : d.awake.skinOnSpheres)
-    range.onFrames ? placeSkinOnFrames(d, range) : placeOnSphere(d, range);
+    range.onFrames ? placeSkinOnFrames(d, range) : placeSkinOnSphere(d, range);
   for (const HostRange& range : d.awake.carriedOnLinks) {
     placeOnLink(d, range);
     hang(d, range);

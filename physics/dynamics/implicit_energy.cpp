@@ -178,6 +178,8 @@ double kineticEnergy(const WorldData& d, ImplicitData& s) {
 }
 
 void noteEnergyBefore(WorldData& d, ImplicitData& s) {
+  runStage(d, evaluateFramedLinks);
+  runStage(d, evaluateAttachments);
   setKinetic(d, s, &EnergyBalance::kineticBefore);
   setElastic(d, s, &EnergyBalance::elasticBefore);
   for (std::size_t b = 0; b < s.bodies.size(); ++b) {

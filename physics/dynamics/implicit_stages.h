@@ -107,7 +107,7 @@ void visitAngularMomenta(const WorldData& d, const ImplicitData& s, const Visit&
 }
 
 // implicit_energy.cpp: what a step made of energy, judged for each island of bodies that push each other by itself.
-void noteEnergyBefore(WorldData& d, ImplicitData& s);       // at forces of the state that the step sets out from
+void noteEnergyBefore(WorldData& d, ImplicitData& s);       // of the state that the step sets out from
 double kineticEnergy(const WorldData& d, ImplicitData& s);  // J
 // At the step's end: ImplicitData::verdicts. False where any failed, and nothing is done then. Else islands that gained
 // a little are slowed down, and those at rest stay as they were.

@@ -178,7 +178,6 @@ void advanceBy(WorldData& d, Part part, const Loads& loads, const StepTime& time
   part.oneStage = part.oneStage || d.settings.order == 1 || !d.contact.held.empty();
   ImplicitData& s = dataOf(d, part);
   beginHere(d, s.before);
-  runStage(d, evaluateForces);
   noteEnergyBefore(d, s);
   const Ending ending = attempt(d, s, part.halvings, loads, time);
   const bool last = deepest && part.oneStage;  // fails by its energy alone

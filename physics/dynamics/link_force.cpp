@@ -184,18 +184,28 @@ template <bool kFar>
 
 }  // namespace
 
-void evaluateLinks(WorldData& d, const Batch& batch) {
-  for (const int g : batch.linkGroups)
+static void evaluateGroups(WorldData& d, const Batch& batch, const std::vector<int>& groups) {
+  for (const int g : groups)
     evaluateGroup<false>(d.links.groups[g], d.spheres, d.links.unwoundTwist[g], d.links.frames[g]);
   evaluateIdentifiedLinks(d, batch);
 }
 
+void evaluateLinks(WorldData& d, const Batch& batch) {
+  evaluateGroups(d, batch, batch.linkGroups);
+}
+
+void evaluateHostLinks(WorldData& d, const Batch& batch) {
+  evaluateGroups(d, batch, batch.hostLinkGroups);
+}
+
+void evaluateFramedLinks(WorldData& d, const Batch& batch) {
+  evaluateGroups(d, batch, batch.framedLinkGroups);
+}
+
 void evaluateLinkForces(WorldData& d, const Batch& batch) {
-  for (const int g : batch.framedLinkGroups)
-    evaluateGroup<false>(d.links.groups[g], d.spheres, d.links.unwoundTwist[g], d.links.frames[g]);
+  evaluateFramedLinks(d, batch);
   for (const int g : batch.bareLinkGroups)
     evaluateBareGroup<false>(d.links.groups[g], d.spheres, d.links.unwoundTwist[g], &d.links.slots[8 * g]);
-  evaluateIdentifiedLinks(d, batch);
 }
 
 // Loads are minus the forces on the nodes; torsion turns the frame's two spins apart, as a load does.

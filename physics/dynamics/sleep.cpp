@@ -83,16 +83,21 @@ void moveImpulses(const WorldData& d, bool asleep, std::vector<CarriedImpulse>& 
   to = std::move(all);
 }
 
-// Links' frames are for nodes that move by themselves, and for skins that loads act on.
+// Links' frames are for nodes that move by themselves and for skins that loads act on, at a frame's end for all nodes.
 void shareOutLinkGroups(WorldData& d) {
-  std::vector<char> framed(d.links.groups.size(), 0);
+  std::vector<char> framed(d.links.groups.size(), 0), hosts = framed;
+  for (const std::vector<HostRange>* ranges : {&d.nodes.onLinks, &d.nodes.skinOnLinks})
+    for (const HostRange& range : *ranges) hosts[range.host / 4] = 1;
   for (std::size_t b = 0; b < d.awake.loadedSkins.size(); ++b) {
     if (!d.awake.loadedSkins[b]) continue;
     for (int k = 0; k < d.ranges[b].linkCount; ++k) framed[(d.ranges[b].firstLink + k) / 4] = 1;
   }
   for (Batch& batch : d.awake.batches) {
     for (const HostRange& range : batch.onLinks) framed[range.host / 4] = 1;
-    for (const int g : batch.linkGroups) (framed[g] ? batch.framedLinkGroups : batch.bareLinkGroups).push_back(g);
+    for (const int g : batch.linkGroups) {
+      (framed[g] ? batch.framedLinkGroups : batch.bareLinkGroups).push_back(g);
+      if (hosts[g]) batch.hostLinkGroups.push_back(g);
+    }
   }
 }
 
@@ -231,7 +236,7 @@ void fallAsleep(WorldData& d, const Loads& loads) {
   }
   if (!any) return;
   moveImpulses(d, true, d.contact.carried, d.contact.resting);
-  runStage(d, evaluateLinks);  // once more, for the nodes that hang on them: without speed
+  runStage(d, evaluateHostLinks);  // once more, for the nodes that hang on them: without speed
   runStage(d, evaluateAttachments);
   placeCarriedNodes(d);
   listAwake(d);

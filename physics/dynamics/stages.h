@@ -14,7 +14,9 @@ struct StepTime {
 
 // link_force.cpp: elongation, flexion, torsion; the frames that nodes hang on
 void evaluateLinks(WorldData&, const Batch&);
-// The same without the frames that no node asks for within a substep; forces of such links are in their slots then.
+void evaluateHostLinks(WorldData&, const Batch&);    // of links that nodes hang on, whether these move or not
+void evaluateFramedLinks(WorldData&, const Batch&);  // of links whose frames substeps ask for
+// Of all, without the frames that no substep asks for; forces of such links are in their slots then.
 void evaluateLinkForces(WorldData&, const Batch&);
 // carried_weight.cpp: forces and torques of spheres begin with the weight of carried nodes; first of
 // evaluateAttachments.
@@ -87,7 +89,7 @@ inline void runStage(WorldData& d, Stage stage) {
 void layOutDeadLoads(WorldData&);
 
 // carried_nodes.cpp: nodes of a skin, and others that do not move by themselves, to where they hang from their hosts;
-// needs evaluateLinks at the current state. Where gravity is felt, their weight from now on acts there.
+// needs evaluateHostLinks at the current state. Where gravity is felt, their weight from now on acts there.
 void placeCarriedNodes(WorldData&);
 void weighCarriedNodes(WorldData&);  // carried_weight.cpp, as part of it
 // carried_weight.cpp: what carried nodes weigh is less what their body falls by on the whole, or one that falls freely

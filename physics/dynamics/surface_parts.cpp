@@ -349,7 +349,7 @@ void chooseSurfaceParts(WorldData& d, const Loads& loads) {
     }
   }
   if (!changed) return;
-  runStage(d, evaluateLinks);
+  runStage(d, evaluateHostLinks);
   placeCarriedNodes(d);  // what joins sets out from where its hosts are now, not from where they were a frame ago
   changeParts(d);
 }

@@ -276,7 +276,7 @@ std::vector<Eigen::Vector3d> World::advance(const Loads& loads) {
   chooseSurfaceParts(d, loads);
   fallAsleep(d, loads);
   // The frames that readers hang nodes on are those of the state at the end.
-  runStage(d, evaluateLinks);
+  runStage(d, evaluateHostLinks);
   placeCarriedNodes(d);
   requireFinite(d, time());
   return toolImpulse;

@@ -330,6 +330,7 @@ struct EnergyLedger {
 struct Batch {
   std::vector<int> bodies, spheres, sphereGroups, linkGroups, nodeGroups;  // groups: with anything awake in them
   std::vector<int> framedLinkGroups, bareLinkGroups;  // linkGroups: with and without frames that substeps ask for
+  std::vector<int> hostLinkGroups;                    // linkGroups: that nodes hang on, whether they move or not
   std::vector<HostRange> onLinks, onSpheres;
   bool sharesStages = false;  // nothing that its stages leave is asked for between them (StageArray)
 };
