@@ -80,7 +80,7 @@ VectorXd RestModel::stiffnessTimes(const VectorXd& x, double links, double surfa
 // Lanczos' recurrence in the masses' inner product (Golub and Van Loan, Matrix Computations, 10.1). Only two vectors
 // are kept: lost orthogonality brings copies of eigenvalues, which do not move the largest. Power iteration asks for
 // several times the products and ends below it.
-double RestModel::largestEigenvalue(const BodyMechanics& masses, double links, double surface) const {
+double RestModel::largestEigenvalue(const BodyMechanics& masses, double links, double surface, double spheres) const {
   constexpr int kMostSteps = 200, kStepsPerLook = 8;
   constexpr double kAccuracy = 1e-3;
   const Masses mass(masses, spheres_, nodes_);
@@ -91,7 +91,8 @@ double RestModel::largestEigenvalue(const BodyMechanics& masses, double links, d
   double norm = std::sqrt(x.dot(mass.times(x))), largest = 0;
   while (norm > 0) {
     x /= norm;
-    const VectorXd force = stiffnessTimes(x, links, surface);
+    VectorXd force = stiffnessTimes(x, links, surface);
+    if (spheres != 0) force.head(6 * spheres_) += spheres * mass.times(x).head(6 * spheres_);
     diagonal.push_back(x.dot(force));
     VectorXd next = mass.divide(force) - diagonal.back() * x;
     if (!beside.empty()) next -= beside.back() * before;

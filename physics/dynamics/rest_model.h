@@ -20,9 +20,10 @@ class RestModel {
   // (links * K_links + surface * K_surface) x
   Eigen::VectorXd stiffnessTimes(const Eigen::VectorXd& x, double links, double surface) const;
 
-  // 1/s2: the largest eigenvalue of M^-1 (links * K_links + surface * K_surface) over what is not fixed, within a
-  // thousandth; throws std::runtime_error where a stiffness over a mass is not finite.
-  double largestEigenvalue(const BodyMechanics& masses, double links, double surface) const;
+  // 1/s2: the largest eigenvalue of M^-1 (links * K_links + surface * K_surface) over what is not fixed, with `spheres`
+  // more of the spheres' freedoms, within a thousandth; throws std::runtime_error where a stiffness over a mass is not
+  // finite.
+  double largestEigenvalue(const BodyMechanics& masses, double links, double surface, double spheres = 0) const;
 
   // N m per rad: the stiffness that sphere i turns against while all else stands still.
   Eigen::Matrix3d turningStiffness(int i) const;

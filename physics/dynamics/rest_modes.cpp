@@ -320,16 +320,20 @@ double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrato
   // Nobody watches bodies settle: critical damping of the lowest mode brings them to rest soonest.
   mechanics.settlingDamping = lowest > 0 ? damping(std::max(asked, 2 / lowest)) : 0;
   // Both matrices are sums of the links' and the surface's, and the modes that are stiffest are not those damped most:
-  // the step is searched for where the largest eigenvalue of h^2 K + 2 h C itself reaches 4.
+  // the step is searched for where the largest eigenvalue of h^2 K + 2 h C itself reaches 4. What the mass-proportional
+  // part takes of the spheres' velocities in a step, l = h alpha / (1 + h alpha) of them, counts twice: at l = 1 a step
+  // is one of gradient descent, which is stable up to h^2 K = 2.
   const double linkBeta = mechanics.linkRelaxation, surfaceBeta = mechanics.surfaceRelaxation;
   // That goes with a power of h between the first and the second, nearly the second: each round leaves a tenth of the
   // deviation, coming from a step that is too short.
   constexpr int kRounds = 2;
+  const auto lost = [&](double h) { return 1 - 1 / (1 + h * mechanics.massDamping); };
   double step = stableStep(all, rest.largestEigenvalue(mechanics, linkBeta, surfaceBeta));
+  if (mechanics.massDamping > 0) step *= std::sqrt(1 - 0.5 * lost(step));
   for (int i = 0; i < kRounds && step < std::numeric_limits<double>::infinity(); ++i) {
     const double square = step * step;
-    step *=
-        std::sqrt(4 / rest.largestEigenvalue(mechanics, square + 2 * step * linkBeta, square + 2 * step * surfaceBeta));
+    step *= std::sqrt(4 / rest.largestEigenvalue(mechanics, square + 2 * step * linkBeta,
+                                                 square + 2 * step * surfaceBeta, 2 * lost(step)));
   }
   return step;
 }
