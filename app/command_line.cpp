@@ -40,13 +40,8 @@ constexpr const char* kExitCodes =
 std::map<std::string, std::string> filesByTool(const std::string& option, const std::vector<std::string>& words) {
   std::map<std::string, std::string> out;
   for (const std::string& word : words) {
-    const std::size_t equals = word.find('=');
-    const bool named = equals != std::string::npos;
-    if (equals == word.size() - 1) usageError(option, word, "a file behind the =");
-    if (equals == 0) usageError(option, word, "a tool's name before the =");
-    const bool isFirst =
-        out.try_emplace(named ? word.substr(0, equals) : "", named ? word.substr(equals + 1) : word).second;
-    if (!isFirst) usageError(option, word, "one file per tool");
+    const NamedFile file = namedFile(option, word);
+    if (!out.try_emplace(file.name, file.path).second) usageError(option, word, "one file per tool");
   }
   return out;
 }
@@ -71,6 +66,14 @@ EmbreeSettings embreeSettings(const std::string& text) {
 }
 
 }  // namespace
+
+NamedFile namedFile(const std::string& option, const std::string& word) {
+  const std::size_t equals = word.find('=');
+  if (equals == std::string::npos) return {"", word};
+  if (equals + 1 == word.size()) usageError(option, word, "a file behind the =");
+  if (equals == 0) usageError(option, word, "a name of the scene before the =");
+  return {word.substr(0, equals), word.substr(equals + 1)};
+}
 
 void usageError(const std::string& option, const std::string& value, const std::string& expected) {
   throw CLI::ValidationError(value.empty() ? option : option + " " + value, "expected " + expected);

@@ -15,7 +15,7 @@ namespace {
 struct ChartArguments {
   RunArguments run;
   ChartOptions options;
-  std::vector<std::string> steps = {"0.1", "0.2", "0.5", "1", "2", "5", "10", "20"};
+  std::vector<std::string> steps = {"0.1", "0.2", "0.5", "1", "2", "5", "10", "20"}, models;
 };
 
 CLI::Validator stepFrom(const std::string& what) {
@@ -46,6 +46,15 @@ void dropRepeats(std::vector<T>& list) {
   list = std::move(once);
 }
 
+CLI::Option* addList(CLI::App& command, const char* name, std::vector<std::string>& values, const CLI::Validator& check,
+                     const char* help) {
+  return command.add_option(name, values, help)
+      ->check(check)
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->capture_default_str();
+}
+
 ChartOptions chartOptions(const ChartArguments& a) {
   ChartOptions options = a.options;
   options.run = runOptions(a.run);
@@ -55,6 +64,7 @@ ChartOptions chartOptions(const ChartArguments& a) {
   if (chosen) options.steps.push_back(0);
   dropRepeats(options.steps);
   dropRepeats(options.methods);
+  for (const std::string& word : a.models) options.models.push_back(namedFile("--models", word));
   return options;
 }
 
@@ -90,23 +100,15 @@ Verb addChart(CLI::App& app) {
        "missing")
       ->type_name("DIR")
       ->required();
-  c->add_option(
-       "--steps", a.steps,
-       "substeps to run with, ms; the nearest whole shares of a dynamics frame are taken; auto: as long as each run's "
-       "stability estimate allows")
-      ->check(stepOrAuto())
-      ->type_name("MS,MS,...|auto")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->capture_default_str();
+  addList(
+      *c, "--steps", a.steps, stepOrAuto(),
+      "substeps to run with, ms; the nearest whole shares of a dynamics frame are taken; auto: as long as each run's "
+      "stability estimate allows")
+      ->type_name("MS,MS,...|auto");
   a.options.methods = chartMethodsOfAnyModel();
-  c->add_option("--methods", a.options.methods,
-                "curves; the first method's finest run is the reference where no body names one")
-      ->check(CLI::IsMember(chartMethodNames()))
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->capture_default_str();
-  c->add_option("--models", a.options.models,
+  addList(*c, "--methods", a.options.methods, CLI::IsMember(chartMethodNames()),
+          "curves; the first method's finest run is the reference where no body names one");
+  c->add_option("--models", a.models,
                 "models of the same mesh with other numbers of spheres, for curves of their own (repeatable)")
       ->type_name("[BODY=]FILE")
       ->allow_extra_args(false);
@@ -124,24 +126,12 @@ Verb addStability(CLI::App& app) {
                 "folder for map.csv, trials.csv, stability.gnuplot and stability.svg; made where missing")
       ->type_name("DIR")
       ->required();
-  const auto addList = [&](const char* name, std::vector<std::string>& values, const CLI::Validator& check,
-                           const char* help, const char* type) {
-    c->add_option(name, values, help)
-        ->check(check)
-        ->type_name(type)
-        ->delimiter(',')
-        ->allow_extra_args(false)
-        ->capture_default_str();
-  };
   for (const TortureMethod& method : tortureMethods()) a.options.methods.push_back(method.name);
-  c->add_option("--methods", a.options.methods, "integrators, a panel each")
-      ->check(CLI::IsMember(a.options.methods))
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->capture_default_str();
-  addList("--steps", a.steps, stepFrom("milliseconds"), "steps of the map, ms", "MS,MS,...");
-  addList("--young", a.young, numberFrom(1e-3, 1e12, "Pa"), "stiffnesses of the map, Pa", "PA,PA,...");
-  addList("--trial-steps", a.trialSteps, stepFrom("milliseconds"), "steps of the trials, ms", "MS,MS,...");
+  addList(*c, "--methods", a.options.methods, CLI::IsMember(a.options.methods), "integrators, a panel each");
+  addList(*c, "--steps", a.steps, stepFrom("milliseconds"), "steps of the map, ms")->type_name("MS,MS,...");
+  addList(*c, "--young", a.young, numberFrom(1e-3, 1e12, "Pa"), "stiffnesses of the map, Pa")->type_name("PA,PA,...");
+  addList(*c, "--trial-steps", a.trialSteps, stepFrom("milliseconds"), "steps of the trials, ms")
+      ->type_name("MS,MS,...");
   a.options.threads = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 64U));
   c->add_option("--threads", a.options.threads, "trials that run side by side; the results are the same")
       ->check(wholeNumberFrom(1, 64))

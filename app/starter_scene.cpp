@@ -9,6 +9,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "app/files/report_file.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/rotation_between.h"
@@ -145,10 +146,6 @@ double stiffening(const SoftBodyModel& m, const std::vector<int>& held, const Ti
   for (const int sphere : held) body.fixed.push_back({sphere});
   const double frequency = lowestFrequency(body, bodyMechanics(body)) / (2 * std::numbers::pi);
   return frequency > 0 ? std::clamp(std::pow(kSlowest / frequency, 2), 1.0, kMost) : 1;
-}
-
-std::string vectorText(const Vector3d& v) {
-  return fmt::format("{:.6g} {:.6g} {:.6g}", v.x(), v.y(), v.z());
 }
 
 std::string sceneText(const std::string& name, const SoftBodyModel& model, const Layout& l) {

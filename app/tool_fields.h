@@ -1,5 +1,9 @@
 #pragma once
 
+#include <Eigen/Geometry>
+#include <string>
+#include <type_traits>
+
 #include "haptics/servo.h"
 
 namespace medulla {
@@ -21,6 +25,23 @@ void visitToolFields(Input& input, Tool& tool, const Visit& visit) {
   visit("contact", tool.inContact);
   visit("held", tool.holding);
   visit("clamped", tool.clamped);
+}
+
+// The same as numbers: `visit(name, double)`, of vectors "device.x" and so on, of orientations x, y, z, w.
+template <class Visit>
+void visitToolNumbers(const ToolSample& input, const ToolState& tool, const Visit& visit) {
+  visitToolFields(input, tool, [&visit](const std::string& name, const auto& value) {
+    using Value = std::remove_cvref_t<decltype(value)>;
+    const auto each = [&](const char* axes, const auto& numbers) {
+      for (int k = 0; axes[k] != 0; ++k) visit(name + "." + axes[k], numbers[k]);
+    };
+    if constexpr (std::is_same_v<Value, Eigen::Vector3d>)
+      each("xyz", value);
+    else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>)
+      each("xyzw", value.coeffs());
+    else
+      visit(name, double(value));
+  });
 }
 
 }  // namespace medulla

@@ -19,6 +19,9 @@ struct Verb {
 
 [[noreturn]] void usageError(const std::string& option, const std::string& value, const std::string& expected);
 
+// From "[NAME=]FILE". A usage error where either is missing beside the =.
+NamedFile namedFile(const std::string& option, const std::string& word);
+
 // A usage error where the file that an option is to write has the ending of another kind: what stands under that name
 // would be lost by mistake. Endings of no known kind pass for a file that does not exist yet.
 void refuseOtherKinds(const std::string& option, const std::string& path, const std::string& ending);

@@ -200,7 +200,7 @@ static void setBounds(const Bucket& bucket, std::vector<BoundGroup>& bounds) {
   BoundGroup& group = bounds[bucket.index / 4];
   const int lane = bucket.index % 4;
   setLane(group.centre, lane, {centre[0], centre[1], centre[2]});
-  group.radius[lane] = std::sqrt(std::max({squared[0], squared[1], squared[2], squared[3]})) + bucket.inflation;
+  group.radius[lane] = std::sqrt(largestOfLanes(squared)) + bucket.inflation;
 }
 
 bool isEmbreeIsa(const std::string& isa) {

@@ -360,9 +360,9 @@ void Renderer::take(Image& out, StageTimes* times) {
   if (times) times->stop();
 }
 
-void Renderer::render(const Picture& picture, Image& out, StageTimes* times) {
-  begin(picture, times);
-  take(out, times);
+void Renderer::render(const Picture& picture, Image& out) {
+  begin(picture);
+  take(out);
 }
 
 RendererSettings rendererSettings(int width, int height, const std::string& context, Quality quality) {

@@ -144,9 +144,9 @@ class Renderer {
   ~Renderer();
   Renderer(Renderer&&) noexcept;
   void addSurface(SurfaceShape shape);  // throws std::runtime_error on an unknown look, naming the known ones
-  void render(const Picture& picture, Image& out, StageTimes* times = nullptr);  // adds to `times`, if given
+  void render(const Picture& picture, Image& out);
   // The same in two steps: OpenGL's threads fill one picture while the next is placed and lit. begin() may be one
-  // picture ahead of take(), which gives the pictures in their order.
+  // picture ahead of take(), which gives the pictures in their order. Both add to `times`, if given.
   void begin(const Picture& picture, StageTimes* times = nullptr);
   void take(Image& out, StageTimes* times = nullptr);
   float aspect() const;             // width over height

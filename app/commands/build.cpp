@@ -25,7 +25,6 @@
 #include "physics/model/identify/check_loads.h"
 #include "physics/model/identify/slits.h"
 #include "physics/model/identify/thin_parts.h"
-#include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
 #include "physics/model/render_surface.h"
 #include "physics/sort_unique.h"
@@ -298,8 +297,10 @@ std::vector<Result> resultsOf(const std::vector<BuildJob>& jobs) {
   std::vector<BuildReport> reports;
   std::set<std::string> names;
   for (const BuildJob& job : jobs) {
-    std::string name = plainName(job.name);
-    if (!names.insert(name).second) name += fmt::format("_{}", &job - jobs.data() + 1);
+    const std::string plain = plainName(job.name);
+    std::string name = plain;
+    for (std::ptrdiff_t k = &job - jobs.data() + 1; !names.insert(name).second; ++k)
+      name = fmt::format("{}_{}", plain, k);
     for (Result& r : buildResults(job.report)) results.push_back({name + "." + r.name, r.value, r.unit});
     reports.push_back(job.report);
   }

@@ -54,6 +54,7 @@ struct ChartRun {
   int spheres = 0;
   double step = 0;                    // s
   std::size_t method = 0, model = 0;  // in the order in which they were asked for
+  int style = -1;                     // of the method; -1: of one model among several
 };
 
 struct Outcome {
@@ -75,24 +76,14 @@ std::vector<SceneOverride> expanded(const std::vector<SceneOverride>& overrides,
   return out;
 }
 
-// Of "[BODY=]FILE".
-std::string modelPathOf(const std::string& model) {
-  return model.substr(model.find('=') + 1);
-}
-
-// The override that puts "[BODY=]FILE" in the place of a model. Overrides are relative to the scene, words on the
-// command line to where it was typed.
-SceneOverride modelOverride(const std::string& model, const Scene& scene) {
-  const std::size_t equals = model.find('=');
-  if (equals == std::string::npos && scene.bodies.size() != 1)
-    throw std::runtime_error(
-        fmt::format("--models {}: the scene has {} bodies, write BODY=FILE", model, scene.bodies.size()));
-  const std::string body = equals == std::string::npos ? scene.bodies[0].name : model.substr(0, equals);
-  if (std::none_of(scene.bodies.begin(), scene.bodies.end(), [&](const SceneBody& b) { return b.name == body; }))
-    throw std::runtime_error(fmt::format("--models {}: the scene has no body \"{}\"", model, body));
-  const std::string path = modelPathOf(model);
-  if (!fs::exists(path)) throw std::runtime_error(fmt::format("--models {}: {} does not exist", model, path));
-  return {fmt::format("body.{}.model", body), fs::absolute(path).string()};
+// The override that puts a file in the place of a model. Overrides are relative to the scene, words on the command line
+// to where it was typed.
+SceneOverride modelOverride(const NamedFile& model, const Scene& scene) {
+  std::vector<std::string> names;
+  for (const SceneBody& b : scene.bodies) names.push_back(b.name);
+  const std::string body = meantName("--models", model, names, "body");
+  if (!fs::exists(model.path)) throw std::runtime_error(fmt::format("--models {} does not exist", model.path));
+  return {fmt::format("body.{}.model", body), fs::absolute(model.path).string()};
 }
 
 int spheresOf(const LoadedScene& loaded) {
@@ -122,7 +113,7 @@ std::optional<LoadedScene> loadMethod(const ChartRun& run, const ChartOptions& o
     return loadRun(run.options);
   } catch (const std::runtime_error& error) {
     if (!mayBeLeftOut && !options.models.empty())
-      throw std::runtime_error(fmt::format("with --models {}: {}", options.models[run.model], error.what()));
+      throw std::runtime_error(fmt::format("with --models {}: {}", options.models[run.model].path, error.what()));
     if (!mayBeLeftOut) throw;
     tell("note: no curve of {}: {}\n", run.curve, error.what());
     return {};
@@ -144,12 +135,13 @@ void addRun(const LoadedScene& base, ChartRun run, int substeps, std::vector<Cha
 // A model has curves of its own: by its spheres, by its file's name where those are alike, or else by its place.
 void nameCurveApart(const std::vector<ChartRun>& runs, const ChartOptions& options, ChartRun& run) {
   if (options.models.size() < 2) return;
+  run.style = -1;
   const auto isTaken = [&] {
     return std::any_of(runs.begin(), runs.end(),
                        [&](const ChartRun& r) { return r.curve == run.curve && r.model != run.model; });
   };
   run.curve += fmt::format("_{}_spheres", run.spheres);
-  if (isTaken()) run.curve += "_" + plainName(fs::path(modelPathOf(options.models[run.model])).stem().string());
+  if (isTaken()) run.curve += "_" + plainName(fs::path(options.models[run.model].path).stem().string());
   if (isTaken()) run.curve += fmt::format("_{}", run.model + 1);
 }
 
@@ -165,7 +157,7 @@ std::set<int> substepsOf(const ChartOptions& options, const LoadedScene& loaded)
 // on the most spheres, at half of the smallest step.
 std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& base) {
   std::vector<std::vector<SceneOverride>> models;
-  for (const std::string& model : options.models) models.push_back({modelOverride(model, base.scene)});
+  for (const NamedFile& model : options.models) models.push_back({modelOverride(model, base.scene)});
   if (models.empty()) models.push_back({});
   std::vector<ChartRun> runs;
   int mostSubsteps = 0;
@@ -182,6 +174,7 @@ std::vector<ChartRun> planRuns(const ChartOptions& options, const LoadedScene& b
       if (!loaded) break;
       requireSameMeshes(base, *loaded);
       run.spheres = spheresOf(*loaded);
+      run.style = static_cast<int>(method - chartMethods().begin());
       nameCurveApart(runs, options, run);
       if (number == 0 && run.spheres > reference.spheres) reference = run;
       const std::set<int> all = substepsOf(options, *loaded);
@@ -215,6 +208,7 @@ Outcome execute(const ChartRun& run, const std::function<void(double)>& progress
   const LoadedScene loaded = loadRun(run.options);
   Outcome out;
   out.point.curve = run.curve;
+  out.point.style = run.style;
   out.point.spheres = run.spheres;
   out.point.step = run.step;
   out.moments = framesToRecord(loaded);
@@ -383,7 +377,7 @@ int runChart(const ChartOptions& options) {
   for (const std::string& stem : options.models.size() > 1 ? std::vector{chart, spheres} : std::vector{chart})
     for (const char* ending : {".csv", ".gnuplot", ".svg"}) outputs.push_back(stem + ending);
   requireDistinctOutputs(base, options.run, outputs);
-  for (const std::string& model : options.models) requireDistinctFiles(outputs, {modelPathOf(model)});
+  for (const NamedFile& model : options.models) requireDistinctFiles(outputs, {model.path});
   requireWritable(outputs);
   ChartTruth truth;
   const std::vector<ChartRun> runs = planRuns(options, base);

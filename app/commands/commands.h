@@ -86,7 +86,7 @@ struct ChartOptions {
   // s; substeps are whole shares of a dynamics frame, the nearest to these. 0: what a run's stability estimate allows.
   std::vector<double> steps;
   std::vector<std::string> methods;  // of chartMethodNames(), at least one; the first is the reference's
-  std::vector<std::string> models;   // [BODY=]FILE: of the scene's mesh with other numbers of spheres; empty: its own
+  std::vector<NamedFile> models;     // of the scene's mesh with other numbers of spheres; empty: its own
 };
 std::vector<std::string> chartMethodNames();
 std::vector<std::string> chartMethodsOfAnyModel();  // of these, those that need nothing of a model

@@ -62,16 +62,7 @@ std::vector<std::string> fieldsOf(const CacheLayout& layout) {
   const ToolSample input;
   const ToolState state;
   for (const std::string& tool : layout.tools)
-    visitToolFields(input, state, [&](const char* what, const auto& value) {
-      using Value = std::remove_cvref_t<decltype(value)>;
-      const std::string name = fmt::format("{}.{}", tool, what);
-      if constexpr (std::is_same_v<Value, Eigen::Vector3d>)
-        appendNames(out, name, "xyz");
-      else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>)
-        appendNames(out, name, "wxyz");
-      else
-        out.push_back(name);
-    });
+    visitToolNumbers(input, state, [&](const std::string& what, double) { out.push_back(tool + "." + what); });
   return out;
 }
 
@@ -88,15 +79,7 @@ void valuesOf(const PictureState& state, std::vector<double>& out) {
     for (const Eigen::Vector3d& node : body.nodes) add(node);
   }
   for (std::size_t k = 0; k < state.tools.size(); ++k)
-    visitToolFields(state.inputs[k], state.tools[k], [&](const char*, const auto& value) {
-      using Value = std::remove_cvref_t<decltype(value)>;
-      if constexpr (std::is_same_v<Value, Eigen::Vector3d>)
-        add(value);
-      else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>)
-        turn(value);
-      else
-        out.push_back(value);
-    });
+    visitToolNumbers(state.inputs[k], state.tools[k], [&out](const std::string&, double x) { out.push_back(x); });
 }
 
 // Components of one vector share a scale: one that stays near zero has no meaning of its own.

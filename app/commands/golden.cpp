@@ -41,15 +41,7 @@ struct Moment {
 std::string toolsHash(const PictureState& state) {
   NumberHash hash;
   for (std::size_t k = 0; k < state.tools.size(); ++k)
-    visitToolFields(state.inputs[k], state.tools[k], [&hash](const char*, const auto& value) {
-      using Value = std::remove_cvref_t<decltype(value)>;
-      if constexpr (std::is_same_v<Value, Eigen::Vector3d>)
-        for (const double x : value) hash.add(x);
-      else if constexpr (std::is_same_v<Value, Eigen::Quaterniond>)
-        for (const double x : value.coeffs()) hash.add(x);
-      else
-        hash.add(double(value));
-    });
+    visitToolNumbers(state.inputs[k], state.tools[k], [&hash](const std::string&, double x) { hash.add(x); });
   return fmt::format("{:016x}", hash.value());
 }
 

@@ -25,18 +25,6 @@ namespace medulla {
 
 namespace {
 
-std::string text(double value) {
-  return fmt::format("{:.6g}", value);
-}
-
-std::string text(std::size_t value) {
-  return fmt::format("{}", value);
-}
-
-std::string text(const Eigen::Vector3d& v) {
-  return fmt::format("{:.6g} {:.6g} {:.6g}", v.x(), v.y(), v.z());
-}
-
 std::vector<Result> modelResults(const SoftBodyModel& model) {
   constexpr double densityOfWater = 1000;
   double radiusMin = std::numeric_limits<double>::infinity(), radiusMax = 0;
@@ -49,18 +37,18 @@ std::vector<Result> modelResults(const SoftBodyModel& model) {
                                  {"name", model.name, ""},
                                  {"settings", model.settings, ""},
                                  {"mesh_hash", fmt::format("{:016x}", model.meshHash), ""},
-                                 {"input_vertices", text(model.nodeOfInputVertex.size()), ""},
-                                 {"nodes", text(model.restNodes.size()), ""},
-                                 {"render_triangles", text(model.renderSurface.triangles.size()), ""},
-                                 {"mass_at_1000_kg/m3", text(densityOfWater * report.volume), "kg"},
-                                 {"extents", text(Eigen::Vector3d(boundsOf(model.restNodes).sizes())), "m"},
-                                 {"radius_min", text(radiusMin), "m"},
-                                 {"radius_max", text(radiusMax), "m"}};
+                                 {"input_vertices", numberText(model.nodeOfInputVertex.size()), ""},
+                                 {"nodes", numberText(model.restNodes.size()), ""},
+                                 {"render_triangles", numberText(model.renderSurface.triangles.size()), ""},
+                                 {"mass_at_1000_kg/m3", numberText(densityOfWater * report.volume), "kg"},
+                                 {"extents", vectorText(Eigen::Vector3d(boundsOf(model.restNodes).sizes())), "m"},
+                                 {"radius_min", numberText(radiusMin), "m"},
+                                 {"radius_max", numberText(radiusMax), "m"}};
   for (const Result& r : buildResults(report))
     if (r.name != "seconds") results.push_back(r);
   if (model.identified) {
     for (const Result& r : identifiedResults(*model.identified, std::nullopt)) results.push_back(r);
-    results.push_back({"identified_poisson", text(model.identified->poisson), ""});
+    results.push_back({"identified_poisson", numberText(model.identified->poisson), ""});
   }
   return results;
 }
@@ -75,19 +63,19 @@ void addBody(const SceneBody& body, std::vector<Result>& results) {
     results.push_back({fmt::format("body.{}.{}", body.name, name), value, unit});
   };
   const double volume = enclosedVolume({model.restNodes, model.triangles});
-  add("spheres", text(model.spheres.size()), "");
-  add("links", text(linkCount(body)), "");
-  add("nodes", text(model.restNodes.size()), "");
-  add("triangles", text(model.triangles.size()), "");
-  add("mass", text(volume * body.tissue.density), "kg");
-  add("young", text(body.tissue.young), "Pa");
-  add("poisson", text(body.tissue.poisson), "");
-  add("damping", text(body.tissue.damping), "");
+  add("spheres", numberText(model.spheres.size()), "");
+  add("links", numberText(linkCount(body)), "");
+  add("nodes", numberText(model.restNodes.size()), "");
+  add("triangles", numberText(model.triangles.size()), "");
+  add("mass", numberText(volume * body.tissue.density), "kg");
+  add("young", numberText(body.tissue.young), "Pa");
+  add("poisson", numberText(body.tissue.poisson), "");
+  add("damping", numberText(body.tissue.damping), "");
   add("link_model", nameOf(body.links), "");
   add("surface", nameOf(body.surface), "");
   add("look", body.look, "");
-  add("fixed_spheres", text(body.fixed.size()), "");
-  add("driven_spheres", text(body.driven.size()), "");
+  add("fixed_spheres", numberText(body.fixed.size()), "");
+  add("driven_spheres", numberText(body.driven.size()), "");
 }
 
 // Undamped, of the whole body as it is held.
@@ -112,27 +100,27 @@ std::vector<Result> sceneResults(const LoadedScene& loaded) {
   }
   std::vector<Result> results = {{"kind", "scene", ""},
                                  {"name", scene.name, ""},
-                                 {"duration", text(scene.duration), "s"},
-                                 {"servo", text(scene.servoRate), "Hz"},
-                                 {"dynamics", text(scene.dynamicsRate), "Hz"},
+                                 {"duration", numberText(scene.duration), "s"},
+                                 {"servo", numberText(scene.servoRate), "Hz"},
+                                 {"dynamics", numberText(scene.dynamicsRate), "Hz"},
                                  {"substeps_per_frame", fmt::format("{}", world.substepsPerFrame()), ""},
-                                 {"substep", text(world.substep()), "s"},
-                                 {"stable_substep", text(world.stableSubstep()), "s"},
-                                 {"gravity", text(scene.dynamics.gravity), "m/s2"},
+                                 {"substep", numberText(world.substep()), "s"},
+                                 {"stable_substep", numberText(world.stableSubstep()), "s"},
+                                 {"gravity", vectorText(scene.dynamics.gravity), "m/s2"},
                                  {"picture", fmt::format("{}x{}", scene.width, scene.height), ""},
-                                 {"fps", text(scene.fps), "Hz"},
-                                 {"bodies", text(scene.bodies.size()), ""},
-                                 {"statics", text(scene.statics.size()), ""},
-                                 {"tools", text(scene.tools.size()), ""},
-                                 {"spheres", text(spheres), ""},
-                                 {"links", text(links), ""},
-                                 {"nodes", text(nodes), ""}};
+                                 {"fps", numberText(scene.fps), "Hz"},
+                                 {"bodies", numberText(scene.bodies.size()), ""},
+                                 {"statics", numberText(scene.statics.size()), ""},
+                                 {"tools", numberText(scene.tools.size()), ""},
+                                 {"spheres", numberText(spheres), ""},
+                                 {"links", numberText(links), ""},
+                                 {"nodes", numberText(nodes), ""}};
   for (const SceneBody& body : scene.bodies) {
     addBody(body, results);
     addFrequencies(body, results);
   }
   for (const SceneTool& tool : scene.tools)
-    results.push_back({fmt::format("tool.{}.radius", tool.name), text(tool.settings.radius), "m"});
+    results.push_back({fmt::format("tool.{}.radius", tool.name), numberText(tool.settings.radius), "m"});
   return results;
 }
 
@@ -152,15 +140,15 @@ std::vector<Result> trajectoryResults(const Trajectory& trajectory) {
   }
   for (const Eigen::Vector3d& f : trajectory.measuredForces) force = std::max(force, f.norm());
   std::vector<Result> results = {{"kind", "trajectory", ""},
-                                 {"samples", text(samples.size()), ""},
-                                 {"from", text(samples.front().time), "s"},
-                                 {"to", text(samples.back().time), "s"},
-                                 {"gap_max", text(gap), "s"},
-                                 {"lower", text(box.min()), "m"},
-                                 {"upper", text(box.max()), "m"},
-                                 {"speed_max", text(speed), "m/s"},
+                                 {"samples", numberText(samples.size()), ""},
+                                 {"from", numberText(samples.front().time), "s"},
+                                 {"to", numberText(samples.back().time), "s"},
+                                 {"gap_max", numberText(gap), "s"},
+                                 {"lower", vectorText(box.min()), "m"},
+                                 {"upper", vectorText(box.max()), "m"},
+                                 {"speed_max", numberText(speed), "m/s"},
                                  {"grip_closings", fmt::format("{}", closings), ""}};
-  if (!trajectory.measuredForces.empty()) results.push_back({"force_measured_max", text(force), "N"});
+  if (!trajectory.measuredForces.empty()) results.push_back({"force_measured_max", numberText(force), "N"});
   return results;
 }
 
@@ -169,18 +157,18 @@ std::vector<Result> meshResults(const std::string& path, const std::string& unit
   const TriangleMesh mesh = readMesh(path, metresPerUnit(unit));
   const Eigen::AlignedBox3d box = boundsOf(mesh.vertices);
   std::vector<Result> results = {{"kind", "mesh", ""},
-                                 {"input_vertices", text(mesh.vertices.size()), ""},
-                                 {"input_triangles", text(mesh.triangles.size()), ""},
-                                 {"lower", text(box.min()), "m"},
-                                 {"upper", text(box.max()), "m"},
-                                 {"diagonal", text(boundsDiagonal(mesh)), "m"}};
+                                 {"input_vertices", numberText(mesh.vertices.size()), ""},
+                                 {"input_triangles", numberText(mesh.triangles.size()), ""},
+                                 {"lower", vectorText(box.min()), "m"},
+                                 {"upper", vectorText(box.max()), "m"},
+                                 {"diagonal", numberText(boundsDiagonal(mesh)), "m"}};
   noteSize(path, mesh);
   try {
     const RepairedMesh repaired = repairMesh(mesh);
     noteRepairs(path, repaired.notes);
-    results.insert(results.end(), {{"nodes", text(repaired.mesh.vertices.size()), ""},
-                                   {"triangles", text(repaired.mesh.triangles.size()), ""},
-                                   {"volume", text(enclosedVolume(repaired.mesh)), "m3"},
+    results.insert(results.end(), {{"nodes", numberText(repaired.mesh.vertices.size()), ""},
+                                   {"triangles", numberText(repaired.mesh.triangles.size()), ""},
+                                   {"volume", numberText(enclosedVolume(repaired.mesh)), "m3"},
                                    {"buildable", "yes", ""}});
   } catch (const std::runtime_error& why) {
     tell("{}: note: no model can be built: {}\n", path, why.what());
@@ -196,7 +184,7 @@ std::vector<Result> cacheResults(const std::string& path) {
   for (const CacheLayout::Body& body : layout.bodies) bodies.push_back(body.name);
   return {{"kind", "cache", ""},
           {"pictures", fmt::format("{}", cache.pictures()), ""},
-          {"fps", text(layout.fps), "Hz"},
+          {"fps", numberText(layout.fps), "Hz"},
           {"bodies", joined(bodies, " "), ""},
           {"tools", joined(layout.tools, " "), ""},
           {"hash", fmt::format("{:016x}", cache.finalHash()), ""}};
@@ -206,10 +194,10 @@ std::vector<Result> logResults(const std::string& path) {
   const LogTable log = readLog(path, true);
   if (log.isCut) tell("{}: note: ends in the midst of a row\n", path);
   std::vector<Result> results = {
-      {"kind", "log", ""}, {"rows", text(log.value.size()), ""}, {"columns", text(log.columns.size()), ""}};
+      {"kind", "log", ""}, {"rows", numberText(log.value.size()), ""}, {"columns", numberText(log.columns.size()), ""}};
   if (log.value.empty()) return results;
-  results.push_back({"from", text(log.value.front()[0]), "s"});
-  results.push_back({"to", text(log.value.back()[0]), "s"});
+  results.push_back({"from", numberText(log.value.front()[0]), "s"});
+  results.push_back({"to", numberText(log.value.back()[0]), "s"});
   return results;
 }
 

@@ -25,17 +25,28 @@ void recordFrames(const Simulation& simulation, bool last, std::vector<RecordedF
   }
 }
 
+std::string meantName(const std::string& option, const NamedFile& file, const std::vector<std::string>& names,
+                      const std::string& kind) {
+  const auto refuse = [&](const std::string& why) {
+    const std::string word = file.name.empty() ? file.path : file.name + "=" + file.path;
+    throw std::runtime_error(fmt::format("{} {}: the scene has {}", option, word, why));
+  };
+  if (names.empty()) refuse("no " + kind);
+  if (file.name.empty() && names.size() > 1)
+    refuse(fmt::format("{} {}, write NAME=FILE: one of {}", names.size(), kind == "body" ? "bodies" : kind + "s",
+                       joined(names, ", ")));
+  if (!file.name.empty() && std::find(names.begin(), names.end(), file.name) == names.end())
+    refuse(fmt::format("no {} \"{}\"; {}", kind, file.name, hintOfNames(file.name, names)));
+  return file.name.empty() ? names[0] : file.name;
+}
+
 std::map<std::string, std::string> filesOfTools(const std::string& option, const Scene& scene,
                                                 const std::map<std::string, std::string>& files) {
+  std::vector<std::string> names;
+  for (const SceneTool& t : scene.tools) names.push_back(t.name);
   std::map<std::string, std::string> out;
   for (const auto& [name, path] : files) {
-    if (scene.tools.empty()) throw std::runtime_error(fmt::format("{} {}: the scene has no tool", option, path));
-    if (name.empty() && scene.tools.size() != 1)
-      throw std::runtime_error(
-          fmt::format("{} {}: the scene has {} tools, write TOOL=FILE", option, path, scene.tools.size()));
-    const std::string tool = name.empty() ? scene.tools[0].name : name;
-    if (std::none_of(scene.tools.begin(), scene.tools.end(), [&](const SceneTool& t) { return t.name == tool; }))
-      throw std::runtime_error(fmt::format("{} {}={}: the scene has no tool \"{}\"", option, name, path, name));
+    const std::string tool = meantName(option, {name, path}, names, "tool");
     if (!out.try_emplace(tool, path).second)
       throw std::runtime_error(
           fmt::format("{} {}={}: another file is named for this tool, expected one file per tool", option, tool, path));

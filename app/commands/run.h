@@ -20,6 +20,15 @@ struct SurfaceRequest {
   std::string path;
 };
 
+// Of a word "[NAME=]FILE" on the command line.
+struct NamedFile {
+  std::string name, path;  // no name: of the only tool or body
+};
+// The name of the one that is meant of `names`, which are of the scene's tools or bodies, as `kind` says. Throws
+// std::runtime_error "OPTION WORD: ..." where there is none, or more than one and no name.
+std::string meantName(const std::string& option, const NamedFile& file, const std::vector<std::string>& names,
+                      const std::string& kind);
+
 struct RunOptions {
   std::string scene;
   std::vector<SceneOverride> overrides;

@@ -51,9 +51,8 @@ static void printAlmostClosed(const LoadedScene& loaded) {
 
 // m; how far a ball reaches into a closed surface, 0 or less where it does not touch it.
 static double reachInto(const TriangleMesh& surface, const Eigen::Vector3d& centre, double radius) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& v : surface.vertices) box.extend(v);
-  if (box.exteriorDistance(centre) >= radius) return 0;  // most tools start beside most bodies: no tree for them
+  if (boundsOf(surface.vertices).exteriorDistance(centre) >= radius)
+    return 0;  // most tools start beside most bodies: no tree for them
   const SurfaceTree tree = makeSurfaceTree(surface);
   const double distance = closestPoint(tree, centre).distance;
   return radius + (isInside(tree, centre) ? distance : -distance);

@@ -9,6 +9,7 @@ namespace medulla {
 // One run of a chart: what it cost and how far off it was.
 struct ChartPoint {
   std::string curve;  // of the method, and of the model where there are several
+  int style = -1;     // the same in every chart; -1: by its place in this one
   int spheres = 0;    // of all bodies
   double step = 0;    // s, of a substep
   int nodes = 0;      // of a run of the reference's own program; 0: a run of this one

@@ -27,13 +27,6 @@ struct Curve {
   int row = -1;          // on the rim; -1: nothing of it failed
 };
 
-// A method looks the same in every chart; curves of several models are told apart by their order.
-std::size_t styleOf(const std::string& name, std::size_t place) {
-  constexpr std::string_view methods[] = {"full", "contact", "skin", "springs", "implicit", "implicit_2", "identified"};
-  const auto* known = std::find(std::begin(methods), std::end(methods), name);
-  return known != std::end(methods) ? static_cast<std::size_t>(known - methods) : place;
-}
-
 std::vector<Curve> curvesOf(const std::vector<ChartPoint>& points) {
   constexpr int kFilled[] = {5, 7, 9, 11, 13}, kPentagon = 15;
   std::vector<Curve> out;
@@ -43,7 +36,7 @@ std::vector<Curve> curvesOf(const std::vector<ChartPoint>& points) {
     auto curve = std::find_if(out.begin(), out.end(), [&](const Curve& c) { return c.name == p.curve; });
     if (curve == out.end()) {
       const bool other = p.nodes > 0;
-      const std::size_t style = styleOf(p.curve, own);
+      const std::size_t style = p.style >= 0 ? static_cast<std::size_t>(p.style) : own;
       out.push_back({p.curve, other ? kBlack : kCurveColours[style % std::size(kCurveColours)],
                      other ? kPentagon : kFilled[style % std::size(kFilled)], other});
       own += other ? 0 : 1;

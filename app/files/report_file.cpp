@@ -3,22 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <type_traits>
 
 #include "app/files/output_file.h"
 
 namespace medulla {
-
-namespace {
-
-// Quality figures: six digits are more than anyone compares.
-template <typename T>
-std::string numberText(T value) {
-  if constexpr (std::is_floating_point_v<T>) return fmt::format("{:.6g}", value);
-  return fmt::format("{}", value);
-}
-
-}  // namespace
 
 std::vector<Result> buildResults(const BuildReport& r) {
   return {{"triangles", numberText(r.triangles), ""},

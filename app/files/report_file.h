@@ -1,7 +1,11 @@
 #pragma once
 
+#include <fmt/format.h>
+
+#include <Eigen/Core>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "physics/model/build.h"
@@ -12,6 +16,16 @@ namespace medulla {
 struct Result {
   std::string name, value, unit;  // unit is empty for counts and ratios
 };
+
+// Six digits are more than anyone compares; counts are whole.
+template <typename T>
+std::string numberText(T value) {
+  if constexpr (std::is_floating_point_v<T>) return fmt::format("{:.6g}", value);
+  return fmt::format("{}", value);
+}
+inline std::string vectorText(const Eigen::Vector3d& v) {
+  return fmt::format("{:.6g} {:.6g} {:.6g}", v.x(), v.y(), v.z());
+}
 
 // The quality report of a model build, in the order in which it is shown.
 std::vector<Result> buildResults(const BuildReport& report);

@@ -37,10 +37,7 @@ bool readBool(const XmlElement& element, const std::string& attribute, bool fall
 std::string readName(const XmlElement& element) {
   constexpr std::size_t kLongest = 200;  // so that files may be named after them, with what is put before and behind
   std::string name = readText(element, "name");
-  const auto plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
-  };
-  if (!std::all_of(name.begin(), name.end(), plain)) refuse(element, "name", "expected letters, digits, _ and - only");
+  if (name != plainName(name)) refuse(element, "name", "expected letters, digits, _ and - only");
   if (name.size() > kLongest) refuse(element, "name", fmt::format("expected at most {} letters", kLongest));
   return name;
 }

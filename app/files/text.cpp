@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace medulla {
 
@@ -73,22 +74,25 @@ namespace {
 
 // Optimal string alignment distance, row by row.
 std::size_t editsBetween(const std::string& a, const std::string& b) {
-  std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+  std::vector<std::size_t> beforeLast, last, row(b.size() + 1);
   for (std::size_t i = 0; i <= a.size(); ++i) {
-    for (std::size_t j = 0; j <= b.size(); ++j) {
-      if (i == 0 || j == 0) {
-        d[i][j] = i + j;
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      if (i == 0) {
+        row[j] = j;
         continue;
       }
-      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
       const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
-      if (swapped) d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+      if (swapped) row[j] = std::min(row[j], beforeLast[j - 2] + 1);
     }
+    beforeLast = std::exchange(last, row);
   }
-  return d[a.size()][b.size()];
+  return last[b.size()];
 }
 
-constexpr std::size_t kLongestName = 200;  // nobody mistypes more; the table of edits is quadratic
+// Nobody mistypes more, and what stands for a name may be a file without an end.
+constexpr std::size_t kLongestName = 200;
 
 struct NearName {
   std::string name;
@@ -99,7 +103,7 @@ NearName nearest(const std::string& name, const std::vector<std::string>& known)
   const std::string wanted = lowered(name.substr(0, kLongestName));
   NearName best;
   for (const std::string& candidate : known)
-    if (const std::size_t edits = editsBetween(wanted, lowered(candidate)); edits < best.edits)
+    if (const std::size_t edits = editsBetween(wanted, lowered(candidate.substr(0, kLongestName))); edits < best.edits)
       best = {candidate, edits};
   return best;
 }

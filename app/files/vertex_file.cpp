@@ -33,6 +33,8 @@ bool isHeader(std::span<const std::string_view> cells, std::span<const std::stri
 template <typename Row>
 void forEachVertex(std::string_view text, const std::string& name, const SoftBodyModel& model,
                    std::span<const std::string_view> columns, const Row& row) {
+  if (model.nodeOfInputVertex.empty())
+    throw inputError(name, 0, "the model does not say which vertices of its mesh its nodes are: build it anew");
   CsvRows rows(text, name);
   const std::string expected = joined(columns, ",");
   bool first = true, any = false;

@@ -134,7 +134,7 @@ static void foreseeReach(WorldData& d) {
     const Lanes farthest = splat(0.5 / h) * (splat(least) + radius), speed = dot(v, v);
     squared = larger(squared, masked(isLess(farthest * farthest, speed), speed));
   }
-  const double fastest = std::sqrt(std::max(std::max(squared[0], squared[1]), std::max(squared[2], squared[3])));
+  const double fastest = std::sqrt(largestOfLanes(squared));
   c.reach = std::max(least, std::min(2 * fastest, kMost) * h);
   const bool isFast = c.reach > least;
   const double needed = 2 * c.freeMove + (isFast ? 1.5 * c.reach : least);

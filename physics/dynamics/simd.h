@@ -107,6 +107,9 @@ inline Lanes3 masked(Lanes condition, const Lanes3& a) {
 inline bool any(Lanes condition) {
   return _mm256_movemask_pd(condition) != 0;
 }
+inline double largestOfLanes(Lanes a) {
+  return std::max(std::max(a[0], a[1]), std::max(a[2], a[3]));
+}
 inline double sumOfLanes(Lanes a) {
   return (a[0] + a[1]) + (a[2] + a[3]);
 }

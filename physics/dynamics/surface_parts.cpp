@@ -42,10 +42,6 @@ void layOutGive(WorldData& d) {
   }
 }
 
-double longest(Lanes squared) {
-  return std::sqrt(std::max(std::max(squared[0], squared[1]), std::max(squared[2], squared[3])));
-}
-
 double deepestSag(const WorldData& d, const HostRange& range) {
   const Lanes3 gravity = splat(d.gravity);
   Lanes squared = splat(0);
@@ -53,7 +49,7 @@ double deepestSag(const WorldData& d, const HostRange& range) {
     const Lanes3 sag = sagOf(d, gravity, g);
     squared = larger(squared, dot(sag, sag));
   }
-  return longest(squared);
+  return std::sqrt(largestOfLanes(squared));
 }
 
 // Nothing turns or moves what the part hangs on, so that nodes which hold it have nothing to hold.
@@ -211,7 +207,7 @@ double measureShifts(WorldData& d, std::size_t part) {
     storeFour(off, d.surface.shift, 4 * g);
     if (g >= d.surface.parts[part].firstChoice) squared = larger(squared, masked(isNode, dot(off, off)));
   }
-  return longest(squared);
+  return std::sqrt(largestOfLanes(squared));
 }
 
 // Shifts of the nodes of a part that is carried: to where edges and attachments hold them against their neighbours as
@@ -232,7 +228,7 @@ double balanceShifts(WorldData& d, std::size_t part) {
     squared = larger(squared, dot(shift, shift));
   }
   s.parts[part].isShifted = true;
-  return longest(squared);
+  return std::sqrt(largestOfLanes(squared));
 }
 
 void clearShifts(WorldData& d, std::size_t part) {

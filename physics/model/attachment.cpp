@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "physics/model/identified_network.h"
-#include "physics/model/mass_properties.h"
 #include "physics/model/mesh_topology.h"
 
 namespace medulla {
