@@ -107,7 +107,7 @@ Verb addChart(CLI::App& app) {
       ->type_name("MS,MS,...|auto");
   a.options.methods = chartMethodsOfAnyModel();
   addList(*c, "--methods", a.options.methods, CLI::IsMember(chartMethodNames()),
-          "curves; the first method's finest run is the reference where no body names one");
+          "curves; where no body names a reference it is a run of the first method at half of the smallest step");
   c->add_option("--models", a.models,
                 "models of the same mesh with other numbers of spheres, for curves of their own (repeatable)")
       ->type_name("[BODY=]FILE")

@@ -113,7 +113,7 @@ RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) 
   readView(a, options.view);
   readPictures(a, options);
   if (options.still) options.quality = Quality::best;
-  options.run.isExcerpt = options.still.has_value();
+  options.run.isExcerpt = options.still || options.frames;
   if (!a.quality.empty()) options.quality = valueNamed<Quality>(a.quality);
   options.context = a.context;
   options.resume = a.resume;
@@ -197,7 +197,9 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
   c->add_option("--fps", a.fps, "pictures per second, 1 to 240 (default: the scene's)")
       ->check(numberFrom(1, 240))
       ->type_name("HZ");
-  CLI::Option* frames = c->add_option("--frames", a.frames, "only pictures A to B-1, counted from 0")->type_name("A:B");
+  CLI::Option* frames =
+      c->add_option("--frames", a.frames, "only pictures A to B-1, counted from 0; the run ends there")
+          ->type_name("A:B");
   c->add_option("--still", a.still, "one picture at time T (s) into FILE.png")
       ->check(numberFrom(0, kEndless, "a time in seconds"))
       ->type_name("T")

@@ -90,6 +90,8 @@ TEST(VertexFile, MistakesNameTheLine) {
   const auto forces = [&](const char* text) {
     return complaintOf([&] { parseVertexForces(text, "f.csv", model, {}); });
   };
+  EXPECT_EQ(complaintOf([] { parseVertices("0\n", "v.csv", {}); }),
+            "v.csv: the model does not say which vertices of its mesh its nodes are: build it anew");
   EXPECT_EQ(vertices("0\n6\n"), "v.csv:2: column vertex is '6', expected a whole number from 0 to 5");
   EXPECT_EQ(vertices("-1\n"), "v.csv:1: column vertex is '-1', expected a whole number from 0 to 5");
   EXPECT_EQ(vertices("0\n1.5\n"), "v.csv:2: column vertex is '1.5', expected a whole number from 0 to 5");

@@ -265,6 +265,7 @@ TEST_F(SceneFile, WrongValuesOfTimesDynamicsAndBodiesNameTheLineAndWhatWasExpect
       {"6e3", "", R"(x.xml:7: <tissue> young="": expected 1 number > 0)"},
       {"6e3", "0", R"(x.xml:7: <tissue> young="0": expected 1 number > 0)"},
       {"poisson=\"0.4\"", "poisson=\"0.5\"", R"(x.xml:7: <tissue> poisson="0.5": expected 1 number >= 0 and < 0.5)"},
+      {"density=\"1030\"", "density=\"1e-300\"", R"(x.xml:7: <tissue> density="1e-300": expected 1 number >= 1e-06)"},
       {"damping=\"0.2\"", "damping=\"-1\"", R"(x.xml:7: <tissue> damping="-1": expected 1 number >= 0)"},
       {"0.1 0.2 0.3", "0.1 0.2", R"(x.xml:10: <body> position="0.1 0.2": expected 3 numbers)"},
       {"0.1 0.2 0.3", "0.1 0.2 0.3 0", R"(x.xml:10: <body> position="0.1 0.2 0.3 0": expected 3 numbers)"},

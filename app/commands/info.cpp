@@ -75,6 +75,7 @@ void addBody(const SceneBody& body, std::vector<Result>& results) {
   add("surface", nameOf(body.surface), "");
   add("look", body.look, "");
   add("fixed_spheres", numberText(body.fixed.size()), "");
+  add("fixed_nodes", numberText(body.fixedNodes.size()), "");
   add("driven_spheres", numberText(body.driven.size()), "");
 }
 

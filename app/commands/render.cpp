@@ -96,7 +96,8 @@ std::vector<int> cachedNumbers(const CacheReader& cache, const Wanted& wanted, c
     const double number = time * cache.layout().fps;
     if (std::abs(number - std::round(number)) > 1e-6)
       throw inputError(options.cacheToRead, 0,
-                       fmt::format("holds pictures every 1/{:g} s, none at {:g} s", cache.layout().fps, time));
+                       fmt::format("holds pictures every 1/{:g} s, none at {:g} s: the one before it is at {:.6g} s",
+                                   cache.layout().fps, time, std::floor(number) / cache.layout().fps));
     numbers.push_back(static_cast<int>(std::lround(number)));
     if (numbers.back() >= cache.pictures())
       throw inputError(options.cacheToRead, 0,
@@ -182,7 +183,7 @@ int runRender(const RenderOptions& options) {
   const Wanted wanted = wantedOf(options, loaded.scene);
   requireDistinctOutputs(loaded, options.run, options.outputs);
   requireDistinctFiles(options.outputs, {options.cacheToRead});
-  if (options.still) loaded.scene.duration = *options.still;  // nothing later is asked for
+  if (options.still || options.frames) loaded.scene.duration = wanted.times.back();  // nothing later is asked for
   if (options.cacheToRead.empty())
     renderRun(loaded, options, wanted, timings);
   else

@@ -74,6 +74,8 @@ void readDynamics(const XmlElement& dynamics, WorldSettings& out) {
   out.contact = readEnum(dynamics, "contact", out.contact);
 }
 
+constexpr Range kDensity{1e-6};  // kg/m3: air has 1.2, and masses that vanish divide by zero
+
 struct NamedTissue {
   std::string name;
   Tissue tissue;
@@ -86,7 +88,7 @@ std::vector<NamedTissue> readTissues(const XmlElement& root) {
     Tissue t;
     t.young = readNumber(*e, "young", t.young, kPositive);
     t.poisson = readNumber(*e, "poisson", t.poisson, {0, 0.5, false, true});
-    t.density = readNumber(*e, "density", t.density, kPositive);
+    t.density = readNumber(*e, "density", t.density, kDensity);
     t.damping = readNumber(*e, "damping", t.damping, kNotNegative);
     t.friction = readNumber(*e, "friction", t.friction, kNotNegative);
     out.push_back({readUniqueName(*e, taken), t});

@@ -125,7 +125,7 @@ std::string nearestName(const std::string& name, const std::vector<std::string>&
 std::string hintOfNames(const std::string& name, const std::vector<std::string>& known) {
   if (known.empty()) return {};
   const NearName best = nearest(name, known);
-  const bool alike = 2 * best.edits <= std::max(std::min(name.size(), kLongestName), best.name.size());
+  const bool alike = 2 * best.edits <= std::min(std::max(name.size(), best.name.size()), kLongestName);
   return alike ? "did you mean " + inQuotes(best.name, '"') + "?" : "expected one of " + listed(known);
 }
 
