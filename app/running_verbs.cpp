@@ -113,7 +113,7 @@ RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) 
   readView(a, options.view);
   readPictures(a, options);
   if (options.still) options.quality = Quality::best;
-  options.run.isExcerpt = options.still || options.frames;
+  options.run.isExcerpt = options.still.has_value();
   if (!a.quality.empty()) options.quality = valueNamed<Quality>(a.quality);
   options.context = a.context;
   options.resume = a.resume;
@@ -198,7 +198,8 @@ void addPictureOptions(CLI::App* c, RenderArguments& a) {
       ->check(numberFrom(1, 240))
       ->type_name("HZ");
   CLI::Option* frames =
-      c->add_option("--frames", a.frames, "only pictures A to B-1, counted from 0; the run ends there")
+      c->add_option("--frames", a.frames,
+                    "only pictures A to B-1, counted from 0; the run goes on to its end, for its log and hash")
           ->type_name("A:B");
   c->add_option("--still", a.still, "one picture at time T (s) into FILE.png")
       ->check(numberFrom(0, kEndless, "a time in seconds"))

@@ -183,7 +183,7 @@ int runRender(const RenderOptions& options) {
   const Wanted wanted = wantedOf(options, loaded.scene);
   requireDistinctOutputs(loaded, options.run, options.outputs);
   requireDistinctFiles(options.outputs, {options.cacheToRead});
-  if (options.still || options.frames) loaded.scene.duration = wanted.times.back();  // nothing later is asked for
+  if (options.still) loaded.scene.duration = *options.still;  // nothing later is asked for
   if (options.cacheToRead.empty())
     renderRun(loaded, options, wanted, timings);
   else
