@@ -7,19 +7,16 @@
 #include <cstdio>
 
 #include "app/standard_streams.h"
+#include "render/stage_times.h"
 
 namespace medulla {
-
-static double secondsBetween(std::chrono::steady_clock::time_point a, std::chrono::steady_clock::time_point b) {
-  return std::chrono::duration<double>(b - a).count();
-}
 
 Progress::Progress(std::string what, double total, std::string unit)
     : what_(std::move(what)),
       unit_(std::move(unit)),
       total_(std::max(total, 1e-12)),
       terminal_(isatty(STDERR_FILENO) == 1),
-      start_(std::chrono::steady_clock::now()),
+      start_(wallSeconds()),
       last_(start_) {}
 
 Progress::~Progress() {
@@ -40,10 +37,9 @@ std::string Progress::text(double done, double elapsed) const {
 }
 
 void Progress::update(double done) {
-  const auto now = std::chrono::steady_clock::now();
-  const double elapsed = secondsBetween(start_, now);
+  const double now = wallSeconds(), elapsed = now - start_;
   const double pause = terminal_ ? 0.1 : 5;
-  if (elapsed < (terminal_ ? 0.5 : 2) || (drawn_ && secondsBetween(last_, now) < pause)) return;
+  if (elapsed < (terminal_ ? 0.5 : 2) || (drawn_ && now - last_ < pause)) return;
   last_ = now;
   drawn_ = true;
   if (!terminal_) {

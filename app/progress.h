@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <string>
 
 namespace medulla {
@@ -23,7 +22,7 @@ class Progress {
   double total_;
   bool terminal_;
   bool drawn_ = false;
-  std::chrono::steady_clock::time_point start_, last_;
+  double start_, last_;  // s, wallSeconds()
 };
 
 }  // namespace medulla

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -28,6 +27,7 @@
 #include "physics/model/node_volumes.h"
 #include "physics/model/render_surface.h"
 #include "physics/sort_unique.h"
+#include "render/stage_times.h"
 
 namespace medulla {
 
@@ -269,7 +269,7 @@ void chooseFormulasIfBetter(BuildJob& job, IdentifiedNetwork& network, const Ide
 }
 
 void identifyModel(const BuildOptions& options, BuildJob& job) {
-  const auto start = std::chrono::steady_clock::now();
+  const double start = wallSeconds();
   Progress progress("identify", 100, "%");
   const auto tick = [&](double share) {
     checkInterrupt();
@@ -283,7 +283,7 @@ void identifyModel(const BuildOptions& options, BuildJob& job) {
     if (!network->usesFormulas) shareOutMassByLayer(network->layer, job.settings.surfaceMassFraction, job.model);
     return network;
   });
-  job.report.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  job.report.seconds += wallSeconds() - start;
 }
 
 std::vector<Result> resultsOf(const std::vector<BuildJob>& jobs) {

@@ -1,6 +1,5 @@
 #include "app/files/identified_part.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
 
@@ -26,9 +25,12 @@ void putSkin(std::string& out, const IdentifiedNetwork& network) {
   });
 }
 
-std::string attribute(const char* name, double value) {
+std::string attribute(const char* name, std::initializer_list<double> values) {
   std::string out = std::string(" ") + name + "=\"";
-  appendNumber(out, value);
+  for (const double value : values) {
+    if (out.back() != '"') out += ' ';
+    appendNumber(out, value);
+  }
   return out + '"';
 }
 
@@ -37,10 +39,7 @@ void readFrames(const std::string& path, const XmlElement& element, std::size_t 
   rows.forEach([&] {
     IdentifiedFrame& f = network.frames.emplace_back();
     rows.get(f.restPosition, f.volume, f.secondMoment);
-    rows.require(f.volume > 0, "a volume that is not positive");
-    rows.require(f.secondMoment.isApprox(f.secondMoment.transpose(), kRounding),
-                 "a second moment that is not symmetric");
-    rows.require(f.secondMoment.llt().info() == Eigen::Success, "a second moment that is not positive definite");
+    rows.requireMoments(f.volume, f.secondMoment);
   });
   rows.require(network.frames.size() == spheres, "expected one frame per sphere");
 }
@@ -52,9 +51,7 @@ void readPatches(const std::string& path, const XmlElement& element, std::size_t
     Rows rows(path, *child);
     rows.forEach([&] { patch.nodes.push_back(rows.index(nodes)); });
     rows.require(!patch.nodes.empty(), "expected at least one node");
-    rows.require(
-        std::adjacent_find(patch.nodes.begin(), patch.nodes.end(), std::greater_equal<>()) == patch.nodes.end(),
-        "nodes that are not ascending");
+    rows.requireAscending(patch.nodes, "nodes that are not ascending");
   }
 }
 
@@ -147,20 +144,12 @@ XmlRules identifiedRules() {
 }
 
 void putIdentified(std::string& out, const IdentifiedNetwork& network) {
-  const auto list = [&](const char* name, std::initializer_list<double> values) {
-    out += std::string(" ") + name + "=\"";
-    for (const double value : values) {
-      if (out.back() != '"') out += ' ';
-      appendNumber(out, value);
-    }
-    out += '"';
-  };
-  out += "  <identified" + attribute("poisson", network.poisson) + attribute("length_scale", network.lengthScale) +
-         attribute("voxel", network.voxel) + " formulas=\"" + (network.usesFormulas ? "yes" : "no") + '"';
-  list("layer", {network.layer.normal, network.layer.tangential, network.layer.membrane});
-  list("error_bulk", {network.bulk.maximum, network.bulk.rms});
-  list("error_poke", {network.poke.maximum, network.poke.rms});
-  list("error_finite_elements", {network.ofFiniteElements.maximum, network.ofFiniteElements.rms});
+  out += "  <identified" + attribute("poisson", {network.poisson}) + attribute("length_scale", {network.lengthScale}) +
+         attribute("voxel", {network.voxel}) + " formulas=\"" + (network.usesFormulas ? "yes" : "no") + '"' +
+         attribute("layer", {network.layer.normal, network.layer.tangential, network.layer.membrane}) +
+         attribute("error_bulk", {network.bulk.maximum, network.bulk.rms}) +
+         attribute("error_poke", {network.poke.maximum, network.poke.rms}) +
+         attribute("error_finite_elements", {network.ofFiniteElements.maximum, network.ofFiniteElements.rms});
   out += ">\n";
   putRows(out, "identified_frames", network.frames.size(), [&](std::size_t k) {
     const IdentifiedFrame& f = network.frames[k];

@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cassert>
-#include <functional>
 
 #include "app/files/identified_part.h"
 #include "app/files/model_rows.h"
@@ -122,9 +120,7 @@ void readSpheres(const std::string& path, const XmlElement& root, SoftBodyModel&
     FillingSphere& s = model.spheres.emplace_back();
     rows.get(s.restBallCentre, s.radius, s.restFrame, s.restLinkEnd, s.volume, s.secondMoment);
     rows.require(s.radius > 0, "a radius that is not positive");
-    rows.require(s.volume > 0, "a volume that is not positive");
-    rows.require(s.secondMoment.isApprox(s.secondMoment.transpose(), 1e-9), "a second moment that is not symmetric");
-    rows.require(s.secondMoment.llt().info() == Eigen::Success, "a second moment that is not positive definite");
+    rows.requireMoments(s.volume, s.secondMoment);
   });
   rows.require(!model.spheres.empty(), "expected at least one sphere");
 }
@@ -200,8 +196,8 @@ void readRenderSurface(const std::string& path, const XmlElement& root, std::siz
   vertices.forEach([&] {
     const int begin = s.first.back();
     const int end = begin + vertices.index(s.node.size() - begin + 1, 1);
-    const auto notAscending = std::adjacent_find(s.node.begin() + begin, s.node.begin() + end, std::greater_equal<>());
-    vertices.require(notAscending == s.node.begin() + end, "nodes of a stencil that are not ascending");
+    vertices.requireAscending({s.node.begin() + begin, s.node.begin() + end},
+                              "nodes of a stencil that are not ascending");
     vertices.get(s.offset.emplace_back(), s.restPosition.emplace_back());
     s.first.push_back(end);
   });

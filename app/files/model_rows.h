@@ -1,7 +1,10 @@
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -83,6 +86,17 @@ class Rows {
     for (int& i : out) i = index(size);
     for (std::size_t k = 0; k < N; ++k) require(out[k] != out[(k + 1) % N], "the same index twice");
     return out;
+  }
+
+  // Of a cell: m3, m5 about its centroid.
+  void requireMoments(double volume, const Eigen::Matrix3d& second) const {
+    require(volume > 0, "a volume that is not positive");
+    require(second.isApprox(second.transpose(), 1e-9), "a second moment that is not symmetric");
+    require(second.llt().info() == Eigen::Success, "a second moment that is not positive definite");
+  }
+
+  void requireAscending(std::span<const int> numbers, const char* message) const {
+    require(std::adjacent_find(numbers.begin(), numbers.end(), std::greater_equal<>()) == numbers.end(), message);
   }
 
   void require(bool condition, const char* message) const {
