@@ -143,7 +143,7 @@ void checkRender(const RenderArguments& a) {
     if (isVideoName(output)) usageError("--resume", output, "a folder: videos are made in one go");
 }
 
-// Before any film, since what one run writes may be what another reads. Scenes that cannot be read show as well.
+// Before any film, since what one run writes may be what another reads. Scenes that cannot be loaded show as well.
 void requireDistinctRuns(const std::vector<RenderOptions>& all) {
   std::vector<std::string> outputs, inputs;
   const auto append = [](const std::vector<std::string>& files, std::vector<std::string>& to) {
@@ -152,7 +152,7 @@ void requireDistinctRuns(const std::vector<RenderOptions>& all) {
   for (const RenderOptions& options : all) {
     append(options.outputs, outputs);
     append(outputFiles(options.run), outputs);
-    append(inputFiles(readScene(options.run.scene, options.run.overrides)), inputs);
+    append(inputFiles(loadRun(options.run).scene), inputs);
     for (const auto& [tool, path] : options.run.trajectories) inputs.push_back(path);
     inputs.push_back(options.cacheToRead);
   }
@@ -165,7 +165,11 @@ int runRenders(const RenderArguments& a) {
   for (const std::string& scene : a.scenes) all.push_back(renderOptions(a, scene));
   if (all.size() > 1) requireDistinctRuns(all);
   for (const RenderOptions& options : all) {
-    runRender(options);
+    try {
+      runRender(options);
+    } catch (const NotFinite& e) {
+      throw std::runtime_error((all.size() > 1 ? options.run.scene + ": " : "") + e.what());
+    }
     flushResults();
   }
   return 0;

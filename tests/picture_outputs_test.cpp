@@ -164,6 +164,23 @@ TEST_F(Outputs, SeveralScenesInOneProcessHaveFilesOfTheirOwn) {
   EXPECT_FALSE(fs::exists(folder / "own/second.csv"));
 }
 
+// What cannot be loaded shows before anything is drawn, and what fails as it runs says of which scene.
+TEST_F(Outputs, OfSeveralScenesOneThatFailsIsNamed) {
+  std::string lost = read("own/organ.xml");
+  lost.replace(lost.find("gallbladder.model.xml"), 21, "gone.model.xml");
+  folder.write("own/lost.xml", lost);
+  const std::vector<std::string> all = {"render",      "own/organ.xml", "own/lost.xml", "-o",
+                                        "{scene}.gif", "--size",        "64x48"};
+  expectRefused(run(all), "gone.model.xml");
+  EXPECT_FALSE(fs::exists(folder / "organ.gif"));
+  folder.write("own/lost.xml", read("own/organ.xml"));
+  std::vector<std::string> stiff = all;
+  stiff.insert(stiff.end(), {"--set", "dynamics.substeps=1", "--set", "tissue.t.young=1e7"});
+  const ProgramResult failed = run(stiff);
+  EXPECT_EQ(failed.exitCode, 1);
+  EXPECT_NE(failed.err.find("medulla: own/organ.xml: body 'organ' is not finite at "), std::string::npos) << failed.err;
+}
+
 TEST_F(Outputs, FoldersThatAreMissingAreMade) {
   ASSERT_EQ(render({"--size", "64x48", "--frames", "0:2", "-o", "films/new/{scene}.gif", "-o", "films/b.mp4"}).exitCode,
             0);
