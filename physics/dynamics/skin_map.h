@@ -69,8 +69,11 @@ MEDULLA_INLINE void seeRates(const Identified& s, const SkinHost& host, SkinTerm
   const auto spinOf = [&](int t) {
     return rotateBack(to.rotation, gatherQuads(s.frames.data(), terms[t].frame, &FrameState::angularVelocity));
   };
-  Lanes3 sum = zeroVectors();
-  for (int t = 0; t < turning; ++t) put(fma(terms[t].share, rateOfTurn(states[t], spinOf(t)), sum), sum);
+  Lanes3 sum = zeroVectors(), spins[kMostTurning];
+  for (int t = 0; t < turning; ++t) {
+    put(spinOf(t), spins[t]);
+    put(fma(terms[t].share, rateOfTurn(states[t], spins[t]), sum), sum);
+  }
   Quad mean;
   store(mean, sumOfLanes(to.inverseLength * sum));
   const Lanes3 omega = splat(mean);
@@ -80,7 +83,7 @@ MEDULLA_INLINE void seeRates(const Identified& s, const SkinHost& host, SkinTerm
     SkinTermState& at = states[t];
     const Lanes3 velocity = gatherQuads(s.frames.data(), terms[t].frame, &FrameState::velocity) - to.velocity;
     const Lanes3 wayRate = rotateBack(to.rotation, velocity) - cross(omega, at.place);
-    put(rateOfTurn(at, spinOf(t) - omega), at.turnRate);
+    put(rateOfTurn(at, (t < turning ? spins[t] : spinOf(t)) - omega), at.turnRate);
     const Lanes3 beyond = dot(wayRate, at.spareRow) * terms[t].axis;
     put(beyond, at.spareRate);
     put(wayRate - beyond, at.wayRate);
