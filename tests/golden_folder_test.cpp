@@ -107,6 +107,15 @@ TEST_F(GoldenFolder, AnImageThatNoMomentNamesFailsUntilAnUpdateRemovesIt) {
   EXPECT_EQ(golden({}).exitCode, 0);
 }
 
+TEST_F(GoldenFolder, AnUpdateOfASceneThatNamesNoMomentAnyMoreRemovesItsImages) {
+  folder.write("own/organ.xml", replaced(read("own/organ.xml"), " golden=\"0.32 0.4\"", ""));
+  const ProgramResult r = golden({"own/organ.xml", "--update", "organ"});
+  EXPECT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "pictures/organ_8.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "pictures/other_1.png"));
+  expectRefused(golden({"own/organ.xml", "--update", "organ"}), "own/organ.xml: names no golden moments");
+}
+
 TEST_F(GoldenFolder, ImagesOfAnotherSceneOfTheNameAreKeptUntilThatHasGone) {
   const std::string scene = read("own/organ.xml"), before = read("pictures/organ_8.png");
   std::filesystem::create_directory(folder / "moved");

@@ -58,9 +58,11 @@ std::string processorName() {
   return "unknown processor";
 }
 
+std::runtime_error withoutMoments(const std::string& path) {
+  return std::runtime_error(path + ": names no golden moments: expected <output golden=\"...\"/>");
+}
+
 std::vector<Moment> momentsOf(const Scene& scene) {
-  if (scene.goldenTimes.empty())
-    throw std::runtime_error(scene.path + ": names no golden moments: expected <output golden=\"...\"/>");
   std::vector<Moment> moments;
   for (const double time : scene.goldenTimes) {
     Moment moment;
@@ -80,6 +82,7 @@ std::vector<Moment> renderMoments(const std::string& path, const std::string& co
   const LoadedScene loaded = loadRun(run);
   const Scene& scene = loaded.scene;
   std::vector<Moment> moments = momentsOf(scene);
+  if (moments.empty()) throw withoutMoments(path);
   Simulation simulation(loaded);
   Renderer renderer(rendererSettings(scene.width, scene.height, context, Quality::standard));
   const SceneView view(loaded, simulation.current(), renderer);
@@ -180,7 +183,8 @@ Update updateOf(const std::string& path, const GoldenOptions& options, const std
   const std::string scene = fs::proximate(fs::absolute(path), fs::absolute(update.folder)).string();
   const bool whole = std::any_of(options.update.begin(), options.update.end(),
                                  [&](const std::string& name) { return namesScene(name, path); });
-  const std::vector<Moment> moments = renderMoments(path, options.context);
+  const bool none = momentsOf(readScene(path)).empty();  // any more: what is stored goes
+  const std::vector<Moment> moments = none ? std::vector<Moment>{} : renderMoments(path, options.context);
   for (const Moment& m : moments) {
     if (!whole && std::find(options.update.begin(), options.update.end(), m.name) == options.update.end()) continue;
     const std::vector<std::uint8_t> bytes = encodePng(
@@ -192,6 +196,7 @@ Update updateOf(const std::string& path, const GoldenOptions& options, const std
   if (!whole) return update;
   for (const StrayImage& image : formerMoments(path, update.folder, namesOf(moments)))
     if (image.fault.empty()) update.removed.push_back(image.path);
+  if (none && update.removed.empty()) throw withoutMoments(path);
   return update;
 }
 
