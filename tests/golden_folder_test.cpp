@@ -107,6 +107,15 @@ TEST_F(GoldenFolder, AnImageThatNoMomentNamesFailsUntilAnUpdateRemovesIt) {
   EXPECT_EQ(golden({}).exitCode, 0);
 }
 
+TEST_F(GoldenFolder, NothingIsStoredWhereOneImageCannotBe) {
+  write({.cameraTarget = -0.03});
+  const std::string before = read("pictures/organ_8.png");
+  std::filesystem::remove(folder / "pictures/organ_10.png");
+  std::filesystem::create_directory(folder / "pictures/organ_10.png");
+  expectRefused(golden({"own/organ.xml", "--update", "organ"}), "organ_10.png: is a folder");
+  EXPECT_TRUE(read("pictures/organ_8.png") == before);
+}
+
 TEST_F(GoldenFolder, AnUpdateOfASceneThatNamesNoMomentAnyMoreRemovesItsImages) {
   folder.write("own/organ.xml", replaced(read("own/organ.xml"), " golden=\"0.32 0.4\"", ""));
   const ProgramResult r = golden({"own/organ.xml", "--update", "organ"});

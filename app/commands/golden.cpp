@@ -228,6 +228,9 @@ int updateImages(const std::vector<std::string>& scenes, const GoldenOptions& op
     const std::vector<std::string> known = namesOf(momentsOf(readScene(*scene)));
     if (!namesScene(name, *scene) && std::find(known.begin(), known.end(), name) == known.end())
       throw std::runtime_error(fmt::format("--update {}: {} has no such moment", name, *scene));
+    const std::string folder = goldenFolderOf(*scene, options);
+    for (const std::string& moment : known)
+      if (fs::is_directory(folder)) requireWritable({fmt::format("{}/{}.png", folder, moment)});
     chosen.insert(*scene);
   }
   const std::string renderedWith = drawnWith(options);
