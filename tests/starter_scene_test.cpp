@@ -16,6 +16,13 @@ namespace medulla {
 
 static const std::string kMesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj";
 
+static std::string objText(const TriangleMesh& mesh) {
+  std::string obj;
+  for (const Eigen::Vector3d& x : mesh.vertices) obj += fmt::format("v {} {} {}\n", x.x(), x.y(), x.z());
+  for (const auto& [a, b, c] : mesh.triangles) obj += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
+  return obj;
+}
+
 static ProgramResult makeStarter(const TemporaryFolder& folder, const std::string& mesh = kMesh) {
   return runProgram({"new", mesh, "-o", folder / "mine", "--spheres", "5"});
 }
@@ -120,11 +127,7 @@ TEST(StarterScene, ABoxOfTwelveTrianglesIsTouchedOnAFace) {
 // A tool made for a tube's length would close far behind it.
 TEST(StarterScene, TheToolIsNoThickerThanAThinBody) {
   const TemporaryFolder folder;
-  const TriangleMesh mesh = cylinderMesh(1, 0.005, 12, 200);
-  std::string obj;
-  for (const Eigen::Vector3d& x : mesh.vertices) obj += fmt::format("v {} {} {}\n", x.x(), x.y(), x.z());
-  for (const auto& [a, b, c] : mesh.triangles) obj += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
-  folder.write("tube.obj", obj);
+  folder.write("tube.obj", objText(cylinderMesh(1, 0.005, 12, 200)));
   ASSERT_EQ(runProgram({"new", folder / "tube.obj", "-o", folder / "mine"}).exitCode, 0);
   const Scene scene = readScene(folder / "mine/tube.xml");
   EXPECT_LT(scene.tools[0].settings.radius, 0.005);
@@ -134,19 +137,29 @@ TEST(StarterScene, TheToolIsNoThickerThanAThinBody) {
 // From its end a long body hides behind the tool.
 TEST(StarterScene, ABodyIsSeenAcrossItsLongestSide) {
   const TemporaryFolder folder;
-  const TriangleMesh mesh = cylinderMesh(0.2, 0.02, 12, 20);  // along x
   for (const int axis : {0, 2}) {
-    std::string obj;
-    for (const Eigen::Vector3d& x : mesh.vertices)
-      obj += axis == 0 ? fmt::format("v {} {} {}\n", x.x(), x.y(), x.z())
-                       : fmt::format("v {} {} {}\n", x.y(), x.z(), x.x());
-    for (const auto& [a, b, c] : mesh.triangles) obj += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
+    TriangleMesh mesh = cylinderMesh(0.2, 0.02, 12, 20);  // along x
+    if (axis == 2)
+      for (Eigen::Vector3d& x : mesh.vertices) x = {x.y(), x.z(), x.x()};
     const std::string name = fmt::format("bar{}", axis);
-    folder.write(name + ".obj", obj);
+    folder.write(name + ".obj", objText(mesh));
     ASSERT_EQ(runProgram({"new", folder / (name + ".obj"), "-o", folder / name}).exitCode, 0);
     const Scene scene = readScene(folder / fmt::format("{0}/{0}.xml", name));
     const Eigen::Vector3d view = scene.camera[0].position - scene.camera[0].target;
     EXPECT_GT(view[axis == 0 ? 2 : 0], 0.99 * view.norm());
+  }
+}
+
+TEST(StarterScene, ThinSheetsRunInImplicitSteps) {
+  const TemporaryFolder folder;
+  for (const double thickness : {0.02, 0.0008}) {
+    const std::string name = thickness < 0.01 ? "sheet" : "lens";
+    folder.write(name + ".obj", objText(ellipsoidMesh(4, {0.05, 0.035, thickness})));
+    const ProgramResult made = runProgram({"new", folder / (name + ".obj"), "-o", folder / name, "--spheres", "14"});
+    ASSERT_EQ(made.exitCode, 0) << made.err;
+    const std::string scene = folder / fmt::format("{0}/{0}.xml", name);
+    EXPECT_EQ(readFile(scene).find("integrator=\"implicit\"") != std::string::npos, thickness < 0.01) << name;
+    EXPECT_EQ(complaints(runProgram({"check", scene})), std::vector<std::string>{}) << name;
   }
 }
 
