@@ -62,7 +62,8 @@ std::vector<std::string> fieldsOf(const CacheLayout& layout) {
   const ToolSample input;
   const ToolState state;
   for (const std::string& tool : layout.tools)
-    visitToolNumbers(input, state, [&](const std::string& what, double) { out.push_back(tool + "." + what); });
+    visitToolNumbers(input, state,
+                     [&](const std::string& what, double) { out.push_back(fmt::format("{}.{}", tool, what)); });
   return out;
 }
 
