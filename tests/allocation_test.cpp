@@ -10,8 +10,12 @@
 #include "tests/synthetic_model.h"
 #include "tests/tool_run.h"
 
-// Counts what this program asks of operator new; sanitizers bring their own.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+// Counts what this program asks of operator new; sanitizers bring their own, which g++ and clang tell each their way.
+#if !defined(__has_feature)
+#define __has_feature(x) 0
+#endif
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || __has_feature(address_sanitizer) || \
+    __has_feature(thread_sanitizer)
 #define MEDULLA_COUNTS_ALLOCATIONS 0
 #else
 #define MEDULLA_COUNTS_ALLOCATIONS 1

@@ -17,7 +17,7 @@ TEST(Text, WordsThatResembleNothingAreToldWhatThereIs) {
   EXPECT_EQ(hintOfNames("Mm", units), "did you mean \"mm\"?");
   EXPECT_EQ(hintOfNames("colour", {"name", "look"}), "expected one of name, look");
   EXPECT_EQ(hintOfNames("colour", {}), "");
-  EXPECT_EQ(hintOfNames("unit", {std::string(100'000'000, 'x')}).size(),
+  EXPECT_EQ(hintOfNames("unit", {std::string(8'000'000, 'x')}).size(),
             hintOfNames("unit", {std::string(99, 'x')}).size());
   EXPECT_EQ(hintOfNames("q", std::vector<std::string>(31, "a\nb")).substr(0, 22), "expected one of a b, a");
   EXPECT_TRUE(hintOfNames("q", std::vector<std::string>(31, "a\nb")).ends_with("a b, ..."));
