@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
 
 #include "app/files/chart_labels.h"
 #include "app/files/chart_style.h"
