@@ -97,11 +97,19 @@ TEST(OutputFile, WritesThroughALink) {
   EXPECT_EQ(readTextFile(folder / "elsewhere/real.csv"), "new");
 }
 
+TEST(OutputFile, MakesMissingFoldersAndLeavesNoneEmpty) {
+  const TemporaryFolder folder;
+  { const OutputFile dropped(folder / "a/b/run.csv"); }
+  requireWritable({folder / "a/b/run.csv"});
+  EXPECT_TRUE(folder.contents().empty());
+  writeTextFile(folder / "a/b/run.csv", "text");
+  EXPECT_EQ(readTextFile(folder / "a/b/run.csv"), "text");
+}
+
 TEST(OutputFile, TargetsThatCannotBeWrittenAreRefusedAtOnce) {
   const TemporaryFolder folder;
   folder.write("file", "earlier");
-  EXPECT_EQ(complaint(folder / "none/a.csv"), folder / "none/a.csv: cannot be written: No such file or directory");
-  EXPECT_EQ(complaint(folder / "file/a.csv"), folder / "file/a.csv: cannot be written: Not a directory");
+  EXPECT_EQ(complaint(folder / "file/a.csv"), folder / "file: cannot be made: Not a directory");
   EXPECT_EQ(complaint(folder.path()), folder.path() + ": is a folder, expected the name of a file to write");
   EXPECT_EQ(complaint(folder / "new/"), folder / "new/: expected the name of a file to write");
   EXPECT_EQ(complaint(""), ": expected the name of a file to write");

@@ -40,8 +40,13 @@ static const std::string& namedFile(const std::string& path) {
   return path;
 }
 
+static std::string folderOf(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
 OutputFile::OutputFile(const std::string& path)
-    : path_(namedFile(path)), file_(path), descriptor_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
+    : path_(namedFile(path)), made_(folderOf(path)), file_(path), descriptor_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
   if (descriptor_ < 0) throw unwritable(path_);
 }
 
