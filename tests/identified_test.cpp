@@ -101,6 +101,44 @@ TEST(IdentifiedLink, BentWithoutAxialForceItFeelsNone) {
   EXPECT_NEAR(twice / once, 16, 1);
 }
 
+// Cells of 10 mm edge, `slender` of them in a chain, 10 mm apart, behind a clique of five. That is no row of cells.
+IdentifiedNetwork chainBehindClique(int slender) {
+  IdentifiedNetwork n;
+  n.frames.resize(5 + slender);
+  for (std::size_t i = 0; i < n.frames.size(); ++i) {
+    IdentifiedFrame& cell = n.frames[i];
+    cell.volume = 1e-6;
+    cell.secondMoment = 1e-4 / 12 * cell.volume * Eigen::Matrix3d::Identity();
+    cell.restPosition = 0.01 * (i < 5 ? Vector3d(0, int(i) % 2, int(i) / 2) : Vector3d(double(i) - 4, 0, 0));
+  }
+  const auto link = [&n](int a, int b) {
+    IdentifiedLink l;
+    l.frame0 = a, l.frame1 = b;
+    l.restPoint0 = n.frames[a].restPosition, l.restPoint1 = n.frames[b].restPosition;
+    n.links.push_back(l);
+  };
+  for (int a = 0; a < 5; ++a)
+    for (int b = 0; b < a; ++b) link(b, a);
+  for (int k = 0; k < slender; ++k) link(k == 0 ? 0 : 4 + k, 5 + k);
+  return n;
+}
+
+TEST(IdentifiedLink, OfABarIsWhatTheNetworkHangsOn) {
+  EXPECT_EQ(barsAmong(chainBehindClique(0)), std::vector<bool>(10, false));
+  EXPECT_EQ(barsAmong(chainBehindClique(1)), std::vector<bool>(11, false)) << "no longer than thick";
+  std::vector<bool> expected(10, false);
+  expected.resize(13, true);
+  EXPECT_EQ(barsAmong(chainBehindClique(3)), expected);
+  // Held at both ends, it leads from what is held to what is held: no link of it is the only way.
+  IdentifiedNetwork arch = chainBehindClique(3);
+  for (const int end : {1, 7}) {
+    arch.links.push_back(arch.links.back());
+    arch.links.back().frame0 = end;
+    arch.links.back().frame1 = 8;
+  }
+  EXPECT_EQ(barsAmong(arch), std::vector<bool>(15, false));
+}
+
 // Wound by more than 232 degrees a link would end a whole turn away from rest: the spheres behind it change their sign,
 // which moves nothing. Below that they keep it: half a turn is no seam.
 TEST(IdentifiedLink, TurnedTooFarLetsGoOfAWholeTurn) {

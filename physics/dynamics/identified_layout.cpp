@@ -83,6 +83,7 @@ double stretchedLength(const SoftBodyModel& m, const IdentifiedLink& link, const
 void addLinks(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbers& frames) {
   const IdentifiedNetwork& n = *d.bodies[body].model->identified;
   std::vector<IdentifiedLinkGroup>& groups = d.identified.links;
+  const std::vector<bool> bars = barsAmong(n);
   for (std::size_t k = 0; k < n.links.size(); ++k) {
     const IdentifiedLink& link = n.links[k];
     const int l = static_cast<int>(k % 4);
@@ -98,7 +99,7 @@ void addLinks(WorldData& d, int body, const BodyMechanics& mechanics, FrameNumbe
     g.inverseRestLength[l] = 1 / g.restLength[l];
     g.lengthScale[l] = n.lengthScale;
     g.relaxation[l] = mechanics.linkRelaxation;
-    const LinkBending bending = linkBending(n, link);
+    const LinkBending bending = bars[k] ? linkBending(n, link) : LinkBending();
     g.softening[l] = bending.softening;
     g.lengthening[l] = bending.lengthening;
     g.bound[l] = bending.bound;

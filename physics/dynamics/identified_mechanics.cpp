@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "physics/model/cross_matrix.h"
+#include "physics/model/disjoint_sets.h"
 #include "physics/model/row_of_cells.h"
 #include "physics/sort_unique.h"
 
@@ -104,23 +105,69 @@ std::vector<LinkStrains> identifiedStrains(const BodyDescription& body) {
   return out;
 }
 
-LinkBending linkBending(const IdentifiedNetwork& network, const IdentifiedLink& link) {
-  if (!isRowOfCells(network.links, network.frames.size())) return {};
-  const Vector3d line = link.restPoint1 - link.restPoint0, along = link.axes.row(0);
-  double alongLine = 0, across = 0;  // m2: of the cells along the line in sum, across it in the mean
-  int cells = 0;
+// m2: second moments over the volume of the cells that a link joins, along it in sum and across where they are thinnest
+// in the mean. What is held has none.
+struct LinkedCells {
+  int count = 0;
+  double along = 0, thinnest = 0;
+};
+static LinkedCells cellsOf(const IdentifiedNetwork& network, const IdentifiedLink& link) {
+  LinkedCells out;
+  double thinnest = 0;
   for (const int frame : {link.frame0, link.frame1}) {
-    if (frame >= static_cast<int>(network.frames.size())) continue;
+    if (frame >= static_cast<int>(network.frames.size()) || !(network.frames[frame].volume > 0)) continue;
     const IdentifiedFrame& cell = network.frames[frame];
-    if (!(cell.volume > 0)) continue;
-    const double own = along.dot(cell.secondMoment * along) / cell.volume;
-    alongLine += own;
-    across += 0.5 * (cell.secondMoment.trace() / cell.volume - own);
-    ++cells;
+    const Eigen::Matrix3d moments = link.axes * cell.secondMoment * link.axes.transpose() / cell.volume;
+    const Eigen::Matrix2d section = moments.bottomRightCorner<2, 2>();
+    const double mean = 0.5 * section.trace();
+    thinnest += mean - std::sqrt(std::max(0.0, mean * mean - section.determinant()));
+    out.along += moments(0, 0);
+    ++out.count;
   }
-  if (cells == 0) return {};
-  const double length = line.norm(), nu = network.poisson, square = 4 * across / cells / (length * length);
-  return {0.5 * (0.395 - 0.433 * nu) * square, 0.25 * ((1 + nu) * square * length - alongLine / length), 2 * square};
+  if (out.count > 0) out.thinnest = thinnest / out.count;
+  return out;
+}
+
+static double lengthOf(const IdentifiedLink& link) {
+  return (link.restPoint1 - link.restPoint0).norm();
+}
+
+std::vector<bool> barsAmong(const IdentifiedNetwork& network) {
+  constexpr double kSlender = 2;  // as long as so many times its thickness
+  const std::vector<IdentifiedLink>& links = network.links;
+  const int cells = static_cast<int>(network.frames.size());
+  std::vector<bool> out(links.size(), isRowOfCells(links, network.frames.size()));
+  if (links.empty() || out[0]) return out;
+  const auto join = [&](const IdentifiedLink& link, DisjointSets& sets) {
+    return sets.join(link.frame0, std::min(link.frame1, cells));  // all patches as one: none moves
+  };
+  DisjointSets pieces(network.frames.size() + 1);
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    DisjointSets others(network.frames.size() + 1);
+    for (const IdentifiedLink& link : links)
+      if (&link != &links[k]) join(link, others);
+    out[k] = join(links[k], others);
+    if (out[k]) join(links[k], pieces);
+  }
+  std::vector<double> length(network.frames.size() + 1, 0), thickness = length;  // m, m times m; by piece
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    if (!out[k]) continue;
+    const int piece = pieces.of(links[k].frame0);
+    length[piece] += lengthOf(links[k]);
+    thickness[piece] += lengthOf(links[k]) * std::sqrt(12 * cellsOf(network, links[k]).thinnest);
+  }
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    const int piece = pieces.of(links[k].frame0);
+    out[k] = out[k] && length[piece] * length[piece] > kSlender * thickness[piece];
+  }
+  return out;
+}
+
+LinkBending linkBending(const IdentifiedNetwork& network, const IdentifiedLink& link) {
+  const LinkedCells cells = cellsOf(network, link);
+  if (cells.count == 0) return {};
+  const double length = lengthOf(link), nu = network.poisson, square = 4 * cells.thinnest / (length * length);
+  return {0.5 * (0.395 - 0.433 * nu) * square, 0.25 * ((1 + nu) * square * length - cells.along / length), 2 * square};
 }
 
 std::vector<std::vector<SkinFrame>> heldSkin(const SoftBodyModel& model) {

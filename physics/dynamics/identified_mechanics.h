@@ -27,12 +27,17 @@ std::vector<LinkStrains> identifiedStrains(const BodyDescription& body);
 // - a frame is the mean of its cell, which lies off the middle line by k s^2 / 2 with s^2 the cell's second moment
 //   along the line over its volume. Along the mean direction that brings two frames nearer by
 //   (s0^2 + s1^2) phi^2 / 4 l, of an arc that is as long as before. What is held is a point: s = 0.
-// Where cells lie side by side none is a bar of its own, and all are 0: with these a liver of 20 bent 2.0 / 0.5 % off
-// instead of 1.2 / 0.3. `bound` keeps to where these series hold: beyond (2 k r)^2 of a half they level off.
+// A flat section's r is that of its thin side. `bound` keeps to where these series hold: beyond (2 k r)^2 of a half
+// they level off.
 struct LinkBending {
   double softening = 0, lengthening = 0, bound = 0;  // 1/rad2, m/rad2, 1/rad2
 };
 LinkBending linkBending(const IdentifiedNetwork& network, const IdentifiedLink& link);
+// Per link, whether it is of a bar, which knows large bending: all where cells lie in a row; else those without which
+// the network would fall in two, if what hangs together of them is longer than twice its thickness. Where cells lie
+// side by side no link is a bar of its own: with these terms in all of them a liver of 20 bent 2.0 / 0.5 % off instead
+// of 1.2 / 0.3.
+std::vector<bool> barsAmong(const IdentifiedNetwork& network);
 
 // Nodes of patches hang on the patch alone: they do not move at all.
 std::vector<std::vector<SkinFrame>> heldSkin(const SoftBodyModel& model);
