@@ -149,6 +149,11 @@ TEST_P(StaticAccuracy, SurfaceLiesWhereFiniteElementsPutIt) {
   RecordProperty("volume", std::to_string(error.volume));
 }
 
+std::string nameOf(const testing::TestParamInfo<StaticCase>& tested) {
+  const StaticCase& c = tested.param;
+  return c.spheres == 25 ? c.name + std::string("_of_25") : std::string(c.name);
+}
+
 INSTANTIATE_TEST_SUITE_P(
     All, StaticAccuracy,
     testing::Values(
@@ -165,10 +170,7 @@ INSTANTIATE_TEST_SUITE_P(
         StaticCase{"liver_axial", 35, 31.6, 17.7, 1.3}, StaticCase{"liver_torsion", 35, 27, 8.6, 0.1},
         StaticCase{"liver_poke_small", 35, 30.7, 4.7, 0.4}, StaticCase{"liver_poke_large", 35, 34.7, 7.4, 1},
         StaticCase{"gallbladder_doubled_tip_large", 7, 2.5, 1.2, 0.1}),
-    [](const auto& tested) {
-      const StaticCase& c = tested.param;
-      return c.spheres == 25 ? c.name + std::string("_of_25") : std::string(c.name);
-    });
+    nameOf);
 
 #define KIDNEY_ROOT "vertices=" MEDULLA_SOURCE_DIR "/tests/accuracy/results/kidney_root.fix.csv"
 #define STRETCHED_ROOT "vertices=" MEDULLA_SOURCE_DIR "/tests/accuracy/results/liver_stretched_root.fix.csv"
@@ -181,36 +183,37 @@ INSTANTIATE_TEST_SUITE_P(
 INSTANTIATE_TEST_SUITE_P(Identified, StaticAccuracy,
                          testing::Values(StaticCase{"cylinder_tip", 7, 0.16, 0.09, 0.1, CYLINDER_ROOT},
                                          StaticCase{"cylinder_tip_large", 7, 0.2, 0.1, 0.05, CYLINDER_ROOT},
+                                         StaticCase{"cylinder_tip_large", 25, 0.28, 0.18, 0.05, CYLINDER_ROOT},
                                          StaticCase{"cylinder_mid", 7, 0.38, 0.17, 0.05, CYLINDER_ROOT},
                                          StaticCase{"cylinder_torsion", 7, 1.3, 0.56, 0.05, CYLINDER_ROOT},
                                          StaticCase{"cylinder_axial", 7, 2.2, 1.1, 0.15, CYLINDER_ROOT},
                                          StaticCase{"cylinder_poke_small", 25, 20, 3.3, 0.15, CYLINDER_BED},
                                          StaticCase{"cylinder_poke_large", 25, 19.5, 4.4, 0.3, CYLINDER_BED},
                                          StaticCase{"gallbladder_tip", 7, 0.6, 0.26, 0.1, PEAR_ROOT},
-                                         StaticCase{"gallbladder_tip_large", 7, 0.83, 0.26, 0.08, PEAR_ROOT},
-                                         StaticCase{"gallbladder_mid", 7, 0.92, 0.34, 0.09, PEAR_ROOT},
+                                         StaticCase{"gallbladder_tip_large", 7, 0.76, 0.24, 0.08, PEAR_ROOT},
+                                         StaticCase{"gallbladder_mid", 7, 0.86, 0.3, 0.09, PEAR_ROOT},
                                          StaticCase{"gallbladder_torsion", 7, 6.7, 2.15, 0.05, PEAR_ROOT},
                                          StaticCase{"gallbladder_twist", 7, 1.65, 0.73, 0.08, PEAR_ROOT},
                                          StaticCase{"gallbladder_axial", 7, 10, 2.4, 0.25, PEAR_ROOT},
                                          StaticCase{"gallbladder_poke_small", 25, 29.5, 5.7, 0.15, PEAR_BED},
                                          StaticCase{"gallbladder_poke_large", 25, 18, 5.6, 0.35, PEAR_BED}),
-                         [](const auto& tested) { return std::string(tested.param.name); });
+                         nameOf);
 
 // Meshes that the program's own shapes do not come in: the same organs stretched and remeshed, and a kidney; an arch
 // with narrow ends; a cube under loads of half of Young's modulus and more.
 INSTANTIATE_TEST_SUITE_P(OfOtherMeshes, StaticAccuracy,
                          testing::Values(StaticCase{"liver_stretched_tip", 20, 1.3, 0.35, 0.1, STRETCHED_ROOT},
                                          StaticCase{"liver_stretched_axial", 20, 3.5, 0.85, 0.1, STRETCHED_ROOT},
-                                         StaticCase{"gallbladder_halved_tip_large", 7, 2, 1.1, 0.08, PEAR_ROOT},
+                                         StaticCase{"gallbladder_halved_tip_large", 7, 1.85, 1, 0.08, PEAR_ROOT},
                                          StaticCase{"gallbladder_halved_pull", 7, 5.4, 1.6, 0.1, PEAR_ROOT},
-                                         StaticCase{"gallbladder_doubled_tip_large", 7, 0.85, 0.26, 0.08, PEAR_ROOT},
+                                         StaticCase{"gallbladder_doubled_tip_large", 7, 0.8, 0.25, 0.08, PEAR_ROOT},
                                          StaticCase{"gallbladder_doubled_pull", 7, 1.7, 0.75, 0.1, PEAR_ROOT},
                                          StaticCase{"kidney_tip", 20, 3.4, 1.5, 0.1, KIDNEY_ROOT},
                                          StaticCase{"stomach_pull", 25, 2.28, 1.18, 0.1, STOMACH_ROOT},
                                          StaticCase{"cube_pull", 9, 15.7, 5.6, 0.7, CUBE_ROOT},
                                          StaticCase{"cube_pull_far", 9, 33, 6.2, 4.9, CUBE_ROOT},
                                          StaticCase{"cube_shear", 9, 10.9, 5.3, 1.2, CUBE_ROOT}),
-                         [](const auto& tested) { return std::string(tested.param.name); });
+                         nameOf);
 
 // Bending in both planes, torsion, second bending in both planes; then stretch. The surface swings along.
 TEST(DynamicAccuracy, TheCylindersModesAreThoseOfFiniteElements) {

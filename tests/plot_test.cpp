@@ -86,7 +86,7 @@ TEST(Plot, WritesPngAndSvgOfWhatALogHolds) {
   EXPECT_TRUE(readFile(folder / "force.png").starts_with("\x89PNG"));
   ASSERT_EQ(plot(folder / "one.csv", folder / "one.svg").exitCode, 0);
   EXPECT_TRUE(has(readFile(folder / "one.svg"), "hook: force on the hand, N"));
-  EXPECT_EQ(plot(folder / "run.csv", folder / "none/a.png").exitCode, 1);
+  EXPECT_EQ(plot(folder / "run.csv", folder / "run.csv/a.png").exitCode, 1);
 }
 
 // gnuplot runs what stands between backticks, unless it is told not to.

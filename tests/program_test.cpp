@@ -352,10 +352,10 @@ TEST(ProgramRefuses, OutputsThatCannotBeWritten) {
   folder.write("file", "x");
   expectRefusal(runProgram(command({"render", kScene, "-o", folder / "file/video.mp4"})), 1, {"file"});
   expectRefusal(runProgram(command({"render", kScene, "-o", folder / "file/frames"})), 1, {"file/frames"});
-  expectRefusal(runProgram(command({"replay", kScene, "--log", folder / "none/log.csv"})), 1, {"none/log.csv"});
-  expectRefusal(runProgram(command({"replay", kScene, "--record", folder / "none/r.csv"})), 1, {"none/r.csv"});
+  expectRefusal(runProgram(command({"replay", kScene, "--log", folder / "file/log.csv"})), 1, {"file"});
+  expectRefusal(runProgram(command({"replay", kScene, "--record", folder / "file/r.csv"})), 1, {"file"});
   const std::string mesh = std::string(MEDULLA_SOURCE_DIR) + "/assets/gallbladder/gallbladder.obj";
-  expectRefusal(runProgram({"build", mesh, "-o", folder / "none/m.xml"}), 1, {"none/m.xml"});
+  expectRefusal(runProgram({"build", mesh, "-o", folder / "file/m.xml"}), 1, {"file"});
   EXPECT_EQ(folder.contents(), std::vector<std::string>{"file"});
 }
 
