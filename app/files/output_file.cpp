@@ -46,7 +46,10 @@ static std::string folderOf(const std::string& path) {
 }
 
 OutputFile::OutputFile(const std::string& path)
-    : path_(namedFile(path)), made_(folderOf(path)), file_(path), descriptor_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
+    : path_(namedFile(path)),
+      made_(folderOf(path)),
+      file_(path),
+      descriptor_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
   if (descriptor_ < 0) throw unwritable(path_);
 }
 
