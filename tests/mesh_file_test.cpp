@@ -183,6 +183,21 @@ TEST(MeshFile, UnitsScaleToMetres) {
   EXPECT_EQ(mesh.vertices[1], Vector3d(0.001, 0, 0));
 }
 
+// Debian's assimp ends the program where an assertion of its own fails, and crashes on an empty LightWave scene.
+TEST(MeshFile, WhatAssimpWouldEndTheProgramForIsRefused) {
+  const TemporaryFolder folder;
+  std::string path = written(
+      folder, "short.gltf",
+      R"({"asset":{"version":"1.0"},"buffers":{"b":{"type":"arraybuffer","uri":"data:application/octet-stream;base64,AAAA"}},)"
+      R"("bufferViews":{"v":{"buffer":"b","byteOffset":0,"byteLength":3}},)"
+      R"("accessors":{"a":{"bufferView":"v","byteOffset":0,"componentType":5126,"count":3,"type":"VEC3"}},)"
+      R"("meshes":{"m":{"primitives":[{"attributes":{"POSITION":"a"}}]}},"nodes":{"n":{"meshes":["m"]}},)"
+      R"("scenes":{"s":{"nodes":["n"]}},"scene":"s"})");
+  EXPECT_TRUE(complaintOf([&] { readMesh(path); }).starts_with(path + ": not a readable mesh: assimp expected "));
+  path = written(folder, "empty.lws", "  ");
+  EXPECT_TRUE(complaintOf([&] { readMesh(path); }).starts_with(path + ": unknown mesh format '.lws'"));
+}
+
 TEST(MeshFile, PathsThatHoldNoMeshAreRefusedInOneLine) {
   const TemporaryFolder folder;
   const auto read = [](const std::string& path) { return complaintOf([&] { readMesh(path); }); };

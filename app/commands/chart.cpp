@@ -213,10 +213,12 @@ Outcome execute(const ChartRun& run, const std::function<void(double)>& progress
   out.point.step = run.step;
   out.moments = framesToRecord(loaded);
   std::optional<Simulation> simulation;
-  double start = processCpuSeconds(), simulated = 1 / loaded.scene.dynamicsRate;  // at least a frame is tried
+  const double start = processCpuSeconds();
+  std::optional<double> settled;                     // when bodies had
+  double simulated = 1 / loaded.scene.dynamicsRate;  // at least a frame is tried
   try {
     simulation.emplace(loaded);  // bodies settle
-    start = processCpuSeconds();
+    settled = processCpuSeconds();
     while (!simulation->finished()) {
       checkInterrupt();
       simulated = simulation->time() + 1 / loaded.scene.dynamicsRate;
@@ -228,7 +230,7 @@ Outcome execute(const ChartRun& run, const std::function<void(double)>& progress
   } catch (const NotFinite&) {
     out.point.failedAt = simulation ? simulated : 0;
   }
-  out.point.cpu = (processCpuSeconds() - start) / simulated;
+  out.point.cpu = (processCpuSeconds() - settled.value_or(start)) / simulated;
   return out;
 }
 

@@ -8,8 +8,17 @@
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <exception>
+#include <stdexcept>
 
 #include "app/files/input_error.h"
+
+// In place of assimp's own, which ends the program: Debian builds it with assertions, and a damaged file breaks them.
+namespace Assimp {
+void aiAssertViolation(const char* expression, const char* file, int line);
+void aiAssertViolation(const char* expression, const char*, int) {
+  throw std::runtime_error(std::string("assimp expected ") + expression);
+}
+}  // namespace Assimp
 
 namespace medulla {
 
@@ -44,7 +53,9 @@ const aiScene* import(Assimp::Importer& importer, const std::string& path) {
 }  // namespace
 
 bool assimpReads(const std::string& extension) {
-  return !extension.empty() && Assimp::Importer().IsExtensionSupported(extension);
+  // LightWave's scenes and motions name meshes and are none: assimp 5.2 crashes on an empty one.
+  if (extension.empty() || extension == ".lws" || extension == ".mot") return false;
+  return Assimp::Importer().IsExtensionSupported(extension);
 }
 
 TriangleMesh readWithAssimp(const std::string& path) {

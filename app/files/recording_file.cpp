@@ -220,6 +220,7 @@ std::vector<ToolSample> smoothed(const std::vector<ToolSample>& samples, double 
       position += weight * samples[j].position;
       turn += (q.dot(samples[k].worldFromTool.coeffs()) < 0 ? -weight : weight) * q;
     }
+    if (!(sum > 0)) continue;  // a window of less than the time's rounding
     out[k].position = position / sum;
     out[k].worldFromTool.coeffs() = turn.normalized();
   }
