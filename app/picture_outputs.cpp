@@ -153,11 +153,9 @@ PictureOutputs::PictureOutputs(const std::vector<std::string>& paths, const Sett
     const std::string extension = fs::path(path).extension().string();
     if (settings.still) {
       if (extension != ".png") throw std::runtime_error(path + ": expected FILE.png for a still");
-      makeParent(path);
       requireWritable({path});
       stills_.push_back(path);
     } else if (isVideoName(path)) {
-      makeParent(path);
       videos_.emplace_back(path, settings.width, settings.height, settings.fps);
     } else if (isVideoName("film" + fs::path(path).filename().string())) {
       throw std::runtime_error(path + ": expected a name before the dot");  // a hidden file without an extension
@@ -167,11 +165,6 @@ PictureOutputs::PictureOutputs(const std::vector<std::string>& paths, const Sett
       folders_.push_back(std::make_unique<PngFolder>(path, settings.slice));
     }
   }
-}
-
-void PictureOutputs::makeParent(const std::string& path) {
-  const std::string parent = fs::path(path).parent_path().string();
-  if (!parent.empty()) made_.push_back(std::make_unique<OutputFolder>(parent));
 }
 
 bool PictureOutputs::has(int number) const {

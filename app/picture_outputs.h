@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "app/files/output_file.h"
+#include "render/output_folder.h"
 #include "render/picture_queue.h"
 #include "render/video_writer.h"
 
@@ -73,9 +74,6 @@ class PictureOutputs {
   StageTimes::Stage encoding() const;  // of all videos and folders, in threads of their own
 
  private:
-  void makeParent(const std::string& path);
-
-  std::vector<std::unique_ptr<OutputFolder>> made_;  // before what is written into them: they go last
   std::vector<VideoWriter> videos_;
   std::vector<std::unique_ptr<PngFolder>> folders_;
   std::vector<std::string> stills_;

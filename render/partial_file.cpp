@@ -38,6 +38,7 @@ static bool isStandardStream(const struct stat& file) {
 
 // Renaming onto a device would replace that.
 static std::string resolveTarget(const std::string& path) {
+  requireName(path);
   if (path.empty() || path.back() == '/') throw std::runtime_error(path + ": expected the name of a file to write");
   std::string target = behindLink(path);
   struct stat status {};
@@ -57,7 +58,12 @@ static std::string besideTarget(const std::filesystem::path& target, const std::
   return (target.parent_path() / (name.substr(0, NAME_MAX - ending.size()) + ending)).string();
 }
 
-PartialFile::PartialFile(const std::string& target) : target_(resolveTarget(target)) {
+static std::string folderOf(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
+PartialFile::PartialFile(const std::string& target) : target_(resolveTarget(target)), made_(folderOf(target)) {
   const mode_t readAndWrite = 0666;  // less the user's mask
   // Names left by killed runs are stepped over: O_EXCL never touches a file that somebody else made.
   for (int attempt = 0;; ++attempt) {

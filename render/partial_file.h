@@ -3,6 +3,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "render/output_folder.h"
+
 namespace medulla {
 
 // Of what the system has just refused to write.
@@ -14,8 +16,9 @@ std::runtime_error unwritable(const std::string& path);
 // for is replaced, not the link, also where there is nothing yet.
 class PartialFile {
  public:
-  // There at once, and empty. Throws std::runtime_error with path and reason where the target cannot be written: no
-  // such folder, not permitted, a folder or a device of that name, or where standard output or standard error goes.
+  // There at once, and empty; so are folders in the target's path that are missing, which go again with a file that
+  // never came. Throws std::runtime_error with path and reason where the target cannot be written: not permitted, a
+  // folder or a device of that name, or where standard output or standard error goes.
   explicit PartialFile(const std::string& target);
   ~PartialFile();
   PartialFile(const PartialFile&) = delete;
@@ -25,7 +28,9 @@ class PartialFile {
   void commit();                                     // once, last; throws likewise
 
  private:
-  std::string target_, path_;
+  std::string target_;
+  OutputFolder made_;
+  std::string path_;
 };
 
 }  // namespace medulla

@@ -56,12 +56,19 @@ TEST_F(ImageTest, TruncatedPngIsRefused) {
   }
 }
 
+TEST_F(ImageTest, MissingFoldersAreMadeWithTheFile) {
+  writePng(path("new/deep/a.png"), pattern(4, 4));
+  EXPECT_EQ(readPng(path("new/deep/a.png")).width, 4);
+}
+
 TEST_F(ImageTest, FailedWriteLeavesNothingAndHarmsNothing) {
-  EXPECT_THROW(writePng(path("no_folder/a.png"), pattern(4, 4)), std::runtime_error);
   fs::create_directories(path("a.png"));
   EXPECT_THROW(writePng(path("a.png"), pattern(4, 4)), std::runtime_error);
   EXPECT_TRUE(fs::is_directory(path("a.png")));
-  EXPECT_EQ(filesInFolder(), 1u);
+  folder_.write("file", "here");
+  EXPECT_THROW(writePng(path("file/a.png"), pattern(4, 4)), std::runtime_error);
+  EXPECT_EQ(readFile(path("file")), "here");
+  EXPECT_EQ(filesInFolder(), 2u);
 }
 
 TEST_F(ImageTest, EqualPicturesHaveInfinitePsnr) {

@@ -9,6 +9,7 @@
 #include <csignal>
 
 #include "app/files/text_file.h"
+#include "render/output_folder.h"
 #include "tests/complaint.h"
 #include "tests/temporary_folder.h"
 

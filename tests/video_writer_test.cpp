@@ -235,7 +235,8 @@ TEST_F(VideoWriterTest, WhatEncodingTookIsKnown) {
 }
 
 TEST_F(VideoWriterTest, UnwritableTargetIsRefusedAtOnce) {
-  EXPECT_NE(complaintOf([&] { VideoWriter(path("none/a.mp4"), 64, 32, 30); }).find("No such file or directory"),
+  folder_.write("file", "");
+  EXPECT_NE(complaintOf([&] { VideoWriter(path("file/a.mp4"), 64, 32, 30); }).find("cannot be made: Not a directory"),
             std::string::npos);
   fs::create_directories(path("b.mp4"));
   EXPECT_NE(complaintOf([&] { VideoWriter(path("b.mp4"), 64, 32, 30); }).find("folder"), std::string::npos);

@@ -27,6 +27,7 @@
 #include "physics/model/node_volumes.h"
 #include "physics/model/render_surface.h"
 #include "physics/sort_unique.h"
+#include "render/output_folder.h"
 #include "render/stage_times.h"
 
 namespace medulla {

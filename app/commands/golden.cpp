@@ -16,6 +16,7 @@
 #include "app/tool_fields.h"
 #include "physics/content_hash.h"
 #include "render/flip.h"
+#include "render/output_folder.h"
 
 namespace medulla {
 

@@ -10,6 +10,7 @@
 #include "app/standard_streams.h"
 #include "app/starter_scene.h"
 #include "haptics/tool_input.h"
+#include "render/output_folder.h"
 
 namespace medulla {
 

@@ -18,6 +18,7 @@
 #include "app/progress.h"
 #include "app/standard_streams.h"
 #include "app/torture.h"
+#include "render/output_folder.h"
 
 namespace medulla {
 

@@ -1,7 +1,6 @@
 #include "app/files/output_file.h"
 
 #include <fcntl.h>
-#include <fmt/core.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -34,22 +33,8 @@ FolderLock::~FolderLock() {
   ::close(descriptor_);
 }
 
-// Other programs take - for standard output, which carries the results alone here.
-static const std::string& namedFile(const std::string& path) {
-  if (path == "-") throw std::runtime_error("-: is no file; standard output holds the results, name a file");
-  return path;
-}
-
-static std::string folderOf(const std::string& path) {
-  const std::string folder = std::filesystem::path(path).parent_path().string();
-  return folder.empty() ? "." : folder;
-}
-
 OutputFile::OutputFile(const std::string& path)
-    : path_(namedFile(path)),
-      made_(folderOf(path)),
-      file_(path),
-      descriptor_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
+    : path_(path), file_(path), descriptor_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
   if (descriptor_ < 0) throw unwritable(path_);
 }
 
@@ -107,29 +92,6 @@ void requireDistinctFiles(const std::vector<std::string>& outputs, const std::ve
 void requireWritable(const std::vector<std::string>& paths) {
   for (const std::string& path : paths)
     if (!path.empty()) const OutputFile writableAtAll(path);
-}
-
-OutputFolder::OutputFolder(const std::string& path) {
-  namedFile(path);
-  std::error_code error;
-  std::filesystem::path missing = path;
-  // A link that leads nowhere is there, and not ours to remove.
-  const auto isMissing = [&](const std::filesystem::path& p) {
-    return std::filesystem::symlink_status(p, error).type() == std::filesystem::file_type::not_found;
-  };
-  for (; !missing.empty() && isMissing(missing); missing = missing.parent_path()) made_.push_back(missing.string());
-  std::filesystem::create_directories(path, error);
-  if (!error) return;
-  removeEmpty();
-  throw std::runtime_error(fmt::format("{}: cannot be made: {}", path, error.message()));
-}
-
-OutputFolder::~OutputFolder() {
-  removeEmpty();
-}
-
-void OutputFolder::removeEmpty() const {
-  for (const std::string& folder : made_) rmdir(folder.c_str());
 }
 
 }  // namespace medulla

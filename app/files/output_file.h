@@ -17,26 +17,9 @@ std::filesystem::path placeOf(const std::string& path);
 // places; empty names are skipped.
 void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
 
-// A folder for outputs, made where it is missing, with those above it. What was made here and is empty at the end,
-// since what was to fill it failed, goes again. Throws std::runtime_error with path and reason where the system
-// refuses.
-class OutputFolder {
- public:
-  explicit OutputFolder(const std::string& path);
-  ~OutputFolder();
-  OutputFolder(const OutputFolder&) = delete;
-  OutputFolder& operator=(const OutputFolder&) = delete;
-
- private:
-  void removeEmpty() const;
-
-  std::vector<std::string> made_;  // the innermost first
-};
-
 // A text file that appears under its name only when whole (render/partial_file.h); ^C becomes an exception
-// (app/interrupt.h), and so leaves nothing either. Folders in its path that are missing are made with it. The
-// constructor throws what OutputFolder's and PartialFile's throw, write() and commit() std::runtime_error with path and
-// reason where the system fails (disk full).
+// (app/interrupt.h), and so leaves nothing either. The constructor throws what PartialFile's throws, write() and
+// commit() std::runtime_error with path and reason where the system fails (disk full).
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path);
@@ -50,7 +33,6 @@ class OutputFile {
   void flush();
 
   std::string path_;
-  OutputFolder made_;  // before the file, which goes first
   PartialFile file_;
   int descriptor_;
   std::string buffer_;
