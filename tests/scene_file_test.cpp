@@ -220,9 +220,11 @@ TEST_F(SceneFile, NamesAreNoLongerThanFilesCanBeNamedAfter) {
   EXPECT_NE(complaint(named(201)).find(": expected at most 200 letters"), std::string::npos);
 }
 
-// What single precision, or a product of two, would make infinity of.
+// What single precision, or a product of two, would make infinity or nothing of.
 TEST_F(SceneFile, NumbersBeyondWhatCanBeDrawnOrSimulatedAreRefused) {
   expectComplaints({
+      {"6e3", "1e-160", R"(x.xml:7: <tissue> young="1e-160": expected no number below 1e-100)"},
+      {"radius=\"0.004\"", "radius=\"1e-160\"", R"(x.xml:18: <tool> radius="1e-160": expected no number below 1e-100)"},
       {"6e3", "1e300", R"(x.xml:7: <tissue> young="1e300": expected no number beyond 1e+30)"},
       {"0.1 0.2 0.3", "0.1 0.2 -1e9", R"(x.xml:10: <body> position="0.1 0.2 -1e9": expected no number beyond 1000)"},
       {"amplitude=\"0.1\"", "amplitude=\"1e4\"",

@@ -1,5 +1,6 @@
 #include "app/files/xml_element.h"
 
+#include <fmt/format.h>
 #include <tinyxml2.h>
 
 #include <algorithm>
@@ -189,11 +190,12 @@ std::vector<T> readList(const XmlElement& element, const std::string& attribute,
   for (const std::string& text : texts) {
     const std::optional<T> value = parseNumber<T>(text);
     if (!value || !contains(range, *value)) refuse(element, attribute, expected);
+    const double number = static_cast<double>(*value);
+    if (std::abs(number) > range.most)
+      refuse(element, attribute, fmt::format("expected no number beyond {:g}", range.most));
+    if (range.low == 0 && range.lowExcluded && number < range.least)
+      refuse(element, attribute, fmt::format("expected no number below {:g}", range.least));
     values.push_back(*value);
-    if (std::abs(static_cast<double>(*value)) <= range.most) continue;
-    std::string most;
-    appendNumber(most, range.most);
-    refuse(element, attribute, "expected no number beyond " + most);
   }
   return values;
 }

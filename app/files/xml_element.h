@@ -62,7 +62,8 @@ const XmlRule& ruleOf(const XmlRules& rules, const std::string& element);  // as
 struct Range {
   double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
   bool lowExcluded = false, highExcluded = false;
-  double most = 1e30;  // either way: products of larger numbers overflow
+  double most = 1e30;     // either way: products of larger numbers overflow
+  double least = 1e-100;  // of what has to be more than 0: squares of smaller numbers vanish
 };
 inline constexpr Range kAnyNumber{};
 inline constexpr Range kPositive{0, std::numeric_limits<double>::infinity(), true, false};
