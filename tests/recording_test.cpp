@@ -180,6 +180,14 @@ TEST_F(Recording, SmoothingTakesOutTremorAndNothingElse) {
   }
 }
 
+// 2 s and less 1e-20 s are one number: no row would be inside.
+TEST_F(Recording, SmoothingByLessThanTimesTellChangesNothing) {
+  const Trajectory t = read("", "<columns time=\"1\" position=\"2 3 4\"/><span smooth=\"1e-20\"/>",
+                            "0 0 0 0\n1 1 0 0\n2 5 0 0\n3 2 0 0\n");
+  ASSERT_EQ(t.samples.size(), 4u);
+  EXPECT_EQ(t.samples[2].position, Eigen::Vector3d(5, 0, 0));
+}
+
 TEST_F(Recording, EveryMistakeInTheFileIsNamedWithItsRow) {
   const std::string xyz = "<columns rate=\"10\" position=\"1 2 3\"/>", ros = "map=\"ros\"", sofa = "map=\"sofa\"";
   const std::string named = "<columns time=\"t\" position=\"x y z\"/>";
