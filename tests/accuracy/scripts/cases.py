@@ -210,16 +210,16 @@ def liver_stretched():
     regions = {name: lambda x, n, inside=inside: inside(x / stretch, n) for name, inside in body.regions.items()}
     cases = [Case("tip", "root", Load("tip", (0, 0, 200))), Case("axial", "root", Load("tip", (1000, 0, 0)))]
     return replace(body, name="liver_stretched", mesh="tests/accuracy/liver_stretched.obj", regions=regions, cases=cases,
-                   kept={"root": 1}, modes=0)
+                   modes=0)
 
 
-def gallbladder_remeshed(name, rim):
+def gallbladder_remeshed(name, rim, kept):
     body = gallbladder()
     along = {case.name: case for case in body.cases}["axial"].load.force
     pull = Case("pull", "root", Load("tip", tuple(np.array(along) / 7)), 4)
     cases = [case for case in body.cases if case.name == "tip_large"] + [pull]
-    return replace(body, name=name, mesh=f"tests/accuracy/{name}.obj", cases=cases, grids={"root": rim}, kept={"root": 0},
-                   modes=0)
+    return replace(body, name=name, mesh=f"tests/accuracy/{name}.obj", cases=cases, grids={"root": rim},
+                   kept={"root": kept}, modes=0)
 
 
 def kidney():
@@ -243,6 +243,6 @@ def cube():
 
 
 def bodies():
-    remeshed = [gallbladder_remeshed("gallbladder_halved", grids(2, 4, 3, 4)),
-                gallbladder_remeshed("gallbladder_doubled", grids(1, 4, 2, 4))]
+    remeshed = [gallbladder_remeshed("gallbladder_halved", grids(2, 4, 2, 6, 2, 8), 2),
+                gallbladder_remeshed("gallbladder_doubled", grids(1, 4, 2, 4, 2, 6), 1)]
     return [cylinder(), gallbladder(), liver(), stomach(), liver_stretched(), *remeshed, kidney(), cube()]
