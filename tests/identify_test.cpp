@@ -11,6 +11,7 @@
 #include "physics/dynamics/world.h"
 #include "physics/model/identify/check_loads.h"
 #include "physics/model/identify/held_give.h"
+#include "physics/model/identify/held_rim.h"
 #include "physics/model/identify/hex_stiffness.h"
 #include "physics/model/identify/lbfgs.h"
 #include "physics/model/identify/reduction.h"
@@ -214,6 +215,36 @@ TEST(HeldGive, CellsOfTwoSizesAnswerAlike) {
   solid.give = fine.give = give;
   EXPECT_LT(change(), 0.5 * before);
   EXPECT_EQ(giveOfHeld(mesh, {}, makeVoxelSolid(mesh, 0.014, {}), solid), 0) << "nothing is held";
+}
+
+// A bar's end, the same bar held behind a plane and by its side, and half of a ball's surface. Facets of the bar lean
+// by two degrees.
+TEST(HeldRim, AnglesAreTheBodys) {
+  const auto angles = [](const TriangleMesh& mesh, const std::vector<int>& held, const std::vector<HeldSpace>& spaces) {
+    std::vector<double> out;
+    for (const RimEdge& edge : rimOfHeld(mesh, held, spaces)) out.push_back(edge.angle);
+    EXPECT_FALSE(out.empty());
+    return out;
+  };
+  const TriangleMesh bar = cylinder();
+  const std::vector<int> end = trianglesWhere(bar, [](const Vector3d&x) { return x.x() < 1e-6; }),
+                         behind = trianglesWhere(bar, [](const Vector3d&x) { return x.x() < 0.0201; });
+  const double right = std::numbers::pi / 2, straight = std::numbers::pi;
+  for (const double angle : angles(bar, end, {})) EXPECT_NEAR(angle, right, 0.05);
+  const std::vector<HeldSpace> spaces = heldSpaces(bar, {{"plane=1,0,0,0.0201", {}, true}}, {behind});
+  for (const double angle : angles(bar, behind, spaces)) EXPECT_NEAR(angle, right, 0.05);
+  for (const double angle : angles(bar, behind, {})) EXPECT_NEAR(angle, straight, 0.07);
+  const TriangleMesh ball = ellipsoidMesh(3, {0.05, 0.05, 0.05});
+  for (const double angle : angles(ball, trianglesWhere(ball, [](const Vector3d& x) { return x.x() < 0; }), {}))
+    EXPECT_NEAR(angle, straight, 0.3);
+  // Turned inside out a mesh is a cavity, whose corners are reflex.
+  TriangleMesh cavity = bar;
+  for (std::array<int, 3>& t : cavity.triangles) std::swap(t[1], t[2]);
+  for (const double angle : angles(cavity, end, {})) EXPECT_NEAR(angle, 2 * straight - right, 0.05);
+  EXPECT_NEAR(usualGive(rimOfHeld(bar, end, {})), usualGive(right), 0.05);
+  EXPECT_LT(usualGive(right), usualGive(straight));
+  EXPECT_EQ(usualGive(0.), 0);
+  EXPECT_EQ(usualGive(std::vector<RimEdge>()), 0);
 }
 
 TEST(Multifrontal, SolvesAsAnySparseCholesky) {
