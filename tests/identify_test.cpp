@@ -227,8 +227,8 @@ TEST(HeldRim, AnglesAreTheBodys) {
     return out;
   };
   const TriangleMesh bar = cylinder();
-  const std::vector<int> end = trianglesWhere(bar, [](const Vector3d&x) { return x.x() < 1e-6; }),
-                         behind = trianglesWhere(bar, [](const Vector3d&x) { return x.x() < 0.0201; });
+  const std::vector<int> end = trianglesWhere(bar, [](const Vector3d& x) { return x.x() < 1e-6; });
+  const std::vector<int> behind = trianglesWhere(bar, [](const Vector3d& x) { return x.x() < 0.0201; });
   const double right = std::numbers::pi / 2, straight = std::numbers::pi;
   for (const double angle : angles(bar, end, {})) EXPECT_NEAR(angle, right, 0.05);
   const std::vector<HeldSpace> spaces = heldSpaces(bar, {{"plane=1,0,0,0.0201", {}, true}}, {behind});

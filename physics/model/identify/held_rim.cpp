@@ -40,6 +40,7 @@ std::map<std::pair<int, int>, Vector3d> heldNormals(const TriangleMesh& mesh, co
 std::vector<RimEdge> rimOfHeld(const TriangleMesh& mesh, const std::vector<int>& heldTriangles,
                                const std::vector<HeldSpace>& heldSpaces) {
   std::vector<Corners> triangles;
+  triangles.reserve(heldTriangles.size());
   for (const int t : heldTriangles) triangles.push_back(mesh.triangles[t]);
   const auto held = heldNormals(mesh, triangles, heldSpaces);
   std::map<std::pair<int, int>, Vector3d> beside;  // of the mesh's triangles, by the edge as their neighbour has it
