@@ -8,6 +8,8 @@
 #include <numbers>
 #include <utility>
 
+#include "physics/model/mesh_topology.h"
+
 namespace medulla {
 
 using Eigen::Vector3d;
@@ -16,20 +18,16 @@ namespace {
 
 using Corners = std::array<int, 3>;
 
-Vector3d normalOf(const std::vector<Vector3d>& vertices, const Corners& t) {
-  return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).normalized();
-}
-
-// By the edge along which a triangle meets a rim: the normal of what bounds the free body there, outwards.
-std::map<std::pair<int, int>, Vector3d> heldNormals(const TriangleMesh& mesh, const std::vector<Corners>& triangles,
-                                                    const std::vector<HeldSpace>& spaces) {
+// By the edge along which a triangle meets a rim: the area of what bounds the free body there, outwards.
+std::map<std::pair<int, int>, Vector3d> heldAreas(const TriangleMesh& mesh, const std::vector<Corners>& triangles,
+                                                  const std::vector<HeldSpace>& spaces) {
   std::map<std::pair<int, int>, Vector3d> out;
   for (const Corners& t : triangles)
-    for (int k = 0; k < 3; ++k) out[{t[k], t[(k + 1) % 3]}] = normalOf(mesh.vertices, t);
+    for (int k = 0; k < 3; ++k) out[{t[k], t[(k + 1) % 3]}] = areaVector(mesh, t);
   for (const HeldSpace& space : spaces) {
     for (std::size_t f = space.firstFan; f < space.surface.triangles.size(); ++f) {
       const Corners& fan = space.surface.triangles[f];
-      out[{fan[1], fan[0]}] = -normalOf(space.surface.vertices, fan);
+      out[{fan[1], fan[0]}] = -areaVector(space.surface, fan);
     }
   }
   return out;
@@ -42,15 +40,15 @@ std::vector<RimEdge> rimOfHeld(const TriangleMesh& mesh, const std::vector<int>&
   std::vector<Corners> triangles;
   triangles.reserve(heldTriangles.size());
   for (const int t : heldTriangles) triangles.push_back(mesh.triangles[t]);
-  const auto held = heldNormals(mesh, triangles, heldSpaces);
+  const auto held = heldAreas(mesh, triangles, heldSpaces);
   std::map<std::pair<int, int>, Vector3d> beside;  // of the mesh's triangles, by the edge as their neighbour has it
   for (const Corners& t : mesh.triangles)
-    for (int k = 0; k < 3; ++k) beside[{t[(k + 1) % 3], t[k]}] = normalOf(mesh.vertices, t);
+    for (int k = 0; k < 3; ++k) beside[{t[(k + 1) % 3], t[k]}] = areaVector(mesh, t);
   std::vector<RimEdge> out;
   for (const auto& [a, b] : rimOf(triangles)) {
     const Vector3d along = (mesh.vertices[b] - mesh.vertices[a]).normalized();
-    const Vector3d &n = held.at({a, b}), &free = beside.at({a, b});
-    const double bend = std::atan2(n.cross(free).dot(along), n.dot(free));  // convex: positive
+    const Vector3d &own = held.at({a, b}), &free = beside.at({a, b});
+    const double bend = std::atan2(own.cross(free).dot(along), own.dot(free));  // convex: positive
     out.push_back({mesh.vertices[a], mesh.vertices[b], std::numbers::pi - bend});
   }
   return out;

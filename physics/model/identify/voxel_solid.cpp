@@ -12,6 +12,7 @@
 #include "physics/model/identify/hex_stiffness.h"
 #include "physics/model/identify/thin_parts.h"
 #include "physics/model/mass_properties.h"
+#include "physics/model/mesh_topology.h"
 #include "physics/model/surface_queries.h"
 
 namespace medulla {
@@ -57,11 +58,6 @@ bool isNear(const Vector3d& point, const TriangleMesh& mesh, const std::vector<s
   });
 }
 
-Vector3d normalOf(const TriangleMesh& mesh, std::size_t triangle) {
-  const auto& [a, b, c] = mesh.triangles[triangle];
-  return (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).normalized();
-}
-
 struct HeldSprings {
   HeldCells all, rim;  // the latter within a cell of where what is held ends
 };
@@ -79,7 +75,7 @@ HeldSprings heldSprings(const TriangleMesh& mesh, const SolidSettings& settings,
   };
   const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
   for (const int t : settings.heldTriangles) {
-    const Vector3d normal = normalOf(mesh, t);
+    const Vector3d normal = areaVector(mesh, mesh.triangles[t]).normalized();
     overTriangle(mesh, mesh.triangles[t], grid.size, [&](const Vector3d& point, const Vector3d&, double area) {
       if (!behind(point - 1e-3 * grid.size * normal)) hold(point, area);
     });
@@ -87,7 +83,7 @@ HeldSprings heldSprings(const TriangleMesh& mesh, const SolidSettings& settings,
   const SurfaceTree body = makeSurfaceTree(mesh);
   for (const HeldSpace& space : settings.heldSpaces) {
     for (std::size_t t = space.firstFan; t < space.surface.triangles.size(); ++t) {
-      const Vector3d aside = 1e-3 * grid.size * normalOf(space.surface, t);
+      const Vector3d aside = 1e-3 * grid.size * areaVector(space.surface, space.surface.triangles[t]).normalized();
       overTriangle(space.surface, space.surface.triangles[t], grid.size,
                    [&](const Vector3d& point, const Vector3d&, double area) {
                      const bool isWithin = behind(point - aside) && behind(point + aside);  // of another region
