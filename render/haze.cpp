@@ -100,10 +100,8 @@ HazePass::HazePass() {
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices_);
   glBufferData(GL_ELEMENT_ARRAY_BUFFER, GLsizeiptr(index.size() * sizeof(unsigned)), index.data(), GL_STATIC_DRAW);
   glBindBuffer(GL_ARRAY_BUFFER, vertices_);
-  glEnableVertexAttribArray(0);
-  glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, sizeof(Corner), bufferOffset(offsetof(Corner, place)));
-  glEnableVertexAttribArray(1);
-  glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(Corner), bufferOffset(offsetof(Corner, colour)));
+  readAttribute(0, 2, sizeof(Corner), offsetof(Corner, place));
+  readAttribute(1, 3, sizeof(Corner), offsetof(Corner, colour));
 }
 
 HazePass::~HazePass() {

@@ -20,12 +20,6 @@ constexpr std::array<float, 2> kFinerAbove = {0.012f, 0.06f};  // projected radi
 constexpr glm::vec3 kBackdropColour{0.78f, 0.80f, 0.84f};      // linear RGB, of the shaders' backdrop
 constexpr float kFarthestFaded = 0.45f;
 
-void attribute(unsigned slot, int components, std::size_t stride, std::size_t offset, unsigned divisor) {
-  glEnableVertexAttribArray(slot);
-  glVertexAttribPointer(slot, components, GL_FLOAT, GL_FALSE, int(stride), bufferOffset(offset));
-  glVertexAttribDivisor(slot, divisor);
-}
-
 }  // namespace
 
 ModelView::UnitMesh ModelView::makeUnitMesh(const std::vector<glm::vec3>& positions,
@@ -45,12 +39,15 @@ ModelView::UnitMesh ModelView::makeUnitMesh(const std::vector<glm::vec3>& positi
   glBindVertexArray(m.vertexArray);
   glBindBuffer(GL_ARRAY_BUFFER, m.vertices);
   glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(interleaved.size() * sizeof(glm::vec3)), interleaved.data(), GL_STATIC_DRAW);
-  attribute(0, 3, 2 * sizeof(glm::vec3), 0, 0);
-  attribute(1, 3, 2 * sizeof(glm::vec3), sizeof(glm::vec3), 0);
+  readAttribute(0, 3, 2 * sizeof(glm::vec3), 0);
+  readAttribute(1, 3, 2 * sizeof(glm::vec3), sizeof(glm::vec3));
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, m.indices);
   glBufferData(GL_ELEMENT_ARRAY_BUFFER, GLsizeiptr(indices.size() * sizeof(unsigned)), indices.data(), GL_STATIC_DRAW);
   glBindBuffer(GL_ARRAY_BUFFER, m.instances);
-  for (unsigned k = 0; k < 4; ++k) attribute(2 + k, 4, sizeof(Instance), k * sizeof(glm::vec4), 1);
+  for (unsigned k = 0; k < 4; ++k) {
+    readAttribute(2 + k, 4, sizeof(Instance), k * sizeof(glm::vec4));
+    glVertexAttribDivisor(2 + k, 1);
+  }
   glBindVertexArray(0);
   return m;
 }

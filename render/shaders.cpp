@@ -37,6 +37,11 @@ unsigned compile(unsigned kind, const std::string& source) {
 
 }  // namespace
 
+void readAttribute(unsigned location, int floats, std::size_t stride, std::size_t offset) {
+  glEnableVertexAttribArray(location);
+  glVertexAttribPointer(location, floats, GL_FLOAT, GL_FALSE, int(stride), bufferOffset(offset));
+}
+
 unsigned buildProgram(const std::string& defines, const char* vertex, const char* fragment) {
   const std::string head =
       "#version 330 core\n#extension GL_ARB_texture_gather : require\n#define BLEED .018\n" + defines;

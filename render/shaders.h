@@ -11,6 +11,9 @@ inline const void* bufferOffset(std::size_t bytes) {
   return reinterpret_cast<const void*>(bytes);  // NOLINT(performance-no-int-to-ptr)
 }
 
+// What a shader reads at `location`: so many floats, `offset` bytes into each `stride` bytes of the array buffer bound.
+void readAttribute(unsigned location, int floats, std::size_t stride, std::size_t offset);
+
 unsigned buildProgram(const std::string& defines, const char* vertex, const char* fragment);  // throws with GLSL's log
 
 // Tissue and steel. SHADE 0 lit, 1 shadow edge, 2 dark; DULL: no highlight can be seen.

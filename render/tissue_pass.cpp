@@ -19,11 +19,6 @@ namespace {
 
 constexpr int kMaskSegments = 96;
 
-void attribute(unsigned slot, int components, std::size_t offset) {
-  glEnableVertexAttribArray(slot);
-  glVertexAttribPointer(slot, components, GL_FLOAT, GL_FALSE, sizeof(LitVertex), bufferOffset(offset));
-}
-
 unsigned makeTexture(int filter) {
   unsigned texture = 0;
   glGenTextures(1, &texture);
@@ -120,11 +115,11 @@ TissuePass::TissuePass(int shadowSide, bool supersampled) {
   glBindVertexArray(vertexArray_);
   glBindBuffer(GL_ARRAY_BUFFER, vertices_);
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices_);
-  attribute(0, 3, offsetof(LitVertex, position));
-  attribute(1, 4, offsetof(LitVertex, direct));   // and gloss
-  attribute(2, 4, offsetof(LitVertex, ambient));  // and shadowRadius
-  attribute(3, 4, offsetof(LitVertex, halfway));  // and shadowBias
-  attribute(4, 4, offsetof(LitVertex, uv));       // and detail, seam
+  readAttribute(0, 3, sizeof(LitVertex), offsetof(LitVertex, position));
+  readAttribute(1, 4, sizeof(LitVertex), offsetof(LitVertex, direct));   // and gloss
+  readAttribute(2, 4, sizeof(LitVertex), offsetof(LitVertex, ambient));  // and shadowRadius
+  readAttribute(3, 4, sizeof(LitVertex), offsetof(LitVertex, halfway));  // and shadowBias
+  readAttribute(4, 4, sizeof(LitVertex), offsetof(LitVertex, uv));       // and detail, seam
 
   glGenVertexArrays(1, &maskArray_);
   glGenBuffers(1, &maskBuffer_);
@@ -159,8 +154,7 @@ void TissuePass::drawMask(const Viewpoint& view) {
   glBindVertexArray(maskArray_);
   glBindBuffer(GL_ARRAY_BUFFER, maskBuffer_);
   glBufferData(GL_ARRAY_BUFFER, GLsizeiptr(strip.size() * sizeof(glm::vec2)), strip.data(), GL_STREAM_DRAW);
-  glEnableVertexAttribArray(0);
-  glVertexAttribPointer(0, 2, GL_FLOAT, GL_FALSE, 0, nullptr);
+  readAttribute(0, 2, sizeof(glm::vec2), 0);
   glDrawArrays(GL_TRIANGLE_STRIP, 0, int(strip.size()));
 }
 
