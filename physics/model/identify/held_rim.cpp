@@ -18,11 +18,11 @@ namespace {
 
 using Corners = std::array<int, 3>;
 
-// By the edge along which a triangle meets a rim: the area of what bounds the free body there, outwards.
-std::map<std::pair<int, int>, Vector3d> heldAreas(const TriangleMesh& mesh, const std::vector<Corners>& triangles,
-                                                  const std::vector<HeldSpace>& spaces) {
+// The triangles' areas, outwards, by each of their edges; where a fan cuts the free body off, at the held triangle's
+// edge, that of the cut.
+std::map<std::pair<int, int>, Vector3d> areasByEdge(const TriangleMesh& mesh, const std::vector<HeldSpace>& spaces) {
   std::map<std::pair<int, int>, Vector3d> out;
-  for (const Corners& t : triangles)
+  for (const Corners& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) out[{t[k], t[(k + 1) % 3]}] = areaVector(mesh, t);
   for (const HeldSpace& space : spaces) {
     for (std::size_t f = space.firstFan; f < space.surface.triangles.size(); ++f) {
@@ -40,21 +40,19 @@ std::vector<RimEdge> rimOfHeld(const TriangleMesh& mesh, const std::vector<int>&
   std::vector<Corners> triangles;
   triangles.reserve(heldTriangles.size());
   for (const int t : heldTriangles) triangles.push_back(mesh.triangles[t]);
-  const auto held = heldAreas(mesh, triangles, heldSpaces);
-  std::map<std::pair<int, int>, Vector3d> beside;  // of the mesh's triangles, by the edge as their neighbour has it
-  for (const Corners& t : mesh.triangles)
-    for (int k = 0; k < 3; ++k) beside[{t[(k + 1) % 3], t[k]}] = areaVector(mesh, t);
+  const auto areas = areasByEdge(mesh, heldSpaces);
   std::vector<RimEdge> out;
   for (const auto& [a, b] : rimOf(triangles)) {
-    const Vector3d along = (mesh.vertices[b] - mesh.vertices[a]).normalized();
-    const Vector3d &own = held.at({a, b}), &free = beside.at({a, b});
-    const double bend = std::atan2(own.cross(free).dot(along), own.dot(free));  // convex: positive
-    out.push_back({mesh.vertices[a], mesh.vertices[b], std::numbers::pi - bend});
+    const Vector3d along = mesh.vertices[b] - mesh.vertices[a];
+    const Vector3d &held = areas.at({a, b}), &free = areas.at({b, a});
+    const double length = along.norm();
+    const double bend = std::atan2(held.cross(free).dot(along / length), held.dot(free));  // convex: positive
+    out.push_back({length, std::numbers::pi - bend});
   }
   return out;
 }
 
-// Two measured numbers and a line through them: what brings the cells' answers to loads on ten bodies to CalculiX's in
+// Two measured numbers and a line through them: what brings the cells' answers to loads on nine bodies to CalculiX's in
 // small displacements (tests/accuracy/limits.md).
 double usualGive(double angle) {
   constexpr double right = 0.6, straight = 1.95;
@@ -64,9 +62,8 @@ double usualGive(double angle) {
 double usualGive(const std::vector<RimEdge>& rim) {
   double give = 0, length = 0;
   for (const RimEdge& edge : rim) {
-    const double own = (edge.to - edge.from).norm();
-    give += own * usualGive(edge.angle);
-    length += own;
+    give += edge.length * usualGive(edge.angle);
+    length += edge.length;
   }
   return length > 0 ? give / length : 0;
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
 #include <vector>
 
 #include "physics/model/identify/held_region.h"
@@ -10,8 +9,8 @@ namespace medulla {
 
 // An edge where what is held ends.
 struct RimEdge {
-  Eigen::Vector3d from, to;  // m
-  double angle = 0;          // rad, of the body, between what is held and the free surface beside
+  double length = 0;  // m
+  double angle = 0;   // rad, of the body, between what is held and the free surface beside
 };
 
 // Of held triangles, or of the fans over them where the material behind is held, too.
