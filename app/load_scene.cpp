@@ -12,6 +12,7 @@
 #include "app/files/model_file.h"
 #include "app/files/recording_file.h"
 #include "app/files/text.h"
+#include "app/files/text_file.h"
 #include "app/files/trajectory_file.h"
 #include "app/files/vertex_file.h"
 #include "app/files/xml_element.h"
@@ -42,7 +43,7 @@ static std::runtime_error valueError(const Scene& scene, int line, Attributes at
 // A missing file is the scene's mistake.
 static void requireFile(const Scene& scene, int line, const std::string& attribute, const std::string& what,
                         const std::string& path) {
-  if (!std::filesystem::exists(path))
+  if (!fileExists(path))
     throw valueError(scene, line, {attribute}, fmt::format("{} \"{}\" does not exist", what, path));
 }
 

@@ -99,7 +99,7 @@ void PngFolder::takeOver() const {
     const bool kept = slice_.resume && same && isPicture(entry.path()) && isWholePng(entry.path());
     if (isOurs(entry.path()) && !kept) fs::remove_all(entry.path());
   }
-  writeTextFile(name.string(), run);
+  writeFile(name.string(), run);
 }
 
 PngFolder::~PngFolder() {
@@ -149,6 +149,7 @@ int PngFolder::removeLater() const {
 }
 
 PictureOutputs::PictureOutputs(const std::vector<std::string>& paths, const Settings& settings) {
+  std::error_code unknown;
   for (const std::string& path : paths) {
     const std::string extension = fs::path(path).extension().string();
     if (settings.still) {
@@ -159,7 +160,7 @@ PictureOutputs::PictureOutputs(const std::vector<std::string>& paths, const Sett
       videos_.emplace_back(path, settings.width, settings.height, settings.fps);
     } else if (isVideoName("film" + fs::path(path).filename().string())) {
       throw std::runtime_error(path + ": expected a name before the dot");  // a hidden file without an extension
-    } else if (!extension.empty() && !fs::is_directory(path)) {
+    } else if (!extension.empty() && !fs::is_directory(path, unknown)) {
       throw std::runtime_error(path + ": expected FILE.mp4, .webm, .gif or .webp, or a folder for PNG files");
     } else {
       folders_.push_back(std::make_unique<PngFolder>(path, settings.slice));

@@ -23,7 +23,7 @@ struct PngText {
 };
 void writePng(const std::string& path, const Image& image, const std::vector<PngText>& texts = {});
 // What writePng() writes.
-std::vector<std::uint8_t> encodePng(const Image& image, const std::vector<PngText>& texts = {});
+std::string encodePng(const Image& image, const std::vector<PngText>& texts = {});
 // Throws std::runtime_error when the file is missing or no PNG. `texts`, if given, receives the tEXt chunks.
 Image readPng(const std::string& path, std::vector<PngText>* texts = nullptr);
 

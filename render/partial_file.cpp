@@ -12,6 +12,8 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "render/descriptor.h"
+
 namespace medulla {
 
 std::runtime_error unwritable(const std::string& path) {
@@ -68,11 +70,9 @@ PartialFile::PartialFile(const std::string& target) : target_(resolveTarget(targ
   // Names left by killed runs are stepped over: O_EXCL never touches a file that somebody else made.
   for (int attempt = 0;; ++attempt) {
     path_ = besideTarget(target_, fmt::format(".{}-{}.part", ::getpid(), attempt));
-    const int descriptor = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, readAndWrite);
-    if (descriptor < 0 && errno != EEXIST) throw unwritable(target);
-    if (descriptor < 0) continue;
-    ::close(descriptor);
-    return;
+    const Descriptor made(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, readAndWrite));
+    if (made.isOpen()) return;
+    if (errno != EEXIST) throw unwritable(target);
   }
 }
 
@@ -83,6 +83,15 @@ PartialFile::~PartialFile() {
 void PartialFile::commit() {
   if (std::rename(path_.c_str(), target_.c_str()) != 0) throw unwritable(target_);
   path_.clear();
+}
+
+void writeFile(const std::string& path, std::string_view bytes) {
+  PartialFile file(path);
+  Descriptor to(::open(file.path().c_str(), O_WRONLY | O_CLOEXEC));
+  if (!to.isOpen()) throw unwritable(path);
+  writeAll(to, bytes, path);
+  if (!to.close()) throw unwritable(path);  // some file systems report a full disk only here
+  file.commit();
 }
 
 }  // namespace medulla

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "render/output_folder.h"
 
@@ -11,7 +12,8 @@ namespace medulla {
 std::runtime_error unwritable(const std::string& path);
 
 // A file beside its target that takes the target's name only when it is whole: TARGET.PID-N.part up to commit(), or
-// as much of the target's name as a name has room for.
+// as much of the target's name as a name has room for. That holds against whatever ends a program, not against a power
+// cut, for which every picture of a film would have to wait for the disk.
 // Destroyed before that it is removed, and an earlier file of that name stays as it was. What a symbolic link stands
 // for is replaced, not the link, also where there is nothing yet.
 class PartialFile {
@@ -32,5 +34,8 @@ class PartialFile {
   OutputFolder made_;
   std::string path_;
 };
+
+// A whole PartialFile in one call. Throws what that throws, and unwritable() where the system fails (disk full).
+void writeFile(const std::string& path, std::string_view bytes);
 
 }  // namespace medulla

@@ -35,8 +35,8 @@ namespace {
 constexpr std::uint8_t kSignature[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 constexpr int kMaxSide = 1 << 15;  // a header that claims more is broken, not a picture
 
-void appendBigEndian(std::vector<std::uint8_t>& out, std::uint32_t v) {
-  for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<std::uint8_t>(v >> shift));
+void appendBigEndian(std::string& out, std::uint32_t v) {
+  for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<char>(v >> shift & 0xff));
 }
 
 std::uint32_t bigEndian(const std::uint8_t* p) {
@@ -44,12 +44,11 @@ std::uint32_t bigEndian(const std::uint8_t* p) {
 }
 
 // Length, type, data, CRC over type and data (PNG specification, 5.3).
-void appendChunk(std::vector<std::uint8_t>& out, const char* type, const void* data, std::size_t size) {
+void appendChunk(std::string& out, const char* type, const void* data, std::size_t size) {
   appendBigEndian(out, static_cast<std::uint32_t>(size));
   const std::size_t start = out.size();
-  out.insert(out.end(), type, type + 4);
-  const auto* bytes = static_cast<const std::uint8_t*>(data);
-  out.insert(out.end(), bytes, bytes + size);
+  out.append(type, 4);
+  out.append(static_cast<const char*>(data), size);
   appendBigEndian(out, libdeflate_crc32(0, out.data() + start, out.size() - start));
 }
 
@@ -90,12 +89,12 @@ std::vector<PngText> readTexts(const std::vector<std::uint8_t>& file) {
 
 }  // namespace
 
-std::vector<std::uint8_t> encodePng(const Image& image, const std::vector<PngText>& texts) {
+std::string encodePng(const Image& image, const std::vector<PngText>& texts) {
   assert(image.width > 0 && image.height > 0 && image.pixels.size() == 4ul * image.width * image.height);
-  std::vector<std::uint8_t> out(kSignature, kSignature + sizeof kSignature), header;
+  std::string out(reinterpret_cast<const char*>(kSignature), sizeof kSignature), header;
   appendBigEndian(header, image.width);
   appendBigEndian(header, image.height);
-  for (const int v : {8, 6, 0, 0, 0}) header.push_back(static_cast<std::uint8_t>(v));  // 8 bits, RGBA, not interlaced
+  for (const int v : {8, 6, 0, 0, 0}) header.push_back(static_cast<char>(v));  // 8 bits, RGBA, not interlaced
   appendChunk(out, "IHDR", header.data(), header.size());
   const std::uint8_t perceptual = 0;
   appendChunk(out, "sRGB", &perceptual, 1);
@@ -111,13 +110,7 @@ std::vector<std::uint8_t> encodePng(const Image& image, const std::vector<PngTex
 }
 
 void writePng(const std::string& path, const Image& image, const std::vector<PngText>& texts) {
-  const std::vector<std::uint8_t> bytes = encodePng(image, texts);
-  PartialFile partial(path);
-  std::ofstream file(partial.path(), std::ios::binary);
-  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  file.close();
-  if (!file) throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
-  partial.commit();
+  writeFile(path, encodePng(image, texts));
 }
 
 Image readPng(const std::string& path, std::vector<PngText>* texts) {

@@ -216,6 +216,8 @@ TEST_F(LoadCase, MistakesNameFileAndLine) {
   folder.write("far.csv", "vertex\n10\n235\n");
   folder.write("nan.csv", "vertex,fx,fy,fz\n10,0,nan,0\n");
   EXPECT_EQ(refusal("<fix vertices='none.csv'/>"), "case.xml:4: list of vertices \"none.csv\" does not exist");
+  const std::string endless(300, 'a');  // what the system does not look for
+  EXPECT_EQ(refusal("<fix vertices='" + endless + "'/>"), endless + ": cannot be opened: File name too long");
   EXPECT_EQ(refusal("<fix vertices='far.csv'/>"),
             "far.csv:3: column vertex is '235', expected a whole number from 0 to 234");
   EXPECT_EQ(refusal("<fix plane='0 1 0 -5'/>"), "case.xml:4: no surface node of body \"pear\" lies in here");

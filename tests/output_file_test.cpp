@@ -2,15 +2,13 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include <csignal>
 
 #include "app/files/text_file.h"
 #include "render/output_folder.h"
 #include "tests/complaint.h"
+#include "tests/file_size_limit.h"
 #include "tests/temporary_folder.h"
 
 namespace medulla {
@@ -82,7 +80,7 @@ TEST(OutputFile, NeverTouchesATemporaryFileOfAnother) {
 TEST(OutputFile, ItsNameMayBeAsLongAsNamesMayBe) {
   const TemporaryFolder folder;
   const std::string name(255, 'n');
-  writeTextFile(folder / name, "text");
+  writeFile(folder / name, "text");
   EXPECT_EQ(readTextFile(folder / name), "text");
 }
 
@@ -103,7 +101,7 @@ TEST(OutputFile, MakesMissingFoldersAndLeavesNoneEmpty) {
   { const OutputFile dropped(folder / "a/b/run.csv"); }
   requireWritable({folder / "a/b/run.csv"});
   EXPECT_TRUE(folder.contents().empty());
-  writeTextFile(folder / "a/b/run.csv", "text");
+  writeFile(folder / "a/b/run.csv", "text");
   EXPECT_EQ(readTextFile(folder / "a/b/run.csv"), "text");
 }
 
@@ -134,20 +132,18 @@ TEST(OutputFile, TargetsThatCannotBeWrittenAreRefusedAtOnce) {
 TEST(OutputFile, AFullDiskIsReportedAndLeavesNothing) {
   const TemporaryFolder folder;
   folder.write("a.csv", "earlier");
-  // A limit on the size of files fails a write in the same way as a full disk.
-  const auto previous = std::signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  ::getrlimit(RLIMIT_FSIZE, &before);
-  const rlimit small{1 << 19, before.rlim_max};
-  ::setrlimit(RLIMIT_FSIZE, &small);
-  const std::string message = complaintOf([&] {
+  const std::string inPieces = complaintOf([&] {
+    const FileSizeLimit limit(1 << 19);
     OutputFile file(folder / "a.csv");
     for (int k = 0; k < 4; ++k) file.write(std::string(1 << 18, 'x'));
     file.commit();
   });
-  ::setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, previous);
-  EXPECT_EQ(message, folder / "a.csv: cannot be written: File too large");
+  const std::string atOnce = complaintOf([&] {
+    const FileSizeLimit limit(1 << 19);
+    writeFile(folder / "a.csv", std::string(1 << 20, 'x'));
+  });
+  EXPECT_EQ(inPieces, folder / "a.csv: cannot be written: File too large");
+  EXPECT_EQ(atOnce, inPieces);
   EXPECT_EQ(readTextFile(folder / "a.csv"), "earlier");
   EXPECT_EQ(folder.contents().size(), 1u);
 }

@@ -1,15 +1,14 @@
 #include "render/video_writer.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 
 #include "physics/model/surface_samples.h"
 #include "render/yuv.h"
 #include "tests/complaint.h"
+#include "tests/file_size_limit.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 
@@ -163,24 +162,6 @@ TEST_F(VideoWriterTest, FinishingCanBeBrokenOff) {
     EXPECT_EQ(filesInFolder(), 0u) << name;
   }
 }
-
-// No file may grow beyond a limit meanwhile: what is then written fails as on a full disk.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
 
 TEST_F(VideoWriterTest, AFullDiskIsToldAndLeavesNothing) {
   RandomSequence random{1};

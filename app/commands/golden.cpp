@@ -10,6 +10,7 @@
 #include "app/files/golden_report.h"
 #include "app/files/output_file.h"
 #include "app/files/text.h"
+#include "app/files/text_file.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
 #include "app/standard_streams.h"
@@ -125,7 +126,7 @@ GoldenResult compare(const Moment& moment, const std::string& scene, const std::
   GoldenResult r;
   r.name = moment.name;
   r.scene = scene;
-  if (!fs::exists(goldenPath)) {
+  if (!fileExists(goldenPath)) {
     r.verdict = fmt::format("{} does not exist: --update {} stores it", goldenPath, shellWord(scene));
     return r;
   }
@@ -188,11 +189,11 @@ Update updateOf(const std::string& path, const GoldenOptions& options, const std
   const std::vector<Moment> moments = none ? std::vector<Moment>{} : renderMoments(path, options.context);
   for (const Moment& m : moments) {
     if (!whole && std::find(options.update.begin(), options.update.end(), m.name) == options.update.end()) continue;
-    const std::vector<std::uint8_t> bytes = encodePng(
-        m.image,
-        {{kSceneKey, scene}, {kRendererKey, renderedWith}, {kProcessorKey, processorName()}, {kStateKey, m.state()}});
     update.written.emplace_back(fmt::format("{}/{}.png", update.folder, m.name),
-                                std::string(bytes.begin(), bytes.end()));
+                                encodePng(m.image, {{kSceneKey, scene},
+                                                    {kRendererKey, renderedWith},
+                                                    {kProcessorKey, processorName()},
+                                                    {kStateKey, m.state()}}));
   }
   if (!whole) return update;
   for (const StrayImage& image : formerMoments(path, update.folder, namesOf(moments)))
@@ -204,7 +205,7 @@ Update updateOf(const std::string& path, const GoldenOptions& options, const std
 void apply(const Update& update) {
   const OutputFolder made(update.folder);
   for (const auto& [path, bytes] : update.written) {
-    writeTextFile(path, bytes);
+    writeFile(path, bytes);
     fmt::print("{} written\n", path);
   }
   for (const std::string& path : update.removed) {
@@ -306,7 +307,7 @@ void compareRest(const std::vector<std::string>& scenes, const GoldenOptions& op
       });
       if (!image.fault.empty())
         addFailure(image.name, "", image.fault, comparison);
-      else if (!image.scene.empty() && !fs::exists(image.scene) && !isCompared)
+      else if (!image.scene.empty() && !fileExists(image.scene) && !isCompared)
         addFailure(image.name, image.scene, fmt::format("its scene {} does not exist", image.scene), comparison);
       else if (!isCompared)
         tell("note: {} is compared with nothing: {}\n", image.path,

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "app/files/output_file.h"
+#include "app/files/text_file.h"
 
 namespace medulla {
 
@@ -75,7 +76,7 @@ std::vector<std::string> scenesNamedIn(const std::string& folder) {
 
 std::vector<std::string> chosenScenes(const GoldenOptions& options) {
   for (const std::string& scene : options.scenes)
-    if (!fs::exists(scene)) throw std::runtime_error(scene + ": does not exist, expected a scene file (XML)");
+    if (!fileExists(scene)) throw std::runtime_error(scene + ": does not exist, expected a scene file (XML)");
   if (!options.scenes.empty()) return options.scenes;
   if (std::vector<std::string> updated = updatedScenes(options); !updated.empty()) return updated;
   if (!options.folder.empty()) return scenesNamedIn(options.folder);

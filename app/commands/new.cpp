@@ -7,6 +7,7 @@
 #include "app/files/model_file.h"
 #include "app/files/output_file.h"
 #include "app/files/text.h"
+#include "app/files/text_file.h"
 #include "app/standard_streams.h"
 #include "app/starter_scene.h"
 #include "haptics/tool_input.h"
@@ -33,7 +34,7 @@ int runNew(const NewOptions& options) {
   const auto file = [&](const char* ending) { return (folder / (name + ending)).string(); };
   const std::string scenePath = file(".xml"), trajectoryPath = file(".csv"), modelPath = file(".model.xml");
   const auto requireFree = [](const std::string& path) {
-    if (fs::exists(path)) throw std::runtime_error(path + ": exists already; nothing was written");
+    if (fileExists(path)) throw std::runtime_error(path + ": exists already; nothing was written");
   };
   requireWithinReach(options.build.meshes[0], metresPerUnit(options.build.unit));
   const OutputFolder made(options.folder);
@@ -41,16 +42,15 @@ int runNew(const NewOptions& options) {
   for (const std::string& path : {scenePath, trajectoryPath, modelPath}) requireFree(path);
   BuildOptions build = options.build;
   build.output = modelPath;
-  std::vector<std::string> written;
+  std::vector<std::string> written{modelPath};  // or not yet
   try {
     runBuild(build);
-    written.push_back(modelPath);
     const StarterScene starter = starterScene(name, readModel(modelPath));
     const std::pair<std::string, std::string> files[] = {{trajectoryPath, starter.trajectory},
                                                          {scenePath, starter.scene}};
     for (const auto& [path, text] : files) {
       requireFree(path);
-      writeTextFile(path, text);
+      writeFile(path, text);
       written.push_back(path);
     }
     fmt::print("scene {}\n", scenePath);

@@ -40,7 +40,7 @@ int runPlot(const PlotOptions& options) {
   if (!picture)
     throw std::runtime_error(
         fmt::format("{}: gnuplot is not installed, expected it (Debian package gnuplot-nox)", options.output));
-  writeTextFile(options.output, *picture);
+  writeFile(options.output, *picture);
   fmt::print("file {}\n", std::filesystem::absolute(path).lexically_normal().string());
   return 0;
 }

@@ -46,7 +46,7 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
 static std::uint64_t runHash(const LoadedScene& loaded, std::uint64_t scene) {
   std::uint64_t hash = contentHash(fmt::format("{} {} {:016x}", MEDULLA_VERSION, MEDULLA_MOTION_SOURCES, scene));
   for (const std::string& path : inputFiles(loaded.scene))
-    if (path != loaded.scene.path && std::filesystem::exists(path)) hash = contentHash(readTextFile(path), hash);
+    if (path != loaded.scene.path && fileExists(path)) hash = contentHash(readBytes(path), hash);
   return hash;
 }
 

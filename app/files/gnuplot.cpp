@@ -11,10 +11,11 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "app/files/output_file.h"
 #include "app/files/text.h"
 #include "app/interrupt.h"
 #include "app/standard_streams.h"
+#include "render/descriptor.h"
+#include "render/partial_file.h"
 
 extern char** environ;
 
@@ -23,45 +24,32 @@ namespace medulla {
 namespace {
 
 // A file in memory takes what a program says: a pipe nobody reads could fill and stop it.
-class MemoryFile {
- public:
-  explicit MemoryFile(const char* name) : descriptor_(memfd_create(name, MFD_CLOEXEC)) {
-    if (descriptor_ < 0) throw std::runtime_error(std::string("no file in memory: ") + std::strerror(errno));
-  }
-  ~MemoryFile() { close(descriptor_); }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-  int descriptor() const { return descriptor_; }
-  void write(const std::string& text) const {
-    for (std::size_t done = 0; done < text.size();) {
-      const ssize_t n = ::pwrite(descriptor_, text.data() + done, text.size() - done, static_cast<off_t>(done));
-      if (n < 0) throw std::runtime_error(std::string("no room in memory: ") + std::strerror(errno));
-      done += static_cast<std::size_t>(n);
-    }
-  }
-  std::string text() const {
-    std::string out(static_cast<std::size_t>(lseek(descriptor_, 0, SEEK_END)), '\0');
-    const ssize_t n = pread(descriptor_, out.data(), out.size(), 0);
-    out.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
-    return out;
-  }
+Descriptor memoryFile(const char* name) {
+  Descriptor file(memfd_create(name, MFD_CLOEXEC));
+  if (!file.isOpen()) throw std::runtime_error(std::string("no file in memory: ") + std::strerror(errno));
+  return file;
+}
 
- private:
-  int descriptor_;
-};
+std::string contentOf(const Descriptor& file) {
+  std::string out(static_cast<std::size_t>(lseek(file.value(), 0, SEEK_END)), '\0');
+  const ssize_t n = pread(file.value(), out.data(), out.size(), 0);
+  out.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
+  return out;
+}
 
 }  // namespace
 
 std::optional<std::string> runGnuplot(const std::string& script) {
-  const MemoryFile input("script"), picture("chart"), complaints("gnuplot-errors");
-  input.write(script);
-  std::string program = "gnuplot";
-  char* const argv[] = {program.data(), nullptr};
+  const Descriptor input = memoryFile("script"), picture = memoryFile("chart"), complaints = memoryFile("complaints");
+  writeAll(input, script, "a file in memory");
+  lseek(input.value(), 0, SEEK_SET);
+  std::string program = "gnuplot", options = "--default-settings";  // whatever the user's own are
+  char* const argv[] = {program.data(), options.data(), nullptr};
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, input.descriptor(), STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, picture.descriptor(), STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, complaints.descriptor(), STDERR_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, input.value(), STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, picture.value(), STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, complaints.value(), STDERR_FILENO);
   pid_t child = -1;
   const int failure = posix_spawnp(&child, program.c_str(), &actions, nullptr, argv, environ);
   posix_spawn_file_actions_destroy(&actions);
@@ -73,8 +61,8 @@ std::optional<std::string> runGnuplot(const std::string& script) {
   while (ended < 0 && errno == EINTR);
   checkInterrupt();  // which ends both where it comes from the keyboard
   if (ended != child) throw std::runtime_error(std::string("gnuplot's end cannot be seen: ") + std::strerror(errno));
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return picture.text();
-  std::string complaint = complaints.text();
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return contentOf(picture);
+  std::string complaint = contentOf(complaints);
   while (!complaint.empty() && (complaint.back() == '\n' || complaint.back() == ' ')) complaint.pop_back();
   complaint.erase(0, complaint.rfind('\n') + 1);
   throw std::runtime_error("gnuplot failed: " + (complaint.empty() ? "it gave no reason" : complaint));
@@ -82,9 +70,9 @@ std::optional<std::string> runGnuplot(const std::string& script) {
 
 void drawByGnuplot(const std::string& stem, const std::string& script) {
   const std::string source = stem + ".gnuplot", picture = stem + ".svg";
-  writeTextFile(source, script);
+  writeFile(source, script);
   if (const std::optional<std::string> svg = runGnuplot(script)) {
-    writeTextFile(picture, *svg);
+    writeFile(picture, *svg);
   } else {
     tell("no {}: gnuplot is not installed (Debian package gnuplot-nox); then: gnuplot {} > {}\n",
          std::filesystem::path(picture).filename().string(), shellWord(source), shellWord(picture));

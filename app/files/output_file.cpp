@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -13,59 +12,32 @@
 
 namespace medulla {
 
-void writeAll(int descriptor, std::string_view text, const std::string& path) {
-  while (!text.empty()) {
-    const ssize_t count = ::write(descriptor, text.data(), text.size());
-    if (count < 0 && errno != EINTR) throw unwritable(path);
-    if (count > 0) text.remove_prefix(static_cast<std::size_t>(count));
-  }
-}
-
 FolderLock::FolderLock(const std::string& folder, const std::string& name, const std::string& taken)
-    : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-  if (descriptor_ >= 0 && ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
-  const int error = errno;
-  if (descriptor_ >= 0) ::close(descriptor_);
-  throw inputError(name, 0, error == EWOULDBLOCK ? taken : std::string("cannot be locked: ") + std::strerror(error));
-}
-
-FolderLock::~FolderLock() {
-  ::close(descriptor_);
+    : folder_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (folder_.isOpen() && ::flock(folder_.value(), LOCK_EX | LOCK_NB) == 0) return;
+  throw inputError(name, 0, errno == EWOULDBLOCK ? taken : std::string("cannot be locked: ") + std::strerror(errno));
 }
 
 OutputFile::OutputFile(const std::string& path)
-    : path_(path), file_(path), descriptor_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
-  if (descriptor_ < 0) throw unwritable(path_);
-}
-
-OutputFile::~OutputFile() {
-  if (descriptor_ >= 0) ::close(descriptor_);
+    : path_(path), file_(path), to_(::open(file_.path().c_str(), O_WRONLY | O_CLOEXEC)) {
+  if (!to_.isOpen()) throw unwritable(path_);
 }
 
 void OutputFile::flush() {
-  writeAll(descriptor_, buffer_, path_);
+  writeAll(to_, buffer_, path_);
   buffer_.clear();
 }
 
-void OutputFile::write(const std::string& text) {
+void OutputFile::write(const std::string& bytes) {
   constexpr std::size_t flushAt = 1 << 18;  // bytes: few system calls, little memory
-  buffer_ += text;
+  buffer_ += bytes;
   if (buffer_.size() >= flushAt) flush();
 }
 
 void OutputFile::commit() {
   flush();
-  const int descriptor = descriptor_;
-  descriptor_ = -1;
-  // Some file systems report a full disk only here.
-  if (::close(descriptor) != 0) throw unwritable(path_);
+  if (!to_.close()) throw unwritable(path_);
   file_.commit();
-}
-
-void writeTextFile(const std::string& path, const std::string& text) {
-  OutputFile file(path);
-  file.write(text);
-  file.commit();
 }
 
 // Absolute first: of a path that starts with nothing that exists, weakly_canonical() leaves "a.csv" and "./a.csv" two.

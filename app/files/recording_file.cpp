@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numbers>
 
 #include "app/files/csv_rows.h"
@@ -253,7 +252,7 @@ Trajectory parseRecording(std::string_view text, const std::string& name, const 
 }
 
 Trajectory readRecording(const RecordingMap& map) {
-  if (!std::filesystem::exists(map.recordingPath))
+  if (!fileExists(map.recordingPath))
     throw inputError(map.path, map.line, fmt::format("recording \"{}\" does not exist", map.recordingPath));
   return parseRecording(readTextFile(map.recordingPath), map.recordingPath, map);
 }

@@ -84,7 +84,7 @@ std::vector<ReferenceRun> parseReferenceRuns(std::string_view text, const std::s
 Reference readReference(const std::string& path, const SoftBodyModel& model) {
   Reference out = parseReference(readTextFile(path), path, model);
   const std::string times = std::filesystem::path(path).replace_extension(".time").string();
-  if (std::filesystem::exists(times)) out.runs = parseReferenceRuns(readTextFile(times), times);
+  if (fileExists(times)) out.runs = parseReferenceRuns(readTextFile(times), times);
   return out;
 }
 

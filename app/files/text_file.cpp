@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -15,25 +16,11 @@
 
 #include "app/files/input_error.h"
 #include "app/interrupt.h"
+#include "render/descriptor.h"
 
 namespace medulla {
 
 namespace {
-
-class Descriptor {
- public:
-  // Not blocking: opening a pipe would wait for its writer, whatever signals come.
-  explicit Descriptor(const std::string& path) : value_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
-  ~Descriptor() {
-    if (value_ >= 0) ::close(value_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int value() const { return value_; }
-
- private:
-  int value_;
-};
 
 using FileNumber = std::pair<dev_t, ino_t>;
 
@@ -47,9 +34,9 @@ std::optional<std::string> remembered(const FileNumber& pipe) {
   return found == pipesRead.end() ? std::nullopt : std::optional(found->second);
 }
 
-void remember(const FileNumber& pipe, const std::string& text) {
+void remember(const FileNumber& pipe, const std::string& bytes) {
   const std::lock_guard lock(pipesGuard);
-  pipesRead[pipe] = text;
+  pipesRead[pipe] = bytes;
 }
 
 // The file's number where it is a pipe. Anything but that and a regular file is refused: a device may have no end.
@@ -71,7 +58,7 @@ void waitForInput(const Descriptor& pipe) {
 // To its end.
 std::string readAll(const Descriptor& file, bool pipe, const std::string& path) {
   constexpr std::size_t kPipeMost = 1U << 30;
-  std::string text;
+  std::string bytes;
   char block[1 << 16];
   for (;;) {
     if (pipe) waitForInput(file);
@@ -79,27 +66,38 @@ std::string readAll(const Descriptor& file, bool pipe, const std::string& path) 
     if (count == 0) break;
     if (count < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (count < 0) throw inputError(path, 0, std::string("cannot be read: ") + std::strerror(errno));
-    text.append(block, static_cast<std::size_t>(count));
-    if (pipe && text.size() > kPipeMost) throw inputError(path, 0, "is a pipe of more than 1 GiB");
+    bytes.append(block, static_cast<std::size_t>(count));
+    if (pipe && bytes.size() > kPipeMost) throw inputError(path, 0, "is a pipe of more than 1 GiB");
     checkInterrupt();
   }
-  return text;
+  return bytes;
 }
 
 }  // namespace
 
-std::string readTextFile(const std::string& path) {
-  const Descriptor file(path);
-  if (file.value() < 0) throw inputError(path, 0, std::string("cannot be opened: ") + std::strerror(errno));
+bool fileExists(const std::string& path) {
+  std::error_code error;
+  return std::filesystem::status(path, error).type() != std::filesystem::file_type::not_found;
+}
+
+std::string readBytes(const std::string& path) {
+  // Not blocking: opening a pipe would wait for its writer, whatever signals come.
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!file.isOpen()) throw inputError(path, 0, std::string("cannot be opened: ") + std::strerror(errno));
   const std::optional<FileNumber> pipe = pipeNumber(file, path);
   if (pipe)
-    if (std::optional<std::string> text = remembered(*pipe)) return *text;
-  std::string text = readAll(file, pipe.has_value(), path);
+    if (std::optional<std::string> known = remembered(*pipe)) return *known;
+  std::string bytes = readAll(file, pipe.has_value(), path);
+  if (pipe) remember(*pipe, bytes);
+  return bytes;
+}
+
+std::string readTextFile(const std::string& path) {
+  std::string text = readBytes(path);
   constexpr std::string_view mark = "\xef\xbb\xbf";  // before UTF-8, as spreadsheets write it
   if (text.starts_with(mark)) text.erase(0, mark.size());
   if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
     throw inputError(path, 0, "is written in UTF-16, expected UTF-8 or ASCII");
-  if (pipe) remember(*pipe, text);
   return text;
 }
 

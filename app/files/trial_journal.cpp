@@ -38,13 +38,12 @@ TrialJournal::TrialJournal(std::string path, std::uint64_t run)
     : path_(std::move(path)),
       head_(fmt::format("# medulla stability {:016x}\n", run)),
       lock_(std::filesystem::absolute(path_).parent_path().string(), path_, "another run is filling it") {
-  if (std::filesystem::exists(path_)) read();
+  if (fileExists(path_)) read();
   writeAnew();  // without a row's beginning, and without trials of another run
 }
 
 TrialJournal::~TrialJournal() {
   if (known_.empty()) ::unlink(path_.c_str());
-  if (descriptor_ >= 0) ::close(descriptor_);
 }
 
 void TrialJournal::read() {
@@ -65,7 +64,12 @@ bool TrialJournal::find(StabilityPoint& point) const {
 }
 
 void TrialJournal::add(const StabilityPoint& point) {
-  writeAll(descriptor_, stabilityRow(point), path_);
+  try {
+    writeAll(rows_, stabilityRow(point), path_);
+  } catch (...) {
+    rows_.close();  // a row behind a half one would spoil the file
+    throw;
+  }
   known_[trialKey(point)] = point;
 }
 
@@ -77,10 +81,9 @@ void TrialJournal::forget(const std::vector<StabilityPoint>& done) {
 void TrialJournal::writeAnew() {
   std::string text = head_;
   for (const auto& [key, point] : known_) text += stabilityRow(point);
-  writeTextFile(path_, text);
-  if (descriptor_ >= 0) ::close(descriptor_);
-  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
-  if (descriptor_ < 0) throw unwritable(path_);
+  writeFile(path_, text);
+  rows_ = Descriptor(::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
+  if (!rows_.isOpen()) throw unwritable(path_);
 }
 
 }  // namespace medulla

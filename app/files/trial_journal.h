@@ -19,8 +19,6 @@ class TrialJournal {
   // where the file cannot be read or written, or another run keeps one in the same folder.
   TrialJournal(std::string path, std::uint64_t run);
   ~TrialJournal();  // without trials there is no file
-  TrialJournal(const TrialJournal&) = delete;
-  TrialJournal& operator=(const TrialJournal&) = delete;
 
   // Fills in how `point`'s trial ended. False where it is not known.
   bool find(StabilityPoint& point) const;
@@ -35,7 +33,7 @@ class TrialJournal {
 
   std::string path_, head_;
   FolderLock lock_;  // not of the file, which is replaced
-  int descriptor_ = -1;
+  Descriptor rows_;  // at the file's end
   std::map<std::string, StabilityPoint> known_;
 };
 
