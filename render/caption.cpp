@@ -45,7 +45,7 @@ std::vector<std::string> wrapped(const std::string& text, float height, float wi
 
 }  // namespace
 
-void drawCaption(const std::string& text, int width, Image& image) {
+bool drawCaption(const std::string& text, int width, Image& image) {
   constexpr float kHighest = 0.3f;  // of the picture
   constexpr glm::vec3 kPaper{0.004f, 0.005f, 0.007f}, kLetters{0.85f, 0.86f, 0.88f};
   const float margin = std::round(0.03f * float(image.height));
@@ -59,14 +59,14 @@ void drawCaption(const std::string& text, int width, Image& image) {
   }
   const glm::vec2 size(widestOf(lines, height), height * (1 + kLeading * float(lines.size() - 1)));
   const glm::vec2 low(margin), high = low + size + 2 * kPad * height;
-  if (text.empty() || high.x > float(width) || high.y > std::max(kHighest * float(image.height), low.y + 3 * height))
-    return;
+  if (high.x > float(width) || high.y > std::max(kHighest * float(image.height), low.y + 3 * height)) return false;
   Ink ink(image, low, high);
   ink.fill(low, high);
   ink.apply(kPaper, 0.72f);
   for (std::size_t k = 0; k < lines.size(); ++k)
     writeText(lines[k], low + kPad * height + glm::vec2(0, kLeading * height * float(k)), height, ink);
   ink.apply(kLetters, 1);
+  return true;
 }
 
 }  // namespace medulla

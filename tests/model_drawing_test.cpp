@@ -201,7 +201,7 @@ TEST(Caption, FitsIntoPicturesOfAnySize) {
   for (const auto& [width, height] : {std::pair(320, 240), std::pair(1280, 720), std::pair(200, 400)}) {
     const Image before = blackImage(width, height);
     Image image = before;
-    drawCaption("gallbladder   3.40 s   grabbed", image.width, image);
+    EXPECT_TRUE(drawCaption("gallbladder   3.40 s   grabbed", image.width, image));
     int right = 0, bottom = 0;
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x)
@@ -214,10 +214,10 @@ TEST(Caption, FitsIntoPicturesOfAnySize) {
     EXPECT_LT(bottom, 0.15 * height);
   }
   Image narrow = blackImage(100, 240);  // than a word
-  drawCaption("cholecystectomy_rehearsal 3.40 s", narrow.width, narrow);
+  EXPECT_TRUE(drawCaption("cholecystectomy_rehearsal 3.40 s", narrow.width, narrow));
   EXPECT_NE(narrow.pixels, blackImage(100, 240).pixels);
   Image tiny = blackImage(16, 16);
-  drawCaption("not to be read", tiny.width, tiny);
+  EXPECT_FALSE(drawCaption("not to be read", tiny.width, tiny));
   EXPECT_EQ(tiny.pixels, blackImage(16, 16).pixels);
 }
 

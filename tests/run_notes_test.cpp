@@ -111,6 +111,15 @@ TEST_F(RunNotes, ACameraThatSeesNoBody) {
   EXPECT_EQ(notesOf(0.3), Notes{"note: no body is in sight of the camera in any picture"});
 }
 
+TEST_F(RunNotes, APictureThatIsTooSmallForItsCaption) {
+  const auto notesOf = [&](const char* size) {
+    return complaints(
+        run({"render", "own/organ.xml", "--still", "0.04", "--size", size, "--show", "caption", "-o", "still.png"}));
+  };
+  EXPECT_EQ(notesOf("320x240"), Notes{});
+  EXPECT_EQ(notesOf("32x32"), Notes{"note: 1 of 1 pictures are too small for their caption"});
+}
+
 TEST_F(RunNotes, StaticShapesThatBodiesPassThroughOrThatAreOfAnotherUnit) {
   const std::string text = read("own/organ.xml");
   const auto notesOf = [&](const std::string& shape, const std::string& contact) {

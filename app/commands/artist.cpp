@@ -179,7 +179,7 @@ void Artist::takePanel() {
   desk.begun.pop_front();
   times_.start("letters");
   if (sheet->chart) drawStripChart(*sheet->chart, desk.image);
-  if (!sheet->caption.empty()) drawCaption(sheet->caption, panelWidth_, desk.image);
+  if (!sheet->caption.empty() && !drawCaption(sheet->caption, panelWidth_, desk.image)) ++withoutCaption_;
   times_.start("hand over");
   desk.outputs.write(sheet->number, desk.image);
   ++drawn_;
@@ -250,6 +250,7 @@ void Artist::finish() {
   thread_.join();
   rethrow();
   if (drawn_ > 0 && !sawBody_) tell("note: no body is in sight of the camera in any picture\n");
+  if (withoutCaption_ > 0) tell("note: {} of {} pictures are too small for their caption\n", withoutCaption_, drawn_);
   for (const std::string& note : notes_) tell("note: {}\n", note);  // now that no bar is in the way
 }
 

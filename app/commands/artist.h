@@ -63,7 +63,7 @@ class Artist {
   bool ready_ = false, ended_ = false, abandoned_ = false;
   std::exception_ptr failure_;
   std::unique_ptr<Desk> desk_;  // the thread's; the caller composes with it
-  int drawn_ = 0;
+  int drawn_ = 0, withoutCaption_ = 0;
   StageTimes::Stage encoding_;
   std::vector<std::string> notes_;
   bool sawBody_ = false;
