@@ -6,6 +6,7 @@
 
 #include "app/scene_view.h"
 #include "physics/model/attachment.h"
+#include "render/across.h"
 #include "render/looks.h"
 
 namespace medulla {
@@ -41,6 +42,11 @@ struct CarriedLink {
   Vector3d at(double along) const { return blendPoint(end[0], end[1], along) + 0.5 * along * (1 - along) * bow; }
 };
 
+// A point of the model at rest, as its sphere carries it.
+Vector3d carriedPoint(const FillingSphere& sphere, const SpherePose& pose, const Vector3d& rest) {
+  return pose.position + pose.worldFromSphere * (rest - sphere.restFrame);
+}
+
 CarriedLink carriedLink(const BodyDescription& body, const BodyFrame& frame, const ElasticLink& link) {
   const SoftBodyModel& model = *body.model;
   const FillingSphere* spheres[] = {&model.spheres[link.sphere0], &model.spheres[link.sphere1]};
@@ -51,9 +57,8 @@ CarriedLink carriedLink(const BodyDescription& body, const BodyFrame& frame, con
   rest.col(2) = rest.col(0).cross(rest.col(1));
   CarriedLink out;
   for (int k = 0; k < 2; ++k) {
-    const Eigen::Matrix3d worldFromSphere = poses[k]->worldFromSphere.toRotationMatrix();
-    out.end[k] = poses[k]->position + worldFromSphere * (spheres[k]->restLinkEnd - spheres[k]->restFrame);
-    out.worldFromLink[k] = worldFromSphere * rest;
+    out.end[k] = carriedPoint(*spheres[k], *poses[k], spheres[k]->restLinkEnd);
+    out.worldFromLink[k] = poses[k]->worldFromSphere * rest;
   }
   out.radius = std::min(spheres[0]->radius, spheres[1]->radius);
   if (body.links != LinkModel::beam) return out;
@@ -77,7 +82,7 @@ CarriedLink carriedLink(const BodyDescription& body, const BodyFrame& frame, con
       const FillingSphere& sphere = model.spheres[frames[k]];
       const SpherePose& pose = frame.spheres[frames[k]];
       worldFromFrame = pose.worldFromSphere.toRotationMatrix();
-      out.end[k] = pose.position + worldFromFrame * (*points[k] - sphere.restFrame);
+      out.end[k] = carriedPoint(sphere, pose, *points[k]);
       out.radius = std::min(out.radius, sphere.radius);
     }
     out.worldFromLink[k] = worldFromFrame * link.axes.transpose();
@@ -102,8 +107,7 @@ Vector3d carriedBySphere(const SoftBodyModel& model, const BodyFrame& frame, con
     const double distance = (model.spheres[i].restFrame - rest).squaredNorm();
     if (distance < (model.spheres[nearest].restFrame - rest).squaredNorm()) nearest = i;
   }
-  const SpherePose& pose = frame.spheres[nearest];
-  return pose.position + pose.worldFromSphere * (rest - model.spheres[nearest].restFrame);
+  return carriedPoint(model.spheres[nearest], frame.spheres[nearest], rest);
 }
 
 void drawSkeleton(const SoftBodyModel& model, const BodyFrame& frame, float height, Drawing& out) {
@@ -177,7 +181,7 @@ void drawFrames(const CarriedLink& link, float length, Drawing& out) {
 }  // namespace
 
 Eigen::Vector3d ballCentre(const FillingSphere& sphere, const SpherePose& pose) {
-  return pose.position + pose.worldFromSphere * (sphere.restBallCentre - sphere.restFrame);
+  return carriedPoint(sphere, pose, sphere.restBallCentre);
 }
 
 void drawBodyModel(const SceneBody& body, const BodyFrame& frame, const Shown& shown, float height, Drawing& out) {
@@ -211,9 +215,7 @@ static std::vector<Segment> coil(glm::vec3 a, glm::vec3 b, float radius, float w
   constexpr float kLead = 0.12f;  // share of the length in which the coil widens at either end
   std::vector<Segment> out;
   if (a == b) return out;
-  const glm::vec3 along = b - a, w = glm::normalize(along);
-  const glm::vec3 aside = std::abs(w.x) < 0.7f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
-  const glm::vec3 u = glm::normalize(glm::cross(aside, w)), v = glm::cross(w, u);
+  const glm::vec3 along = b - a, w = glm::normalize(along), u = across(w), v = glm::cross(w, u);
   glm::vec3 before = a;
   for (int k = 1; k <= kPieces; ++k) {
     const float s = float(k) / kPieces, angle = 2 * std::numbers::pi_v<float> * float(k) / kPiecesPerTurn;

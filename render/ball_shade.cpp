@@ -89,7 +89,7 @@ void BallShade::bake(const SceneMesh& mesh, const Balls& atRest) {
   if (balls_.empty()) return;
   for (std::uint32_t p = 0; p < mesh.parts.size(); ++p) {
     const MeshPart& part = mesh.parts[p];
-    for (std::uint32_t i = part.firstVertex; !part.travels && i < part.firstVertex + part.vertexCount; ++i)
+    for (std::uint32_t i = part.firstVertex; !part.travels && i < part.endVertex(); ++i)
       left_[i] = leftAt(mesh.position[i], mesh.normal[i], p);
   }
 }
@@ -101,7 +101,7 @@ void BallShade::apply(const Balls& balls, vec3 eye, SceneMesh& mesh) {
   if (balls_.empty()) return;
   for (std::uint32_t p = 0; p < mesh.parts.size(); ++p) {
     const MeshPart& part = mesh.parts[p];
-    for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+    for (std::uint32_t i = part.firstVertex; i < part.endVertex(); ++i) {
       const vec3 toEye = eye - mesh.position[i];
       if (glm::dot(mesh.normal[i], toEye) < kAway * glm::length(toEye)) continue;
       const float left = leftAt(mesh.position[i], mesh.normal[i], p);

@@ -49,7 +49,7 @@ void sortByVariant(const SceneMesh& mesh, const VisibleTriangles& seen, const Ve
     const auto side = float(part.look->detail.side);
     for (auto& levels : out.byVariant)
       for (auto& list : levels) list.clear();
-    for (std::uint32_t k = visible.firstIndex; k < visible.firstIndex + visible.indexCount; k += 3) {
+    for (std::uint32_t k = visible.firstIndex; k < visible.endIndex(); k += 3) {
       const std::uint32_t* t = &seen.index[k];
       const Shade shade = shadow && !part.instrument ? shadeOf(*part.look, seen, lit, *shadow, t) : Shade::lit;
       const bool glinting = lit.glinting[t[0]] || lit.glinting[t[1]] || lit.glinting[t[2]];

@@ -9,6 +9,7 @@
 #include <glm/gtc/type_ptr.hpp>
 #include <numbers>
 
+#include "render/across.h"
 #include "render/shaders.h"
 
 namespace medulla {
@@ -160,9 +161,7 @@ static glm::vec4 rowOf(int k, glm::vec3 x, glm::vec3 y, glm::vec3 z, glm::vec3 o
 
 // Places what reaches from 0 to 1 along z. a and b differ.
 ModelView::Instance ModelView::rodInstance(glm::vec3 a, glm::vec3 b, float radius, glm::vec4 colour) {
-  const glm::vec3 along = b - a, w = glm::normalize(along),
-                  aside = std::abs(w.x) < 0.7f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
-  const glm::vec3 x = radius * glm::normalize(glm::cross(aside, w)), y = glm::cross(w, x);
+  const glm::vec3 along = b - a, w = glm::normalize(along), x = radius * across(w), y = glm::cross(w, x);
   return {{rowOf(0, x, y, along, a), rowOf(1, x, y, along, a), rowOf(2, x, y, along, a)}, colour};
 }
 

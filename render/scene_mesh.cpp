@@ -29,11 +29,11 @@ void SceneMesh::resizeVertices(std::size_t count) {
 }
 
 void computeNormals(SceneMesh& mesh, const MeshPart& part) {
-  const std::uint32_t last = part.firstVertex + part.vertexCount;
+  const std::uint32_t last = part.endVertex();
   std::vector<glm::vec3>& around = mesh.tangent;  // scratch: the tangents follow
   std::fill_n(mesh.normal.begin() + part.firstVertex, part.vertexCount, glm::vec3(0));
   std::fill_n(around.begin() + part.firstVertex, part.vertexCount, glm::vec3(0));
-  for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
+  for (std::uint32_t k = part.firstIndex; k < part.endIndex(); k += 3) {
     const std::uint32_t a = mesh.index[k], b = mesh.index[k + 1], c = mesh.index[k + 2];
     const glm::vec3 pa = mesh.position[a], pb = mesh.position[b], pc = mesh.position[c], sum = pa + pb + pc;
     const glm::vec3 n = glm::cross(pb - pa, pc - pa);
@@ -60,7 +60,7 @@ float spacingOf(const SceneMesh& mesh, std::size_t i) {
 // Where there is no relief to speak of, nobody sees which way it runs: tangents that turn with the texture from vertex
 // to vertex would crumple the highlights between them.
 static void computeEvenTangents(SceneMesh& mesh, const MeshPart& part) {
-  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+  for (std::uint32_t i = part.firstVertex; i < part.endVertex(); ++i) {
     const glm::vec3 n = mesh.normal[i];
     mesh.tangent[i] = normalizedOr(glm::vec3(1, 0, 0) - n * n.x, {0, 1, 0});
   }
@@ -74,14 +74,14 @@ static bool hasRelief(const MeshPart& part) {
 void computeTangents(SceneMesh& mesh, const MeshPart& part) {
   if (!hasRelief(part)) return computeEvenTangents(mesh, part);
   std::fill_n(mesh.tangent.begin() + part.firstVertex, part.vertexCount, glm::vec3(0));
-  for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
+  for (std::uint32_t k = part.firstIndex; k < part.endIndex(); k += 3) {
     const std::uint32_t a = mesh.index[k], b = mesh.index[k + 1], c = mesh.index[k + 2];
     const glm::vec2 ub = mesh.uv[b] - mesh.uv[a], uc = mesh.uv[c] - mesh.uv[a];
     const float area = ub.x * uc.y - ub.y * uc.x;
     const glm::vec3 t = (mesh.position[b] - mesh.position[a]) * uc.y - (mesh.position[c] - mesh.position[a]) * ub.y;
     for (const std::uint32_t i : {a, b, c}) mesh.tangent[i] += area < 0 ? -t : t;
   }
-  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+  for (std::uint32_t i = part.firstVertex; i < part.endVertex(); ++i) {
     const glm::vec3 n = mesh.normal[i], t = mesh.tangent[i] - n * glm::dot(n, mesh.tangent[i]);
     const glm::vec3 aside = std::abs(n.x) < 0.9f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
     mesh.tangent[i] = normalizedOr(t, glm::normalize(aside - n * glm::dot(n, aside)));
@@ -101,7 +101,7 @@ void findSeams(SceneMesh& mesh, const MeshPart& part) {
   constexpr float kAgreeing = 0.5f;  // 60 degrees
   std::fill_n(mesh.seam.begin() + part.firstVertex, part.vertexCount, 0.f);
   if (!hasRelief(part)) return;  // even tangents disagree in two points alone
-  for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3)
+  for (std::uint32_t k = part.firstIndex; k < part.endIndex(); k += 3)
     for (int corner = 0; corner < 3; ++corner) {
       const std::uint32_t a = mesh.index[k + corner], b = mesh.index[k + (corner + 1) % 3];
       if (agreement(mesh, a, b) < kAgreeing) mesh.seam[a] = mesh.seam[b] = 1;

@@ -8,10 +8,17 @@
 
 namespace medulla {
 
-// A range of vertices and triangles of SceneMesh that shares a look.
-struct MeshPart {
-  const Look* look = nullptr;
+// Of vertices, and of triangles by the places of their corners in an index.
+struct MeshRange {
   std::uint32_t firstVertex = 0, vertexCount = 0, firstIndex = 0, indexCount = 0;
+
+  std::uint32_t endVertex() const { return firstVertex + vertexCount; }
+  std::uint32_t endIndex() const { return firstIndex + indexCount; }
+};
+
+// A range of SceneMesh that shares a look.
+struct MeshPart : MeshRange {
+  const Look* look = nullptr;
   bool moving = false;   // drawn from given positions in this picture
   bool travels = false;  // SurfaceShape
   bool instrument = false;

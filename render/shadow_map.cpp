@@ -86,7 +86,7 @@ void renderShadowMap(const SceneMesh& mesh, const LightView& light, ShadowMap& s
   s.map.clear();
   for (const MeshPart& part : mesh.parts) {
     if (!part.look->castsShadow) continue;
-    for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
+    for (std::uint32_t k = part.firstIndex; k < part.endIndex(); k += 3) {
       const glm::vec3 a = s.texel[mesh.index[k]], b = s.texel[mesh.index[k + 1]], c = s.texel[mesh.index[k + 2]];
       const int behind = isBehind(a) + isBehind(b) + isBehind(c);
       if (behind == 0) s.map.rasterize(a, b, c);

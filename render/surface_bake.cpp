@@ -5,6 +5,7 @@
 #include <numeric>
 #include <optional>
 
+#include "render/across.h"
 #include "render/depth_map.h"
 #include "render/noise.h"
 
@@ -18,7 +19,7 @@ using glm::vec3;
 float meanRadius(const SceneMesh& mesh, const MeshPart& part) {
   double volume = 0, area = 0;
   const vec3 origin = part.vertexCount ? mesh.position[part.firstVertex] : vec3(0);
-  for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
+  for (std::uint32_t k = part.firstIndex; k < part.endIndex(); k += 3) {
     const vec3 a = mesh.position[mesh.index[k]] - origin, b = mesh.position[mesh.index[k + 1]] - origin,
                c = mesh.position[mesh.index[k + 2]] - origin;
     volume += glm::dot(a, glm::cross(b, c)) / 6;
@@ -103,7 +104,7 @@ void smoothOverEdges(const SceneMesh& mesh, std::size_t first, std::size_t last,
 
 template <class Value>
 void smoothOverPart(const SceneMesh& mesh, const MeshPart& part, int passes, std::vector<Value>& value) {
-  smoothOverEdges(mesh, part.firstIndex, part.firstIndex + part.indexCount, part.firstVertex, passes, value);
+  smoothOverEdges(mesh, part.firstIndex, part.endIndex(), part.firstVertex, passes, value);
 }
 
 bool occludes(const MeshPart& part) {
@@ -121,7 +122,7 @@ using Parts = std::vector<const MeshPart*>;
 template <class Visit>
 void visitVertices(const Parts& parts, const Visit& visit) {
   for (const MeshPart* part : parts)
-    for (std::size_t i = part->firstVertex; i < part->firstVertex + part->vertexCount; ++i) visit(i, *part);
+    for (std::size_t i = part->firstVertex; i < part->endVertex(); ++i) visit(i, *part);
 }
 
 // Orthographic depth map of these parts seen against `direction`, and how much light each of their vertices gets along
@@ -129,8 +130,7 @@ void visitVertices(const Parts& parts, const Visit& visit) {
 // thickness).
 void gatherDirection(const SceneMesh& mesh, const Parts& parts, vec3 centre, float radius, vec3 direction,
                      DepthMap& map, std::vector<vec3>& texel, Gathered& sum) {
-  const vec3 aside = std::abs(direction.x) < 0.7f ? vec3(1, 0, 0) : vec3(0, 1, 0);
-  const vec3 right = glm::normalize(glm::cross(aside, direction)), up = glm::cross(direction, right);
+  const vec3 right = across(direction), up = glm::cross(direction, right);
   const float scale = 0.5f / radius;
   visitVertices(parts, [&](std::size_t i, const MeshPart&) {
     const vec3 p = mesh.position[i] - centre;
@@ -140,7 +140,7 @@ void gatherDirection(const SceneMesh& mesh, const Parts& parts, vec3 centre, flo
   map.clear();
   for (const MeshPart* part : parts) {
     if (!occludes(*part)) continue;
-    for (std::uint32_t k = part->firstIndex; k < part->firstIndex + part->indexCount; k += 3)
+    for (std::uint32_t k = part->firstIndex; k < part->endIndex(); k += 3)
       map.rasterize(texel[mesh.index[k]], texel[mesh.index[k + 1]], texel[mesh.index[k + 2]]);
   }
   const float bias = 2.5f / kMapSide;  // two and a half texels
@@ -198,7 +198,7 @@ glm::vec2 stretchOf(const SceneMesh& mesh, const std::uint32_t* t) {
 // unrolled coordinates stretch the texture or squeeze it; vessels would show there as blots and hairs.
 void bakeDetail(SceneMesh& mesh, const MeshPart& part) {
   std::vector<float> sum(part.vertexCount, 0.f), weight = sum;
-  for (std::size_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
+  for (std::size_t k = part.firstIndex; k < part.endIndex(); k += 3) {
     const glm::vec2 stretch = stretchOf(mesh, &mesh.index[k]) / part.look->detailScale;
     if (!std::isfinite(stretch.x) || !std::isfinite(stretch.y)) continue;  // a triangle without area
     const float share = smoothStep(0.2f, 0.45f, stretch.y) * (1 - smoothStep(2.5f, 4.f, stretch.x));
@@ -253,7 +253,7 @@ void bakeAlbedo(SceneMesh& mesh, const MeshPart& part) {
   const Look& look = *part.look;
   const Bounds bounds = boundsOf(mesh, part);
   const vec3 extent = glm::max(bounds.high - bounds.low, vec3(1e-6f));
-  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+  for (std::uint32_t i = part.firstVertex; i < part.endVertex(); ++i) {
     const vec3 p = mesh.position[i], inBox = (p - bounds.low) / extent;
     const float coarse = fractalNoise(p * look.mottleFrequency + 3.f);
     const float middle = fractalNoise(p * look.mottleFrequency * 3.f + 9.f);

@@ -137,7 +137,7 @@ void halveEdges(Work& work, std::vector<std::uint32_t>& index, std::vector<std::
 bool mayBeLong(const SceneMesh& mesh, const MeshPart& part, const Viewpoint& v) {
   if (part.instrument) return false;
   float nearest = std::numeric_limits<float>::infinity();
-  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
+  for (std::uint32_t i = part.firstVertex; i < part.endVertex(); ++i)
     nearest = std::min(nearest, glm::length(mesh.position[i] - v.position));
   const float length = (part.moving ? 2 : 1) * part.longestEdge;
   const float corner = v.tangent * std::sqrt(1 + v.aspect * v.aspect),
@@ -164,7 +164,7 @@ void markSharp(Work& work, std::uint32_t first, const std::vector<std::uint32_t>
 
 float longestEdge(const SceneMesh& mesh, const MeshPart& part) {
   float most = 0;
-  for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3)
+  for (std::uint32_t k = part.firstIndex; k < part.endIndex(); k += 3)
     for (int e = 0; e < 3; ++e) {
       const vec3 d = mesh.position[mesh.index[k + e]] - mesh.position[mesh.index[k + (e + 1) % 3]];
       most = std::max(most, glm::dot(d, d));
@@ -185,7 +185,7 @@ bool tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight,
   for (MeshPart part : mesh.parts) {
     const auto first = std::uint32_t(out.position.size()), firstIndex = std::uint32_t(out.index.size());
     index.clear();
-    for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; ++k)
+    for (std::uint32_t k = part.firstIndex; k < part.endIndex(); ++k)
       index.push_back(mesh.index[k] - part.firstVertex + first);
     appendVertices(mesh, part, out);
     for (std::size_t i = first; i < out.position.size(); ++i)

@@ -10,7 +10,7 @@ namespace medulla {
 void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part) {
   // Full effect of stretch at this share of area gained, or lost; of a fold per slope.
   constexpr float kStretch = 1.8f, kSqueeze = 0.8f, kFold = 1.6f, kDarkest = 0.55f;
-  for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+  for (std::uint32_t i = part.firstVertex; i < part.endVertex(); ++i) {
     const float gained = mesh.area[i] / std::max(rest.area[i], 1e-16f) - 1;
     mesh.blanch[i] = glm::clamp(gained / (gained > 0 ? kStretch : kSqueeze), -1.f, 0.4f);
     const float deeper = mesh.hollow[i] - rest.hollow[i];
@@ -30,7 +30,7 @@ struct Bump {
 };
 void displace(const MeshPart& part, const Bump& bump, SceneMesh& mesh) {
   constexpr float kShade = 0.5f, kDarkest = 0.6f;  // share of the cavity's light lost, per slope; left at most
-  for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+  for (std::size_t i = part.firstVertex; i < part.endVertex(); ++i) {
     const glm::vec3 d = mesh.position[i] - bump.centre, scaled = bump.narrow * d;
     const float q = glm::dot(scaled, scaled);
     if (q > 9) continue;
@@ -59,7 +59,7 @@ Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
   float best = reach * reach;
   for (const MeshPart& part : mesh.parts) {
     if (!part.moving) continue;
-    for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+    for (std::size_t i = part.firstVertex; i < part.endVertex(); ++i) {
       const glm::vec3 d = mesh.position[i] - p;
       if (const float q = glm::dot(d, d); q < best) {
         best = q;
@@ -122,7 +122,7 @@ void shadeAround(const Instrument& instrument, SceneMesh& mesh) {
                   start = instrument.tip + glm::mix(radius, kHinge * instrument.scale, open) * axis;
   for (const MeshPart& part : mesh.parts) {
     if (part.instrument) continue;
-    for (std::size_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i) {
+    for (std::size_t i = part.firstVertex; i < part.endVertex(); ++i) {
       const glm::vec3 d = mesh.position[i] - start;
       const float along = glm::clamp(glm::dot(d, axis), 0.f, length);
       const glm::vec3 away = d - along * axis;

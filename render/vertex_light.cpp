@@ -292,7 +292,7 @@ void lightVertices(const SceneMesh& mesh, const VisibleTriangles& seen, const Vi
   for (const VisiblePart& visible : seen.parts) {
     const MeshPart& part = mesh.parts[visible.part];
     const GlossLobes lobes = glossLobes(*part.look);
-    for (std::size_t k = visible.firstVertex; k < visible.firstVertex + visible.vertexCount; ++k) {
+    for (std::size_t k = visible.firstVertex; k < visible.endVertex(); ++k) {
       const std::size_t i = seen.vertices[k];
       LitVertex& o = out.vertices[k];
       const Shading v = lightVertex(mesh, *part.look, i, seen.picture[i], s, o);

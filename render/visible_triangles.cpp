@@ -11,7 +11,7 @@ std::vector<std::size_t> frontToBack(const SceneMesh& mesh, const std::vector<gl
   std::vector<float> farthest(mesh.parts.size(), 0.f);
   for (std::size_t p = 0; p < mesh.parts.size(); ++p) {
     const MeshPart& part = mesh.parts[p];
-    for (std::uint32_t i = part.firstVertex; i < part.firstVertex + part.vertexCount; ++i)
+    for (std::uint32_t i = part.firstVertex; i < part.endVertex(); ++i)
       farthest[p] = std::max(farthest[p], picture[i].z);
   }
   std::vector<std::size_t> order(mesh.parts.size());
@@ -34,7 +34,7 @@ bool isVisible(glm::vec3 a, glm::vec3 b, glm::vec3 c, const Viewpoint& view) {
 
 // Appends the corners, vertices of the mesh, of the part's triangles that face the camera within the picture.
 void gatherFacing(const SceneMesh& mesh, const MeshPart& part, const Viewpoint& view, VisibleTriangles& out) {
-  for (std::uint32_t k = part.firstIndex; k < part.firstIndex + part.indexCount; k += 3) {
+  for (std::uint32_t k = part.firstIndex; k < part.endIndex(); k += 3) {
     const std::uint32_t* t = &mesh.index[k];
     if (isVisible(out.picture[t[0]], out.picture[t[1]], out.picture[t[2]], view))
       out.index.insert(out.index.end(), t, t + 3);
@@ -104,12 +104,12 @@ void findVisibleTriangles(const SceneMesh& mesh, const Viewpoint& view, bool opa
   for (const std::size_t p : frontToBack(mesh, out.picture)) {
     const auto first = std::uint32_t(out.index.size());
     gatherFacing(mesh, mesh.parts[p], view, out);
-    out.parts.push_back({p, 0, 0, first, std::uint32_t(out.index.size()) - first});
+    out.parts.push_back({{0, 0, first, std::uint32_t(out.index.size()) - first}, p});
   }
   if (opaque) drawDepth(view, out);
   std::size_t kept = 0;
   for (VisiblePart& part : out.parts) {
-    const std::size_t first = part.firstIndex, last = first + part.indexCount;
+    const std::size_t first = part.firstIndex, last = part.endIndex();
     part.firstVertex = std::uint32_t(out.vertices.size());
     part.firstIndex = std::uint32_t(kept);
     keepSeen(first, last, opaque, out, kept);

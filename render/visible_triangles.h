@@ -10,11 +10,9 @@
 
 namespace medulla {
 
-// What can be seen of one part.
-struct VisiblePart {
+// What can be seen of one part, as a range of VisibleTriangles::vertices and ::index.
+struct VisiblePart : MeshRange {
   std::size_t part = 0;
-  std::uint32_t firstVertex = 0, vertexCount = 0;  // of VisibleTriangles::vertices
-  std::uint32_t firstIndex = 0, indexCount = 0;    // of VisibleTriangles::index
 };
 
 // Two of three triangles never reach OpenGL, and their vertices are never lit.

@@ -32,7 +32,7 @@ SceneMesh torus(std::uint32_t around, std::uint32_t across) {
       mesh.tangent[k] = vec3(-out.y, out.x, 0);
       mesh.index.insert(mesh.index.end(), {k, on, both, k, both, up});
     }
-  mesh.parts.push_back({&looks()[0], 0, around * across, 0, std::uint32_t(mesh.index.size())});
+  mesh.parts.push_back({{0, around * across, 0, std::uint32_t(mesh.index.size())}, &looks()[0]});
   return mesh;
 }
 
@@ -99,7 +99,7 @@ TEST(Tessellation, PlaneCloseToTheLensIsCutFinely) {
   std::fill(mesh.normal.begin(), mesh.normal.end(), vec3(0, 0, 1));
   std::fill(mesh.tangent.begin(), mesh.tangent.end(), vec3(1, 0, 0));
   mesh.index = {0, 1, 2, 0, 2, 3};
-  mesh.parts.push_back({&looks()[0], 0, 4, 0, 6});
+  mesh.parts.push_back({{0, 4, 0, 6}, &looks()[0]});
   const Viewpoint view = makeViewpoint({.position = {0, 0, 1.5f}, .fovDegrees = 40}, 1, false);
   SceneMesh finer;
   tessellate(mesh, view, 2160, Halved::outlines, finer);
