@@ -153,7 +153,6 @@ void requireDistinctRuns(const std::vector<RenderOptions>& all) {
     append(options.outputs, outputs);
     append(outputFiles(options.run), outputs);
     append(inputFiles(loadRun(options.run).scene), inputs);
-    for (const auto& [tool, path] : options.run.trajectories) inputs.push_back(path);
     inputs.push_back(options.cacheToRead);
   }
   requireDistinctFiles(outputs, inputs);

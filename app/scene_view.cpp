@@ -5,6 +5,7 @@
 
 #include "app/model_drawing.h"
 #include "haptics/monotone_cubic.h"
+#include "physics/dynamics/rigid_support.h"
 
 namespace medulla {
 
@@ -12,7 +13,7 @@ glm::vec3 toGlm(const Eigen::Vector3d& v) {
   return {float(v.x()), float(v.y()), float(v.z())};
 }
 
-glm::quat toGlm(const Eigen::Quaterniond& q) {
+static glm::quat toGlm(const Eigen::Quaterniond& q) {
   return {float(q.w()), float(q.x()), float(q.y()), float(q.z())};
 }
 
@@ -148,7 +149,7 @@ SceneView::SceneView(const LoadedScene& loaded, const DynamicsFrame& rest, Rende
     SurfaceShape shape = shapeOf(body.model->renderSurface.triangles, body.look);
     drawnPositions(body, smoothings_[b], rest.bodies[b].nodes, shape.restPositions);
     ballsOf(*body.model, rest.bodies[b], shape.restBalls);
-    shape.travels = body.fixed.empty() && body.fixedNodes.empty();
+    shape.travels = !isHeld(body);
     renderer.addSurface(std::move(shape));
   }
   for (std::size_t s = 0; s < scene.statics.size(); ++s) {

@@ -11,7 +11,6 @@
 namespace medulla {
 
 glm::vec3 toGlm(const Eigen::Vector3d& v);
-glm::quat toGlm(const Eigen::Quaterniond& q);
 
 struct ViewOptions {
   std::vector<ViewKind> panels = {ViewKind::tissue};  // at least one; side by side, from the left

@@ -156,9 +156,7 @@ double stiffening(const SoftBodyModel& m, const std::vector<int>& held, const Ti
 // Of a thin sheet's cells explicit steps are so short that implicit ones are many times as fast.
 bool runsInImplicitSteps(const SoftBodyModel& m, const std::vector<int>& held, const Tissue& tissue) {
   constexpr double kShortest = 1e-5;  // s
-  const BodyDescription body = heldBody(m, held, tissue);
-  BodyMechanics mechanics = bodyMechanics(body);
-  return dampBody(body, mechanics, Integrator::explicitEuler) < kShortest;
+  return explicitLimit(heldBody(m, held, tissue)) < kShortest;
 }
 
 std::string sceneText(const std::string& name, const SoftBodyModel& model, const Layout& l) {

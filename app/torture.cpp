@@ -56,22 +56,17 @@ int longestAxis(const Eigen::AlignedBox3d& box) {
   return axis;
 }
 
-// Of the spheres that are held, or of the nodes where links hold no sphere.
-Vector3d heldPlace(const WorldData& d) {
+// Of the spheres that are held, or of the nodes where links hold no sphere; at rest.
+Vector3d heldPlace(const BodyDescription& body) {
   Vector3d sum = Vector3d::Zero();
-  int count = 0;
-  if (d.bodies[0].fixed.empty()) return meanPlace(*d.bodies[0].model, d.bodies[0].fixedNodes);
-  for (int i = 0; i < d.spheres.count; ++i) {
-    if (d.spheres.groups[i / 4].inverseMass[i % 4] > 0) continue;
-    sum += vectorOf(d.spheres.position[i]);
-    ++count;
-  }
-  return sum / std::max(1, count);
+  if (body.fixed.empty()) return meanPlace(*body.model, body.fixedNodes);
+  for (const FixedSphere& f : body.fixed) sum += body.model->spheres[f.sphere].restFrame;
+  return sum / static_cast<double>(body.fixed.size());
 }
 
 void stretch(WorldData& d, const Eigen::AlignedBox3d& box, double factor) {
   const int axis = longestAxis(box);
-  const double held = heldPlace(d)[axis];
+  const double held = heldPlace(d.bodies[0])[axis];
   disturb(
       d,
       [&](Vector3d x) {
@@ -302,7 +297,7 @@ BodyDescription alone(BodyDescription body) {
 // The body that a trial is about.
 BodyDescription bodyOf(const Trial& trial, const BodyDescription& whole) {
   BodyDescription body = alone(whole);
-  if (body.fixed.empty() && !holdsByNodes(body))
+  if (!isHeld(body))
     throw std::runtime_error(fmt::format("body '{}' is not held anywhere: expected a body with <fix>", body.name));
   if (trial.change) trial.change(body);
   return body;
@@ -338,10 +333,7 @@ double farthestFromRest(const WorldData& d, const BodyDescription& body) {
 
 // The node that is farthest from what is fixed.
 int freeEnd(const BodyDescription& body) {
-  Vector3d held = Vector3d::Zero();
-  for (const FixedSphere& f : body.fixed) held += body.model->spheres[f.sphere].restFrame;
-  held = body.fixed.empty() ? meanPlace(*body.model, body.fixedNodes)
-                            : Vector3d(held / static_cast<double>(body.fixed.size()));
+  const Vector3d held = heldPlace(body);
   int best = 0;
   for (std::size_t i = 0; i < body.model->restNodes.size(); ++i)
     if ((body.model->restNodes[i] - held).squaredNorm() > (body.model->restNodes[best] - held).squaredNorm())
@@ -430,10 +422,8 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
   return out;
 }
 
-double explicitLimit(const BodyDescription& whole) {
-  const BodyDescription body = alone(whole);
-  BodyMechanics mechanics = bodyMechanics(body);
-  return dampBody(body, mechanics, Integrator::explicitEuler);
+double tortureLimit(const BodyDescription& body) {
+  return explicitLimit(alone(body));
 }
 
 }  // namespace medulla

@@ -36,6 +36,6 @@ TortureOutcome torture(const BodyDescription& body, const TortureMethod& method,
 double tortureSteps(const BodyDescription& body, const std::string& trial, double step);
 
 // s, the largest stable step of the explicit method by its own estimate, of the body alone.
-double explicitLimit(const BodyDescription& body);
+double tortureLimit(const BodyDescription& body);
 
 }  // namespace medulla

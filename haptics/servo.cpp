@@ -418,8 +418,6 @@ Servo::Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSet
   }
 }
 Servo::~Servo() = default;
-Servo::Servo(Servo&&) noexcept = default;
-Servo& Servo::operator=(Servo&&) noexcept = default;
 
 const std::vector<ToolState>& Servo::tools() const {
   return data_->states;

@@ -50,8 +50,8 @@ class Servo {
   Servo(const std::vector<TouchableBody>& bodies, const std::vector<ToolSettings>& tools, double tickDuration,
         const DynamicsFrame& rest, const std::vector<ToolSample>& start, const EmbreeSettings& embree = {});
   ~Servo();
-  Servo(Servo&&) noexcept;
-  Servo& operator=(Servo&&) noexcept;
+  Servo(const Servo&) = delete;
+  Servo& operator=(const Servo&) = delete;
 
   // Dynamics' side, after each dynamics frame: the two frames to blend next, `from` being the `to` of the last commit.
   // `tools` is about where the tools are: Embree's bounds are renewed near them. `toolImpulse` is what they gave in

@@ -278,7 +278,6 @@ Renderer::Renderer(const RendererSettings& settings) {
   data_ = std::make_unique<Data>(settings);
 }
 Renderer::~Renderer() = default;
-Renderer::Renderer(Renderer&&) noexcept = default;
 
 void Renderer::addSurface(SurfaceShape shape) {
   SceneMesh& m = data_->rest;

@@ -142,7 +142,8 @@ class Renderer {
  public:
   explicit Renderer(const RendererSettings& settings);  // throws std::runtime_error when no context can be made
   ~Renderer();
-  Renderer(Renderer&&) noexcept;
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
   void addSurface(SurfaceShape shape);  // throws std::runtime_error on an unknown look, naming the known ones
   void render(const Picture& picture, Image& out);
   // The same in two steps: OpenGL's threads fill one picture while the next is placed and lit. begin() may be one

@@ -6,6 +6,8 @@
 #include <filesystem>
 
 #include "app/files/trial_journal.h"
+#include "tests/complaint.h"
+#include "tests/file_size_limit.h"
 #include "tests/identified_model.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
@@ -77,7 +79,7 @@ TEST(TortureOfExplicitSteps, FailsBeyondTheLimitAndSaysSo) {
   const BodyDescription body = heldTube();
   const TortureMethod& method = tortureMethods()[0];
   ASSERT_EQ(method.integrator, Integrator::explicitEuler);
-  const double limit = explicitLimit(body);
+  const double limit = tortureLimit(body);
   EXPECT_TRUE(torture(body, method, "stiffness_1", 0.5 * limit).recoveredAt);
   const TortureOutcome failed = torture(body, method, "stiffness_1", 4 * limit);
   EXPECT_FALSE(failed.survived);
@@ -175,6 +177,28 @@ TEST(TrialJournal, KeepsRowsOfTheSameRunAlone) {
   EXPECT_EQ(p.recoveredAt, 1.25);
   EXPECT_FALSE(TrialJournal(folder / "trials.part", 2).find(p));
   EXPECT_FALSE(std::filesystem::exists(folder / "trials.part"));  // nothing is left to keep
+}
+
+// Other trials go on for a while after one that could not be noted: their rows must not follow half of another.
+TEST(TrialJournal, AFullDiskSpoilsNoRowThatWasThere) {
+  const TemporaryFolder folder;
+  StabilityPoint noted{"implicit", "point", 0.05, 9e3, true, 1.25, 1}, half = noted, late = noted;
+  half.trial = "flat";
+  late.trial = "stretched";
+  {
+    TrialJournal journal(folder / "trials.part", 1);
+    journal.add(noted);
+    const auto room = std::filesystem::file_size(folder / "trials.part") + 5;
+    EXPECT_EQ(complaintOf([&] {
+                const FileSizeLimit limit(room);
+                journal.add(half);
+              }),
+              folder / "trials.part: cannot be written: File too large");
+    EXPECT_NE(complaintOf([&] { journal.add(late); }), "");
+  }
+  TrialJournal journal(folder / "trials.part", 1);
+  EXPECT_TRUE(journal.find(noted));
+  EXPECT_FALSE(journal.find(half) || journal.find(late));
 }
 
 TEST(StabilityCommand, BadStepsAndFreeBodiesAreOneLine) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <set>
 
@@ -15,6 +16,7 @@
 #include "app/files/output_file.h"
 #include "app/files/report_file.h"
 #include "app/files/text.h"
+#include "app/files/text_file.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
 #include "app/standard_streams.h"
@@ -165,7 +167,7 @@ std::vector<BuildJob> jobsOf(const BuildOptions& options) {
 
 // Scenes and recordings end in .xml, too.
 void requireReplaceable(const std::string& path) {
-  if (fs::exists(path) && !isModel(path))
+  if (fileExists(path) && !isModel(path))
     throw inputError(path, 0, "is no model: expected one to replace, or a name that is free");
 }
 
@@ -205,6 +207,14 @@ void readHeldRegions(const BuildOptions& options, BuildJob& job) {
   });
 }
 
+// Shows a stage's part of the work, from `from` on and `length` long in parts of the whole.
+std::function<void(double)> shownOn(Progress& progress, double from = 0, double length = 1) {
+  return [&progress, from, length](double share) {
+    checkInterrupt();
+    progress.update(100 * (from + length * share));
+  };
+}
+
 // The spheres asked for are those of all bodies together.
 void divideSpheres(std::vector<BuildJob>& jobs) {
   std::vector<BodyShape> shapes;
@@ -212,16 +222,12 @@ void divideSpheres(std::vector<BuildJob>& jobs) {
   BuildSettings average = jobs[0].settings;
   average.spheres = std::max(1, average.spheres / static_cast<int>(jobs.size()));
   Progress progress("share spheres", 100, "%");
-  const auto tick = [&](double share) {
-    checkInterrupt();
-    progress.update(100 * share);
-  };
+  const auto measured = shownOn(progress, 0, 0.5);
   for (const BuildJob& job : jobs) {
-    tick(0.5 * static_cast<double>(shapes.size()) / static_cast<double>(jobs.size()));
+    measured(static_cast<double>(shapes.size()) / static_cast<double>(jobs.size()));
     shapes.push_back(naming(job.meshPath, [&] { return measureShape(job.mesh.mesh, overshootOf(average)); }));
   }
-  const std::vector<int> counts =
-      shareSpheres(shapes, jobs[0].settings.spheres, [&](double share) { tick(0.5 + 0.5 * share); });
+  const std::vector<int> counts = shareSpheres(shapes, jobs[0].settings.spheres, shownOn(progress, 0.5, 0.5));
   for (std::size_t j = 0; j < jobs.size(); ++j) jobs[j].settings.spheres = counts[j];
 }
 
@@ -229,12 +235,10 @@ void buildAll(std::vector<BuildJob>& jobs) {
   Progress progress("build", 100, "%");
   for (std::size_t j = 0; j < jobs.size(); ++j) {
     BuildJob& job = jobs[j];
-    const auto tick = [&](double share) {
-      checkInterrupt();
-      progress.update(100 * (static_cast<double>(j) + share) / static_cast<double>(jobs.size()));
-    };
+    const double length = 1 / static_cast<double>(jobs.size());
+    const auto shown = shownOn(progress, static_cast<double>(j) * length, length);
     job.model = naming(job.meshPath, [&] {
-      return buildModel(job.mesh, job.finePath.empty() ? nullptr : &job.fine, job.settings, job.report, tick);
+      return buildModel(job.mesh, job.finePath.empty() ? nullptr : &job.fine, job.settings, job.report, shown);
     });
     job.model.name = job.name;
     job.model.meshHash = job.inputHash;
@@ -272,12 +276,8 @@ void chooseFormulasIfBetter(BuildJob& job, IdentifiedNetwork& network, const Ide
 void identifyModel(const BuildOptions& options, BuildJob& job) {
   const double start = wallSeconds();
   Progress progress("identify", 100, "%");
-  const auto tick = [&](double share) {
-    checkInterrupt();
-    progress.update(100 * share);
-  };
   job.model.identified = naming(job.meshPath, [&] {
-    const Identification found = identifyNetwork(job.model, job.held, options.identification, tick);
+    const Identification found = identifyNetwork(job.model, job.held, options.identification, shownOn(progress));
     progress.end();
     auto network = std::make_shared<IdentifiedNetwork>(found.network);
     chooseFormulasIfBetter(job, *network, found);

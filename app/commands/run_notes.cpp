@@ -164,11 +164,11 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
   for (const BodyOverlap& o : world.startOverlaps()) {
     const std::string& name = scene.bodies[o.body0].name;
     const SceneBody& body = scene.bodies[o.body0];
-    const bool isHeld = !body.fixed.empty() || !body.fixedNodes.empty();
     if (o.body1 < 0)
       tell("warning: body '{}' overlaps static shapes by {:.2g} mm at the start{}\n", name, 1e3 * o.depth,
-           isHeld ? " where its surface is not held on them: its spheres stand on them, and tools feel it too hard"
-                  : "");
+           isHeld(body)
+               ? " where its surface is not held on them: its spheres stand on them, and tools feel it too hard"
+               : "");
     else
       tell("warning: bodies '{}' and '{}' overlap by {:.2g} mm at the start\n", name, scene.bodies[o.body1].name,
            1e3 * o.depth);

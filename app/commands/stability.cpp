@@ -49,12 +49,14 @@ std::vector<TortureMethod> methodsOf(const StabilityOptions& options) {
 void planTrials(const BodyDescription& body, const std::string& trial, const std::string& name,
                 const std::vector<TortureMethod>& methods, const std::vector<double>& steps,
                 std::vector<PlannedTrial>& plan) {
+  std::vector<double> counts;
+  for (const double step : steps) counts.push_back(tortureSteps(body, trial, step));
   for (const TortureMethod& method : methods) {
-    for (const double step : steps) {
-      PlannedTrial p{body, method, trial, tortureSteps(body, trial, step), {}};
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+      PlannedTrial p{body, method, trial, counts[k], {}};
       p.point.method = method.name;
       p.point.trial = name;
-      p.point.step = step;
+      p.point.step = steps[k];
       p.point.young = body.tissue.young;
       plan.push_back(std::move(p));
     }
@@ -158,7 +160,7 @@ StabilityTables runTrials(const StabilityOptions& options, const BodyDescription
     BodyDescription other = body;
     other.tissue.young = young;
     planTrials(other, kMapTrial, "", methods, options.steps, plan);
-    out.limit.push_back({young, explicitLimit(other)});
+    out.limit.push_back({young, tortureLimit(other)});
   }
   for (const std::string& trial : tortureTrials()) planTrials(body, trial, trial, methods, options.trialSteps, plan);
   try {
@@ -175,7 +177,7 @@ StabilityTables runTrials(const StabilityOptions& options, const BodyDescription
 
 // Rows of an earlier call may be of another scene: none is taken along.
 void noteReplaced(const std::string& table, const std::vector<TortureMethod>& methods) {
-  if (!fs::exists(table)) return;
+  if (!fileExists(table)) return;
   const std::string text = readTextFile(table);
   std::vector<std::string> gone;
   for (const TortureMethod& known : tortureMethods()) {

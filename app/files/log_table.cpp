@@ -11,10 +11,15 @@
 
 namespace medulla {
 
+// Of the line that no line end follows; 0 where there is none.
+static std::ptrdiff_t openLine(const std::string& text) {
+  return text.ends_with('\n') ? 0 : std::count(text.begin(), text.end(), '\n') + 1;
+}
+
 // Whether the file can have ended within the row: no line end, and a number or more is missing. A whole last row may
 // have lost its line end in an editor.
-static bool endsWithin(const CsvRows& rows, const std::string& text, std::size_t columns) {
-  if (text.ends_with('\n') || rows.line() != std::count(text.begin(), text.end(), '\n') + 1) return false;
+static bool endsWithin(const CsvRows& rows, std::ptrdiff_t openLine, std::size_t columns) {
+  if (rows.line() != openLine) return false;
   return rows.cells().size() < columns || (rows.cells().size() == columns && !parseNumber<double>(rows.cells().back()));
 }
 
@@ -29,8 +34,9 @@ LogTable readLog(const std::string& path, bool mayBeCut) {
   table.columns.assign(rows.cells().begin(), rows.cells().end());
   if (table.columns[0] != "t") rows.fail("this is no log: expected a header that begins with the column t");
   const std::string expected = fmt::format("{} as in the header", table.columns.size());
+  const std::ptrdiff_t open = mayBeCut ? openLine(text) : 0;
   while (rows.next()) {
-    table.isCut = mayBeCut && endsWithin(rows, text, table.columns.size());
+    table.isCut = endsWithin(rows, open, table.columns.size());
     if (table.isCut) break;
     rows.requireCells(table.columns.size(), expected);
     std::vector<double>& value = table.value.emplace_back();

@@ -6,7 +6,7 @@
 
 namespace medulla {
 
-// The model file: XML whose long arrays are whitespace-separated text, 17 digits, so that reading gives the same bits.
+// The model file: XML whose long arrays are whitespace-separated text, from which reading gives the same bits.
 void writeModel(const std::string& path, const SoftBodyModel& model);
 // By the root element alone; false of what is no XML.
 bool isModel(const std::string& path);

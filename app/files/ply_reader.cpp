@@ -65,14 +65,6 @@ std::size_t sizeOf(Scalar type) {
   return bytes[static_cast<int>(type)];
 }
 
-std::string_view takeWord(std::string_view& rest) {
-  constexpr std::string_view blanks = " \t\r";
-  rest.remove_prefix(std::min(rest.find_first_not_of(blanks), rest.size()));
-  const std::string_view word = rest.substr(0, rest.find_first_of(blanks));
-  rest.remove_prefix(word.size());
-  return word;
-}
-
 // ---- Header ----------------------------------------------------------------------------------------------
 
 Use useOf(const Element& element, const Property& property, std::string_view name) {
@@ -227,7 +219,7 @@ class Values {
   }
 
  private:
-  static bool isBlank(std::string_view row) { return row.find_first_not_of(" \t\r") == std::string_view::npos; }
+  static bool isBlank(std::string_view row) { return trimmed(row).empty(); }
 
   [[noreturn]] void failAtEnd() const {
     fail(fmt::format("the file ends after {} of {} elements {}", number_, element_->count, inQuotes(element_->name)));

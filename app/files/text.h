@@ -19,8 +19,11 @@ std::string plainName(std::string_view text);
 // As an attribute's value, or between tags.
 std::string escapedXml(std::string_view text);
 
-// Without the blanks, tabs and carriage returns at its ends.
+// Without the white space at its ends: blanks, tabs, ends of lines.
 std::string_view trimmed(std::string_view text);
+
+// The first word of `rest`, taken off it with the white space before; empty where there is none.
+std::string_view takeWord(std::string_view& rest);
 
 // Letters of ASCII alone, whatever the locale.
 std::string lowered(std::string_view text);

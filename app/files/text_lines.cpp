@@ -21,18 +21,11 @@ bool TextLines::splitLine() {
   std::string_view text = takeLine(rest_);
   ++line_;
   const std::size_t comment = text.find('#');
-  text = text.substr(0, comment);
-  const std::size_t last = text.find_last_not_of(" \t\r");
-  const bool continued = comment == std::string_view::npos && last != std::string_view::npos && text[last] == '\\';
-  if (continued) text = text.substr(0, last);
-  for (;;) {
-    const std::size_t begin = text.find_first_not_of(" \t\r");
-    if (begin == std::string_view::npos) return continued;
-    text.remove_prefix(begin);
-    const std::size_t length = std::min(text.find_first_of(" \t\r"), text.size());
-    words_.push_back(text.substr(0, length));
-    text.remove_prefix(length);
-  }
+  text = trimmed(text.substr(0, comment));
+  const bool continued = comment == std::string_view::npos && text.ends_with('\\');
+  if (continued) text.remove_suffix(1);
+  for (std::string_view word = takeWord(text); !word.empty(); word = takeWord(text)) words_.push_back(word);
+  return continued;
 }
 
 bool TextLines::next() {

@@ -35,12 +35,11 @@ static std::string_view inAnotherUnit(const std::vector<std::string_view>& cells
   return found == cells.end() || quantity.empty() ? std::string_view() : *found;
 }
 
-static void requireColumn(const std::vector<std::string_view>& cells, std::string_view column, const std::string& name,
-                          int line) {
+static void requireColumn(const CsvRows& header, std::string_view column) {
+  const std::vector<std::string_view>& cells = header.cells();
   if (std::find(cells.begin(), cells.end(), column) != cells.end()) return;
   const std::string_view found = inAnotherUnit(cells, column);
-  throw inputError(
-      name, line,
+  header.fail(
       found.empty()
           ? fmt::format("column {} is missing, expected {}", column, requiredHeader())
           : fmt::format("column {} is missing, found {}: a <recording> that names this file reads other units, by its "
@@ -48,16 +47,15 @@ static void requireColumn(const std::vector<std::string_view>& cells, std::strin
                         column, inQuotes(found)));
 }
 
-static void checkHeader(const std::vector<std::string_view>& cells, const std::string& name, int line) {
-  for (std::size_t k = 0; k < requiredColumns; ++k) requireColumn(cells, columnNames[k], name, line);
+static void checkHeader(const CsvRows& header) {
+  const std::vector<std::string_view>& cells = header.cells();
+  for (std::size_t k = 0; k < requiredColumns; ++k) requireColumn(header, columnNames[k]);
   for (std::size_t k = 0; k < std::min(cells.size(), columnNames.size()); ++k)
     if (cells[k] != columnNames[k])
-      throw inputError(
-          name, line,
+      header.fail(
           fmt::format("column {} is {}, expected {}[,fx[N],fy[N],fz[N]]", k + 1, inQuotes(cells[k]), requiredHeader()));
   if (cells.size() != requiredColumns && cells.size() != columnNames.size())
-    throw inputError(name, line,
-                     fmt::format("{} columns, expected {}[,fx[N],fy[N],fz[N]]", cells.size(), requiredHeader()));
+    header.fail(fmt::format("{} columns, expected {}[,fx[N],fy[N],fz[N]]", cells.size(), requiredHeader()));
 }
 
 void addSample(Trajectory& trajectory, ToolSample sample, const std::string& name, int line) {
@@ -95,7 +93,7 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name) {
   CsvRows rows(text, name);
   if (!rows.next()) throw inputError(name, 0, fmt::format("no header, expected {}", requiredHeader()));
   rows.requireCommas();
-  checkHeader(rows.cells(), name, rows.line());
+  checkHeader(rows);
   const std::size_t columns = rows.cells().size();
   const std::string expected = fmt::format("{} as in the header", columns);
   std::vector<double> row;

@@ -57,13 +57,12 @@ const char* describe(tinyxml2::XMLError error) {
 }
 
 void copyText(const std::string& path, const tinyxml2::XMLText& text, XmlElement& out) {
-  const std::string value = text.Value();
-  const std::size_t start = value.find_first_not_of(" \t\r\n");
-  if (start == std::string::npos) return;
+  const std::string_view value = trimmed(text.Value());
+  if (value.empty()) return;
   // Lines of the text are counted from its start, which only holds for one piece.
   if (!out.text.empty())
     throw inputError(path, text.GetLineNum(), "<" + out.name + ">: text in several pieces, expected one");
-  out.text = value.substr(start, value.find_last_not_of(" \t\r\n") + 1 - start);
+  out.text = value;
   out.textLine = text.GetLineNum();
   out.textWhere = place(path, out.textLine);
 }
@@ -164,14 +163,9 @@ bool contains(Range range, double value) {
   return low && high;
 }
 
-std::vector<std::string> words(const std::string& text) {
-  const char* space = " \t\r\n";
+std::vector<std::string> words(std::string_view text) {
   std::vector<std::string> out;
-  for (std::size_t begin = text.find_first_not_of(space); begin != std::string::npos;) {
-    const std::size_t end = std::min(text.find_first_of(space, begin), text.size());
-    out.push_back(text.substr(begin, end - begin));
-    begin = text.find_first_not_of(space, end);
-  }
+  for (std::string_view word = takeWord(text); !word.empty(); word = takeWord(text)) out.emplace_back(word);
   return out;
 }
 

@@ -240,6 +240,11 @@ LowestMode lowestMode(const BodyDescription& body, const BodyMechanics& mechanic
 
 }  // namespace
 
+double explicitLimit(const BodyDescription& body) {
+  BodyMechanics mechanics = bodyMechanics(body);
+  return dampBody(body, mechanics, Integrator::explicitEuler);
+}
+
 double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics) {
   return lowestMode(body, mechanics).frequency;
 }

@@ -23,6 +23,9 @@ void raiseRotaryInertia(const RestModel& rest, BodyMechanics& mechanics);
 // no massDamping, and relaxations that make up for edges, which have no dampers, instead.
 double dampBody(const BodyDescription& body, BodyMechanics& mechanics, Integrator integrator);
 
+// s: that substep of explicit steps, of the body as it is.
+double explicitLimit(const BodyDescription& body);
+
 // rad/s: the lowest mode of spheres and links that deforms the body, the surface's mass riding along; 0 where none
 // exists (a single sphere, everything fixed).
 double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechanics);

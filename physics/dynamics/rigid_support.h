@@ -32,4 +32,8 @@ inline bool holdsByNodes(const BodyDescription& body) {
   return knowsNodes && !body.fixedNodes.empty();
 }
 
+inline bool isHeld(const BodyDescription& body) {
+  return !body.fixed.empty() || holdsByNodes(body);
+}
+
 }  // namespace medulla
