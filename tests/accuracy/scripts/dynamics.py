@@ -9,6 +9,7 @@ import meshes
 import result_files
 import study
 from result_files import numbers
+from whole_files import publish
 
 COMPUTED = 14  # modes: those written, and more for the step response
 DAMPING = 0.05  # ratio of the first mode in the step response
@@ -74,8 +75,8 @@ def write_modes(folder, body, frequencies, error, shapes, fix):
         ("columns", "ux uy uz of every mode in turn"),
     ]
     table = np.concatenate([s / c for s, c in zip(shapes, scale)], axis=1)
-    result_files.publish(os.path.join(folder, f"{body.name}_modes.txt"),
-                         result_files.header(entries) + result_files.columns(table / 1e-4))
+    publish(os.path.join(folder, f"{body.name}_modes.txt"),
+            result_files.header(entries) + result_files.columns(table / 1e-4))
 
 
 def step_response(body, mesh, load, static, frequencies, shapes, beta):
@@ -116,8 +117,8 @@ def write_step(folder, body, case, fix, load, beta, frequencies, response, error
         ("columns", "t ux uy uz of the loaded vertices, mean weighted by the load"),
     ]
     rows = np.column_stack([t / 1e-5, u / 1000 / result_files.UNIT])
-    result_files.publish(os.path.join(folder, f"{body.name}_step.txt"),
-                         result_files.header(entries) + result_files.columns(rows))
+    publish(os.path.join(folder, f"{body.name}_step.txt"),
+            result_files.header(entries) + result_files.columns(rows))
 
 
 def make(folder, solved):

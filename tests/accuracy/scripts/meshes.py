@@ -12,6 +12,8 @@ from collections import namedtuple
 
 import numpy as np
 
+from whole_files import publish
+
 # Edges of a quadratic tetrahedron in the order of its mid-edge nodes 5 to 10 (CalculiX C3D10).
 TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
 
@@ -68,11 +70,11 @@ def cylinder(length=100.0, radius=10.0, segments=18, stations=20):
 
 
 def write_obj(path, name, vertices, triangles):
-    with open(path, "w") as file:
-        file.write(f"# {name}: metres, {len(vertices)} vertices, {len(triangles)} triangles; made by tests/accuracy\n")
-        file.write(f"o {name}\n")
-        file.writelines("v %.7f %.7f %.7f\n" % tuple(v / 1000 + 0.0) for v in vertices)
-        file.writelines("f %d %d %d\n" % tuple(t + 1) for t in triangles)
+    rows = [f"# {name}: metres, {len(vertices)} vertices, {len(triangles)} triangles; made by tests/accuracy\n"]
+    rows.append(f"o {name}\n")
+    rows += ["v %.7f %.7f %.7f\n" % tuple(v / 1000 + 0.0) for v in vertices]
+    rows += ["f %d %d %d\n" % tuple(t + 1) for t in triangles]
+    publish(path, "".join(rows))
 
 
 def volume(vertices, triangles):

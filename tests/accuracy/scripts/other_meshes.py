@@ -92,5 +92,4 @@ def write_missing(project):
     for name, make in makers.items():
         path = os.path.join(project, "tests/accuracy", name + ".obj")
         if not os.path.exists(path):
-            meshes.write_obj(path + ".part", name, *make())
-            os.replace(path + ".part", path)
+            meshes.write_obj(path, name, *make())

@@ -12,6 +12,7 @@ import meshes
 import other_meshes
 import result_files
 import study
+from whole_files import publish
 
 
 def summary(body, case, kept, error):
@@ -34,9 +35,7 @@ def say(text):
 
 
 def make(project, results, work, wanted):
-    cylinder = os.path.join(project, "tests/accuracy/cylinder.obj")
-    meshes.write_obj(cylinder + ".part", "cylinder", *meshes.cylinder())
-    os.replace(cylinder + ".part", cylinder)
+    meshes.write_obj(os.path.join(project, "tests/accuracy/cylinder.obj"), "cylinder", *meshes.cylinder())
     other_meshes.write_missing(project)
     for body in cases.bodies():
         chosen = lambda name: not wanted or name in wanted or body.name in wanted
@@ -49,7 +48,7 @@ def make(project, results, work, wanted):
             kept = nonlinear[body.kept_grid(case)]
             result_files.write_static(results, body, case, kept, error)
             rows = "".join(timing(body, case, nonlinear, error))
-            result_files.publish(os.path.join(results, f"{body.name}_{case.name}.time"), rows)
+            publish(os.path.join(results, f"{body.name}_{case.name}.time"), rows)
             print(summary(body, case, kept, error), flush=True)
         if body.modes and (chosen(f"{body.name}_modes") or chosen(f"{body.name}_step")):
             dynamics.make(results, solved)

@@ -7,14 +7,9 @@ import numpy as np
 
 import meshes
 import study
+from whole_files import publish
 
 UNIT = 1e-7  # m, of the displacement columns: a hundred-thousandth of the largest
-
-
-def publish(path, text):
-    with open(path + ".part", "w") as file:
-        file.write(text)
-    os.replace(path + ".part", path)
 
 
 def numbers(values, digits=8):
