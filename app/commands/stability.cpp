@@ -50,6 +50,7 @@ void planTrials(const BodyDescription& body, const std::string& trial, const std
                 const std::vector<TortureMethod>& methods, const std::vector<double>& steps,
                 std::vector<PlannedTrial>& plan) {
   std::vector<double> counts;
+  counts.reserve(steps.size());
   for (const double step : steps) counts.push_back(tortureSteps(body, trial, step));
   for (const TortureMethod& method : methods) {
     for (std::size_t k = 0; k < steps.size(); ++k) {
