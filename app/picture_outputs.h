@@ -37,7 +37,7 @@ class PngFolder {
   bool has(int number) const;                  // drawn before, and whole
   void write(int number, const Image& image);  // throws for an earlier one that could not be written
   int finish();                                // how many pictures of an earlier run are gone
-  StageTimes::Stage encoding() const { return queue_.encoding(); }
+  const StageTimes::Stage& encoding() const { return queue_.encoding(); }
 
  private:
   void encode(PictureQueue::Entry& entry) const;

@@ -1,14 +1,11 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
-#include <mutex>
-#include <string>
 #include <thread>
 #include <vector>
 
+#include "render/bounded_buffer.h"
 #include "render/stage_times.h"
 
 namespace medulla {
@@ -28,22 +25,16 @@ class PictureQueue {
   PictureQueue(const PictureQueue&) = delete;
   PictureQueue& operator=(const PictureQueue&) = delete;
 
-  void push(const Fill& fill);         // throws std::runtime_error with the words of an earlier failure
-  void finish();                       // once all are encoded; throws likewise
-  void stop();                         // what still waits is not encoded
-  StageTimes::Stage encoding() const;  // what the thread has taken, up to its last picture
+  void push(const Fill& fill);                                     // throws what ended the work
+  void finish();                                                   // once all are encoded; throws likewise
+  void stop();                                                     // what still waits is not encoded
+  const StageTimes::Stage& encoding() const { return encoding_; }  // what the thread has taken; once it has ended
 
  private:
   void work();
-  void end();
-  void rethrow() const;
 
   Encode encode_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Entry> waiting_, spare_;
-  bool ended_ = false, abandoned_ = false;
-  std::string failure_;  // why it stopped; empty: it has not
+  BoundedBuffer<Entry> entries_;
   StageTimes::Stage encoding_{"encode", 0, 0};
   std::thread thread_;  // last: it begins at once
 };

@@ -91,7 +91,7 @@ void VideoWriter::write(const Image& image) {
   data_->named([&] { data_->queue.push([&](PictureQueue::Entry& entry) { rgbaToI420(image, entry.bytes); }); });
 }
 
-StageTimes::Stage VideoWriter::encoding() const {
+const StageTimes::Stage& VideoWriter::encoding() const {
   return data_->queue.encoding();
 }
 

@@ -26,7 +26,7 @@ class VideoWriter {
   // Calls `goOn` before each picture that is still to be encoded: a GIF is from first to last. What it throws, any but
   // a std::runtime_error, ends the film unfinished and comes through.
   void finish(const std::function<void()>& goOn = [] {});
-  StageTimes::Stage encoding() const;  // what its thread has taken, up to its last picture
+  const StageTimes::Stage& encoding() const;  // what its thread has taken; after finish()
 
  private:
   struct Data;

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <deque>
+#include <exception>
 #include <utility>
 
 #include "app/interrupt.h"
@@ -19,7 +22,7 @@ namespace medulla {
 namespace {
 
 // Two that are drawn, one that waits, one that is composed: more only costs memory.
-constexpr int kSheets = 4;
+constexpr std::size_t kSheets = 4;
 
 // What several panels leave over stays black between them.
 int panelWidth(const Scene& scene, const ViewOptions& view) {
@@ -81,9 +84,9 @@ struct Artist::Desk {
   Image panel, image;
   Progress progress;
   int done = 0;
-  std::deque<std::unique_ptr<Sheet>> begun;  // pictures at work, the oldest first
-  int ahead = 0;                             // panels begun and not taken
-  int taken = 0;                             // panels of the oldest picture
+  std::deque<Sheet> begun;  // pictures at work, the oldest first
+  int ahead = 0;            // panels begun and not taken
+  int taken = 0;            // panels of the oldest picture
 
   Desk(const LoadedScene& loaded, const RenderOptions& options, int first, int count, int width,
        const DynamicsFrame& rest)
@@ -99,65 +102,62 @@ Artist::Artist(const LoadedScene& loaded, const RenderOptions& options, int firs
       options_(&options),
       first_(first),
       count_(count),
-      panelWidth_(panelWidth(loaded.scene, options.view)) {
-  for (int k = 0; k < kSheets; ++k) spare_.push_back(std::make_unique<Sheet>());
-  thread_ = std::thread([this, &rest] { work(rest); });
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return ready_ || failure_; });
-  if (!failure_) return;
-  lock.unlock();
-  thread_.join();
-  std::rethrow_exception(failure_);
+      panelWidth_(panelWidth(loaded.scene, options.view)),
+      sheets_(kSheets) {
+  std::promise<void> ready;
+  std::future<void> begun = ready.get_future();
+  thread_ = std::thread([this, &rest, ready = std::move(ready)]() mutable { work(rest, std::move(ready)); });
+  try {
+    begun.get();
+  } catch (...) {
+    thread_.join();
+    throw;
+  }
 }
 
 Artist::~Artist() {
-  {
-    const std::lock_guard lock(mutex_);
-    ended_ = abandoned_ = true;
-  }
-  changed_.notify_all();
+  sheets_.abandon();
   if (thread_.joinable()) thread_.join();
 }
 
-void Artist::work(const DynamicsFrame& rest) {
+void Artist::work(const DynamicsFrame& rest, std::promise<void> ready) {
   try {
     times_.start("start drawing");
     desk_ = std::make_unique<Desk>(*loaded_, *options_, first_, count_, panelWidth_, rest);
-    {
-      const std::lock_guard lock(mutex_);
-      ready_ = true;
-    }
-    changed_.notify_all();
+  } catch (...) {
+    ready.set_exception(std::current_exception());
+    return;
+  }
+  ready.set_value();
+  try {
     drawAll();
   } catch (...) {
-    const std::lock_guard lock(mutex_);
-    failure_ = std::current_exception();
+    sheets_.fail(std::current_exception());
   }
-  changed_.notify_all();
-  // The caller may be composing with what is on the desk.
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return ended_ || !ready_; });
+  while (sheets_.next()) {
+    // What comes now is not drawn: the caller may be composing with what is on the desk, until it says that it ends.
+  }
   desk_.reset();
 }
 
 void Artist::drawAll() {
   for (;;) {
     times_.start("idle");
-    std::unique_ptr<Sheet> sheet = next();
+    std::optional<Sheet> sheet = sheets_.next();
     if (!sheet) break;
     checkInterrupt();
     if (!sheet->needed) {
-      giveBack(std::move(sheet));
+      giveBack(std::move(*sheet));
       continue;
     }
-    desk_->begun.push_back(std::move(sheet));
+    desk_->begun.push_back(std::move(*sheet));
     // The first panel of this picture meets the last one of the picture before.
-    for (const Picture& panel : desk_->begun.back()->panels) {
+    for (const Picture& panel : desk_->begun.back().panels) {
       desk_->renderer.begin(panel, &times_);
       if (++desk_->ahead == 2) takePanel();
     }
   }
-  if (abandoned_) return;
+  if (sheets_.abandoned()) return;
   while (desk_->ahead > 0) takePanel();
   checkInterrupt();
   times_.start("end files");
@@ -175,80 +175,47 @@ void Artist::takePanel() {
   if (count > 1) copyInto(desk.panel, desk.taken * room / (count - 1), desk.image);
   if (++desk.taken < count) return;
   desk.taken = 0;
-  std::unique_ptr<Sheet> sheet = std::move(desk.begun.front());
+  Sheet sheet = std::move(desk.begun.front());
   desk.begun.pop_front();
   times_.start("letters");
-  if (sheet->chart) drawStripChart(*sheet->chart, desk.image);
-  if (!sheet->caption.empty() && !drawCaption(sheet->caption, panelWidth_, desk.image)) ++withoutCaption_;
+  if (sheet.chart) drawStripChart(*sheet.chart, desk.image);
+  if (!sheet.caption.empty() && !drawCaption(sheet.caption, panelWidth_, desk.image)) ++withoutCaption_;
   times_.start("hand over");
-  desk.outputs.write(sheet->number, desk.image);
+  desk.outputs.write(sheet.number, desk.image);
   ++drawn_;
   giveBack(std::move(sheet));
 }
 
 // Back to the caller.
-void Artist::giveBack(std::unique_ptr<Sheet> sheet) {
+void Artist::giveBack(Sheet sheet) {
   desk_->progress.update(++desk_->done);
-  {
-    const std::lock_guard lock(mutex_);
-    spare_.push_back(std::move(sheet));
-  }
-  changed_.notify_all();
-}
-
-// nullptr: there are no more.
-std::unique_ptr<Artist::Sheet> Artist::next() {
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return ended_ || !waiting_.empty(); });
-  if (abandoned_ || waiting_.empty()) return nullptr;
-  std::unique_ptr<Sheet> sheet = std::move(waiting_.front());
-  waiting_.pop_front();
-  return sheet;
-}
-
-void Artist::rethrow() {
-  if (failure_) std::rethrow_exception(failure_);
+  sheets_.giveBack(std::move(sheet));
 }
 
 void Artist::draw(int number, const PictureState& state, ForceView* forces, StageTimes& times) {
   times.start("wait");
-  std::unique_ptr<Sheet> sheet;
-  {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return failure_ || !spare_.empty(); });
-    rethrow();
-    sheet = std::move(spare_.front());
-    spare_.pop_front();
-  }
+  Sheet sheet = sheets_.take();
   times.start("compose");
-  sheet->number = number;
-  sheet->needed = !desk_->outputs.has(number);
-  if (forces != nullptr) sheet->chart = forces->chart(state);
-  if (options_->view.shown.caption) sheet->caption = captionAt(loaded_->scene, state.time);
-  sheet->panels.resize(options_->view.panels.size());
-  for (std::size_t k = 0; sheet->needed && k < sheet->panels.size(); ++k) {
-    desk_->view.compose(state, options_->view.panels[k], options_->view.shown, sheet->panels[k]);
-    if (forces != nullptr) forces->addArrows(state, sheet->panels[k]);
+  sheet.number = number;
+  sheet.needed = !desk_->outputs.has(number);
+  if (forces != nullptr) sheet.chart = forces->chart(state);
+  if (options_->view.shown.caption) sheet.caption = captionAt(loaded_->scene, state.time);
+  sheet.panels.resize(options_->view.panels.size());
+  for (std::size_t k = 0; sheet.needed && k < sheet.panels.size(); ++k) {
+    desk_->view.compose(state, options_->view.panels[k], options_->view.shown, sheet.panels[k]);
+    if (forces != nullptr) forces->addArrows(state, sheet.panels[k]);
   }
-  if (sheet->needed && !sawBody_)
+  if (sheet.needed && !sawBody_)
     sawBody_ =
-        isAnyInSight(sheet->panels[0], loaded_->scene.bodies.size(), float(panelWidth_) / float(loaded_->scene.height));
-  {
-    const std::lock_guard lock(mutex_);
-    waiting_.push_back(std::move(sheet));
-  }
-  changed_.notify_all();
+        isAnyInSight(sheet.panels[0], loaded_->scene.bodies.size(), float(panelWidth_) / float(loaded_->scene.height));
+  sheets_.give(std::move(sheet));
   times.stop();
 }
 
 void Artist::finish() {
-  {
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
-  }
-  changed_.notify_all();
+  sheets_.end();
   thread_.join();
-  rethrow();
+  sheets_.rethrow();
   if (drawn_ > 0 && !sawBody_) tell("note: no body is in sight of the camera in any picture\n");
   if (withoutCaption_ > 0) tell("note: {} of {} pictures are too small for their caption\n", withoutCaption_, drawn_);
   for (const std::string& note : notes_) tell("note: {}\n", note);  // now that no bar is in the way

@@ -1,16 +1,16 @@
 #pragma once
 
-#include <condition_variable>
-#include <deque>
-#include <exception>
+#include <future>
 #include <memory>
-#include <mutex>
+#include <optional>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include "app/commands/commands.h"
 #include "app/force_view.h"
 #include "app/picture_outputs.h"
+#include "render/bounded_buffer.h"
 #include "render/stage_times.h"
 
 namespace medulla {
@@ -47,21 +47,15 @@ class Artist {
   };
   struct Desk;
 
-  void work(const DynamicsFrame& rest);
-  std::unique_ptr<Sheet> next();
+  void work(const DynamicsFrame& rest, std::promise<void> ready);
   void drawAll();
   void takePanel();
-  void giveBack(std::unique_ptr<Sheet> sheet);
-  void rethrow();
+  void giveBack(Sheet sheet);
 
   const LoadedScene* loaded_;
   const RenderOptions* options_;
   int first_, count_, panelWidth_;  // panelWidth_: px
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<std::unique_ptr<Sheet>> waiting_, spare_;
-  bool ready_ = false, ended_ = false, abandoned_ = false;
-  std::exception_ptr failure_;
+  BoundedBuffer<Sheet> sheets_;
   std::unique_ptr<Desk> desk_;  // the thread's; the caller composes with it
   int drawn_ = 0, withoutCaption_ = 0;
   StageTimes::Stage encoding_;

@@ -137,7 +137,7 @@ std::vector<StrayImage> formerMoments(const std::string& scene, const std::strin
 void requireNameFree(const std::string& scene, const std::string& folder) {
   for (const StrayImage& image :
        imagesCalled(folder, [&](const std::string& name) { return namesMomentOf(name, scene); }))
-    if (fs::exists(image.scene) && !fs::equivalent(image.scene, scene))
+    if (fileExists(image.scene) && !sameFile(image.scene, scene))
       throw std::runtime_error(fmt::format("{}: two scenes of the name {} for one folder of golden images: {} is of {}",
                                            scene, stemOf(scene), image.path, image.scene));
 }

@@ -18,8 +18,8 @@ static std::ptrdiff_t openLine(const std::string& text) {
 
 // Whether the file can have ended within the row: no line end, and a number or more is missing. A whole last row may
 // have lost its line end in an editor.
-static bool endsWithin(const CsvRows& rows, std::ptrdiff_t openLine, std::size_t columns) {
-  if (rows.line() != openLine) return false;
+static bool endsWithin(const CsvRows& rows, std::ptrdiff_t open, std::size_t columns) {
+  if (rows.line() != open) return false;
   return rows.cells().size() < columns || (rows.cells().size() == columns && !parseNumber<double>(rows.cells().back()));
 }
 
