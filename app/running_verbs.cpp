@@ -121,6 +121,18 @@ RenderOptions renderOptions(const RenderArguments& a, const std::string& scene) 
   return options;
 }
 
+// What stands in braces is to be {scene}.
+void checkPlaces(const std::string& file, bool several) {
+  if (several && file.find("{scene}") == std::string::npos)
+    usageError("of several scenes", file, "a name with {scene} in it, which becomes each file's name");
+  for (std::size_t at = file.find('{'); at != std::string::npos; at = file.find('{', at + 1)) {
+    const std::size_t end = file.find('}', at);
+    if (end == std::string::npos) return;
+    if (const std::string place = file.substr(at, end + 1 - at); place != "{scene}")
+      usageError(place, "in " + file, "{scene}, which becomes the scene file's name");
+  }
+}
+
 // Each scene has files of its own, and a run that takes up another draws nothing twice.
 void checkRender(const RenderArguments& a) {
   std::vector<std::string> files = a.outputs;
@@ -128,9 +140,7 @@ void checkRender(const RenderArguments& a) {
     if (!more.empty()) files.push_back(more);
   for (const auto& surface : a.run.surfaces) files.push_back(surface.at(1));
   files.insert(files.end(), a.run.records.begin(), a.run.records.end());
-  for (const std::string& file : files)
-    if (a.scenes.size() > 1 && file.find("{scene}") == std::string::npos)
-      usageError("of several scenes", file, "a name with {scene} in it, which becomes each file's name");
+  for (const std::string& file : files) checkPlaces(file, a.scenes.size() > 1);
   const bool asksForRun = !a.run.log.empty() || !a.run.frameTimes.empty() || !a.run.surfaces.empty() ||
                           !a.run.records.empty() || std::find(a.show.begin(), a.show.end(), "force") != a.show.end();
   if (!a.cache.empty() && asksForRun)

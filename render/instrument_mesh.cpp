@@ -103,8 +103,11 @@ void lathe(Builder& b, const std::vector<Ring>& profile, vec3 albedo, float faci
   }
 }
 
-void addShaft(Builder& b, float facing, int around) {
-  const float r = kShaftRadius;
+// `eye`: in the tool frame, m at scale 1. One inside the sheath would look through a black tube, of which the lens
+// hides what is nearest: it ends behind the collar then.
+void addShaft(Builder& b, vec3 eye, int around) {
+  const float r = kShaftRadius, facing = std::atan2(eye.y, eye.x);
+  const bool isInside = eye.z > kShaftStart && eye.z < kShaftEnd && std::hypot(eye.x, eye.y) < r;
   // Clevis that holds the hinge, and the collar.
   lathe(b,
         {{kHinge - 0.0012f, 0.0001f},
@@ -119,8 +122,8 @@ void addShaft(Builder& b, float facing, int around) {
   // Light is computed per vertex and interpolated without perspective: rings stay close.
   std::vector<Ring> sheath = {{kShaftStart, 0.0023f}, {kShaftStart + 0.0001f, r - 0.0001f}, {kShaftStart + 0.0004f, r}};
   constexpr float kSpacing = 0.006f;
-  for (int k = 1; k <= int((kShaftEnd - kShaftStart) / kSpacing); ++k)
-    sheath.push_back({kShaftStart + kSpacing * float(k), r});
+  const float length = isInside ? kSpacing : kShaftEnd - kShaftStart;
+  for (int k = 1; k <= int(length / kSpacing); ++k) sheath.push_back({kShaftStart + kSpacing * float(k), r});
   // Its end, closed, with an edge that is a little round.
   const float end = sheath.back().z;
   for (const Ring& ring : {Ring{0.0002f, r - 0.00006f}, {0.00034f, r - 0.0002f}, {0.0004f, r - 0.0004f}, {0.0004f, 0}})
@@ -227,7 +230,7 @@ void appendInstrument(const Instrument& instrument, const Viewpoint& view, int p
   const Cuts cuts = cutsFor(pictureHeight);
   for (const float side : {1.f, -1.f}) addJaw(builder, side, instrument.jawAngle, cuts);
   const vec3 toEye = glm::inverse(instrument.worldFromTool) * (view.position - instrument.tip);
-  addShaft(builder, std::atan2(toEye.y, toEye.x), cuts.around);
+  addShaft(builder, toEye / instrument.scale, cuts.around);
   // Teeth of a few pixels would be specks that flicker.
   const float metresPerPixel = 2 * std::max(glm::length(toEye), 1e-3f) * view.tangent / float(pictureHeight);
   const float teeth = smoothStep(4, 9, instrument.scale * kHinge / kTeeth / metresPerPixel);

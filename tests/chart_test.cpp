@@ -232,7 +232,11 @@ TEST_F(ChartCommand, GnuplotDrawsIt) {
   ASSERT_EQ(spheres.size(), 3u);
   EXPECT_EQ(spheres[1][0], "3");
   EXPECT_GT(std::stod(spheres[1][1]), std::stod(spheres[2][1]));  // gap
-  EXPECT_GT(std::stod(spheres[1][5]), std::stod(spheres[2][5]));  // error
+  EXPECT_GT(std::stod(spheres[1][5]), 0.5);                       // error
+  EXPECT_EQ(spheres[2][5], "");                                   // of what the former is measured against
+  EXPECT_NE(spheres[2][4], "");                                   // cost
+  EXPECT_EQ(r.out.find("full_7_spheres.cpu_at"), std::string::npos) << r.out;
+  EXPECT_NE(r.err.find("measured against the model of 7 spheres"), std::string::npos) << r.err;
   EXPECT_NE(readFile(folder / "out/spheres.svg").find("largest gap"), std::string::npos);
   EXPECT_TRUE(svg.ends_with("</svg>\n\n") || svg.ends_with("</svg>\n")) << svg.substr(svg.size() - 20);
 }

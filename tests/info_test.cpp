@@ -31,6 +31,26 @@ TEST(Info, TellsOfModelsAndScenes) {
   expectRefusal(runProgram({"info", folder / "none.xml"}), 1, {"none.xml"});
 }
 
+// Who chooses between the integrators asks for it before.
+TEST(Info, WhatExplicitStepsCouldTakeDoesNotDependOnTheIntegrator) {
+  const TemporaryFolder folder;
+  const auto stable = [&](const std::string& dynamics) {
+    folder.write("x.xml",
+                 "<scene name=\"x\"><clock duration=\"1\"/><dynamics " + dynamics +
+                     "/><tissue name=\"t\" young=\"9e3\"/><body name=\"b\" tissue=\"t\" look=\"liver\" model=\"" +
+                     kSource +
+                     "assets/gallbladder/gallbladder.model.xml\"><fix spheres=\"1\"/></body>"
+                     "<camera position=\"0 0 1\" target=\"0 0 0\"/></scene>");
+    const ProgramResult r = runProgram({"info", folder / "x.xml"});
+    EXPECT_EQ(r.exitCode, 0) << r.err;
+    return valueOf(r.out, "stable_substep");
+  };
+  const std::string expected = stable("integrator=\"explicit\"");
+  EXPECT_GT(std::stod(expected), 1e-4);
+  EXPECT_EQ(stable("integrator=\"implicit\""), expected);
+  EXPECT_EQ(stable("integrator=\"implicit\" order=\"2\""), expected);
+}
+
 TEST(Info, TellsOfTrajectoriesAndRecordings) {
   const std::string scenes = kSource + "scenes/";
   const ProgramResult recording = runProgram({"info", scenes + "recorded/hand.xml"}),
@@ -81,6 +101,12 @@ TEST(Info, TellsOfMeshesWhetherAModelCanBeBuilt) {
   EXPECT_EQ(valueOf(open.out, "upper"), "1 2 1 m");
   EXPECT_NE(open.err.find("no model can be built"), std::string::npos) << open.err;
   expectRefusal(runProgram({"info", kSource + "scenes/gallbladder.csv", "--unit", "mm"}), 2, {"--unit", "a mesh"});
+  const std::string corners = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\n", sides = "f 1 2 4\nf 2 3 4\nf 1 4 3\n";
+  folder.write("even.obj", corners + sides + "f 1 3 2\n");
+  EXPECT_EQ(runProgram({"info", folder / "even.obj"}).err, "");
+  folder.write("sliver.obj", corners + "v .05 .001 0\n" + sides + "f 1 3 5\nf 3 2 5\nf 2 1 5\n");
+  const ProgramResult sliver = runProgram({"info", folder / "sliver.obj"});
+  EXPECT_NE(sliver.err.find("sliver.obj: note: 1 of 6 triangles are slivers"), std::string::npos) << sliver.err;
   folder.write("bad.obj", "v 0 0\n");
   expectRefusal(runProgram({"info", folder / "bad.obj"}), 1, {"bad.obj:1"});
 }

@@ -62,6 +62,15 @@ TEST(Plot, DrawsMagnitudesDepthsAndShades) {
   EXPECT_TRUE(has(script, "from first 0.1, graph 0 to first 0.16, graph 1"));   // grab
 }
 
+TEST(Plot, WhatStaysZeroIsCountedInOnes) {
+  const TemporaryFolder folder;
+  folder.write(
+      "run.csv",
+      "t,sac.volume_ratio,sac.dynamic_nodes,energy.kinetic,energy.elastic\n0.02,1,0,1e-3,0\n0.04,1,0,1e-3,0\n");
+  const std::string script = plotScript(readLog(folder / "run.csv"), nullptr, "run", PlotFormat::svg);
+  EXPECT_TRUE(has(script, "set yrange [0:1]")) << script;
+}
+
 TEST(Plot, ThinsManyRowsWithoutLosingAPeak) {
   const TemporaryFolder folder;
   std::string text = "t,sac.volume_ratio,sac.dynamic_nodes,energy.kinetic,energy.elastic,impulse_mismatch\n";

@@ -51,6 +51,27 @@ TEST(Instrument, TheShaftIsClosedAtItsEnd) {
   EXPECT_NEAR(area / (std::numbers::pi_v<float> * kShaftRadius * kShaftRadius), 1, 0.03);
 }
 
+// One that looks along the shaft sees the jaws, and no tube from inside.
+TEST(Instrument, TheShaftEndsBeforeAnEyeThatItWouldHide) {
+  Instrument instrument;
+  instrument.tip = {0.1f, 0.2f, 0.3f};
+  instrument.scale = 2;
+  const auto lengthSeenFrom = [&](const vec3& eye) {
+    SceneMesh mesh;
+    Viewpoint view;
+    view.position = eye;
+    appendInstrument(instrument, view, 720, mesh);
+    float end = 0;
+    for (const vec3& p : mesh.position) end = std::max(end, p.z - instrument.tip.z);
+    return end;
+  };
+  const float inside = 1.9f * kShaftRadius, outside = 2.1f * kShaftRadius;
+  EXPECT_LT(lengthSeenFrom(instrument.tip + vec3(inside, 0, 0.2f)), 0.08f);
+  EXPECT_GT(lengthSeenFrom(instrument.tip + vec3(outside, 0, 0.2f)), 2 * 0.99f * kShaftEnd);
+  EXPECT_GT(lengthSeenFrom(instrument.tip + vec3(inside, 0, 2.1f * kShaftEnd)), 2 * 0.99f * kShaftEnd) << "behind it";
+  EXPECT_GT(lengthSeenFrom(instrument.tip - vec3(0, 0, 0.2f)), 2 * 0.99f * kShaftEnd) << "before the jaws";
+}
+
 TEST(Touch, StretchPalesAndSqueezeReddens) {
   const SceneMesh rest = sheet(10, 0.003f);
   for (const float factor : {0.8f, 1.f, 1.2f}) {

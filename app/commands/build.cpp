@@ -192,6 +192,7 @@ void readMeshes(const BuildOptions& options, std::vector<BuildJob>& jobs) {
     job.mesh = naming(job.meshPath, [&] { return repairMesh(input); });
     noteSize(job.meshPath, input);  // of one that is not refused
     noteRepairs(job.meshPath, job.mesh.notes);
+    noteCost(job.meshPath, job.mesh.mesh);
     job.settings.renderLevels = options.renderLevels.value_or(renderLevelsFor(job.mesh.mesh.triangles.size()));
     if (!job.finePath.empty()) job.fine = readMesh(job.finePath, scale);
   }

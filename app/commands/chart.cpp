@@ -263,6 +263,11 @@ ChartTruth runReference(std::vector<ChartRun>& runs, const LoadedScene& base,
   ChartTruth truth = truthOfRun(base, reference.moments);
   truth.step = run.step;
   truth.spheres = run.spheres;
+  if (run.style < 0) {
+    truth.ownCurve = run.curve;
+    tell("note: all is measured against the model of {} spheres: it has no error of its own but of steps\n",
+         run.spheres);
+  }
   return truth;
 }
 
@@ -314,7 +319,7 @@ std::vector<Result> chartResults(const std::vector<ChartPoint>& points, const Ch
   for (const double percent : {1.0, 2.0, 5.0, 10.0}) {
     std::map<std::string, double> cheapest;
     for (const ChartPoint& p : points) {
-      if (p.failedAt || p.errorMax > percent) continue;
+      if (p.failedAt || p.errorMax > percent || p.curve == truth.ownCurve) continue;
       const auto [known, isNew] = cheapest.try_emplace(p.curve, p.cpu);
       if (!isNew) known->second = std::min(known->second, p.cpu);
     }
@@ -328,7 +333,8 @@ std::vector<Result> chartResults(const std::vector<ChartPoint>& points, const Ch
 // Per model how well its balls fit, and the first method's run at the smallest step that did not fail. Points come in
 // the order of the runs.
 std::vector<SphereChartRow> sphereRows(const ChartOptions& options, const LoadedScene& base,
-                                       const std::vector<ChartRun>& runs, const std::vector<ChartPoint>& points) {
+                                       const std::vector<ChartRun>& runs, const std::vector<ChartPoint>& points,
+                                       const ChartTruth& truth) {
   std::vector<SphereChartRow> rows;
   for (std::size_t m = 0; m < options.models.size(); ++m) {
     RunOptions run = options.run;
@@ -349,6 +355,7 @@ std::vector<SphereChartRow> sphereRows(const ChartOptions& options, const Loaded
       row.cpu = p.cpu;
       row.errorMax = p.errorMax;
       row.errorRms = p.errorRms;
+      row.isReference = p.curve == truth.ownCurve;
     }
     rows.push_back(row);
   }
@@ -388,7 +395,7 @@ int runChart(const ChartOptions& options) {
   writeChart(chart + ".csv", points, truth.cost);
   drawByGnuplot(chart, chartScript(base.scene.name, points, truth.cost));
   if (options.models.size() > 1) {
-    const std::vector<SphereChartRow> rows = sphereRows(options, base, runs, points);
+    const std::vector<SphereChartRow> rows = sphereRows(options, base, runs, points, truth);
     writeSphereChart(spheres + ".csv", rows, truth.cost);
     drawByGnuplot(spheres, sphereChartScript(base.scene.name, rows, truth.cost));
   }

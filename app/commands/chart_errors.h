@@ -15,6 +15,7 @@ struct ChartTruth {
   ChartCost cost = ChartCost::perSimulatedSecond;
   double step = 0;                  // s, of the reference run, where that is one of this program,
   int spheres = 0;                  // and its number of spheres
+  std::string ownCurve;             // of several models, that of the same method and model: its error is of steps alone
   std::vector<ChartPoint> ownRuns;  // what the references' own program took
 };
 

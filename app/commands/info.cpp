@@ -90,6 +90,16 @@ void addFrequencies(const BodyDescription& body, std::vector<Result>& results) {
     results.push_back({fmt::format("body.{}.natural_frequencies", body.name), joined(list, " "), "Hz"});
 }
 
+// s, by the estimate: of a scene that runs in implicit steps, too, of the dampers that explicit ones would have.
+double stableSubstep(const Scene& scene, const World& world) {
+  if (scene.dynamics.integrator == Integrator::explicitEuler) return world.stableSubstep();
+  WorldSettings settings = scene.dynamics;
+  settings.integrator = Integrator::explicitEuler;
+  settings.order = 1;
+  settings.substeps = 1;
+  return World(settings, {scene.bodies.begin(), scene.bodies.end()}).stableSubstep();
+}
+
 std::vector<Result> sceneResults(const LoadedScene& loaded) {
   const Scene& scene = loaded.scene;
   const World world = makeWorld(loaded);
@@ -106,7 +116,7 @@ std::vector<Result> sceneResults(const LoadedScene& loaded) {
                                  {"dynamics", numberText(scene.dynamicsRate), "Hz"},
                                  {"substeps_per_frame", fmt::format("{}", world.substepsPerFrame()), ""},
                                  {"substep", numberText(world.substep()), "s"},
-                                 {"stable_substep", numberText(world.stableSubstep()), "s"},
+                                 {"stable_substep", numberText(stableSubstep(scene, world)), "s"},
                                  {"gravity", vectorText(scene.dynamics.gravity), "m/s2"},
                                  {"picture", fmt::format("{}x{}", scene.width, scene.height), ""},
                                  {"fps", numberText(scene.fps), "Hz"},
@@ -167,6 +177,7 @@ std::vector<Result> meshResults(const std::string& path, const std::string& unit
   try {
     const RepairedMesh repaired = repairMesh(mesh);
     noteRepairs(path, repaired.notes);
+    noteCost(path, repaired.mesh);
     results.insert(results.end(), {{"nodes", numberText(repaired.mesh.vertices.size()), ""},
                                    {"triangles", numberText(repaired.mesh.triangles.size()), ""},
                                    {"volume", numberText(enclosedVolume(repaired.mesh)), "m3"},

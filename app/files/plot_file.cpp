@@ -221,7 +221,8 @@ std::string axesOf(const Panel& panel) {
   }
   if (panel.fromZero) least = std::min(least, 0.0);
   // A constant is drawn with room around it.
-  const double step = nextRoundNumber(std::max({(most - least) / 4, 1e-3 * std::abs(most), 1e-6}));
+  const bool nothing = least == 0 && most == 0;
+  const double step = nothing ? 1 : nextRoundNumber(std::max({(most - least) / 4, 1e-3 * std::abs(most), 1e-6}));
   const double low = std::floor(least / step + 1e-9) * step,
                high = std::max(std::ceil(most / step - 1e-9) * step, low + step);
   return fmt::format("unset logscale y\nset yrange [{:.9g}:{:.9g}]\nset ytics {:.9g}\nset format y '%g'\n", low, high,

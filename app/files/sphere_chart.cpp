@@ -17,8 +17,8 @@ void writeSphereChart(const std::string& path, const std::vector<SphereChartRow>
   file.write(fmt::format("spheres,gap_max[%],gap_mean[%],step[s],cpu[{}],error_max[%],error_rms[%]\n", costUnit(cost)));
   for (const SphereChartRow& r : rows) {
     file.write(fmt::format("{},{:.4g},{:.4g},", r.spheres, r.gapMax, r.gapMean));
-    file.write(r.step > 0 ? fmt::format("{:.6g},{:.4g},{:.4g},{:.4g}\n", r.step, r.cpu, r.errorMax, r.errorRms)
-                          : ",,,\n");
+    const std::string errors = r.isReference ? "," : fmt::format("{:.4g},{:.4g}", r.errorMax, r.errorRms);
+    file.write(r.step > 0 ? fmt::format("{:.6g},{:.4g},{}\n", r.step, r.cpu, errors) : ",,,\n");
   }
   file.commit();
 }
@@ -45,8 +45,9 @@ std::string sphereChartScript(const std::string& title, const std::vector<Sphere
     ticks += fmt::format("{}{}", ticks.empty() ? "" : ", ", r.spheres);
     // gnuplot leaves out what is no number, and zeros have no logarithm.
     const auto shown = [&](double value, bool any) { return any && value > 0 ? fmt::format("{:.6g}", value) : "NaN"; };
-    data += fmt::format("{} {} {} {} {} {}\n", r.spheres, shown(r.gapMax, true), shown(r.errorMax, r.step > 0),
-                        shown(r.errorRms, r.step > 0), shown(r.cpu, r.step > 0), shown(kChartRim, r.step == 0));
+    const bool hasError = r.step > 0 && !r.isReference;
+    data += fmt::format("{} {} {} {} {} {}\n", r.spheres, shown(r.gapMax, true), shown(r.errorMax, hasError),
+                        shown(r.errorRms, hasError), shown(r.cpu, r.step > 0), shown(kChartRim, r.step == 0));
   }
   out += fmt::format("set xtics ({})\nset xrange [{:.6g}:{:.6g}]\n", ticks, 0.8 * rows.front().spheres,
                      1.25 * rows.back().spheres);

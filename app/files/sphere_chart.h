@@ -14,6 +14,7 @@ struct SphereChartRow {
   double step = 0;                    // s; 0: every run failed
   double cpu = 0;                     // as ChartCost says
   double errorMax = 0, errorRms = 0;  // %
+  bool isReference = false;           // what the others are measured against: it has no error
 };
 
 // CSV, a row per number of spheres. Errors are those of OutputFile.

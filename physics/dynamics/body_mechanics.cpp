@@ -208,6 +208,10 @@ void setMasses(const BodyDescription& body, BodyMechanics& out) {
   const std::vector<double> wholeMass = mass;
   const std::vector<Matrix3d> wholeMoment = moment;
   const bool full = body.surface != SurfaceMode::skin;
+  const auto isMassless = [](const Attachment& a) { return a.volume == 0; };
+  const bool anyMass = !std::all_of(out.attachments.begin(), out.attachments.end(), isMassless);
+  require(!full || out.attachments.empty() || anyMass,
+          "its model's surface has no mass (--surface-mass 0): expected surface=\"skin\", or a model with some");
   for (std::size_t i = 0; i < out.attachments.size(); ++i) {
     const double volume = out.attachments[i].volume;
     require(!full || volume > 0, fmt::format("its model's node {} has volume {}: expected more than 0 m3", i, volume));
