@@ -209,8 +209,10 @@ std::string sceneText(const std::string& name, const SoftBodyModel& model, const
 }
 
 std::string trajectoryText(const Layout& l) {
-  const Vector3d view = 0.35 * rightOf(l) + 0.3 * Vector3d::UnitY() + 0.2 * towardsCamera(l);
-  const Vector3d shaft = (l.normal + view).normalized();  // comes in from the upper right
+  // It comes in from above the free end, of a body that stands from the upper right, and half aside: straight from the
+  // camera it would hide what it does.
+  const Vector3d aside = l.axis == 1 ? rightOf(l) : Vector3d(-l.held * Vector3d::Unit(l.axis));
+  const Vector3d shaft = (0.8 * l.normal + 0.65 * aside + 0.45 * Vector3d::UnitY()).normalized();
   const Eigen::Quaterniond straight = rotationBetween(Vector3d::UnitZ(), shaft);
   const Eigen::Quaterniond twisted = straight * Eigen::AngleAxisd(1.2, Vector3d::UnitZ());
   Vector3d sideways = Vector3d::Zero();

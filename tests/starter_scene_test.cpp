@@ -221,6 +221,11 @@ TEST(StarterScene, IsCheckedWhateverTheMeshIsCalled) {
     const std::string scene = made.out.substr(made.out.find("scene ") + 6);
     EXPECT_EQ(runProgram({"check", scene.substr(0, scene.find('\n'))}).out, "valid yes\n") << name;
   }
+  std::filesystem::copy_file(kMesh, folder / "\u0441\u0435\u0440\u0434\u0446\u0435.obj");
+  std::filesystem::copy_file(kMesh, folder / "tube n\u00e0 m\u00eb.obj");
+  EXPECT_TRUE(
+      makeStarter(folder, folder / "\u0441\u0435\u0440\u0434\u0446\u0435.obj").out.ends_with("mine/organ.xml\n"));
+  EXPECT_TRUE(makeStarter(folder, folder / "tube n\u00e0 m\u00eb.obj").out.ends_with("mine/tube_n_m.xml\n"));
   const std::string model = readFile(folder / "mine/my_organ.model.xml");
   EXPECT_NE(model.find("settings=\"medulla build 'my organ.obj' --"), std::string::npos) << model.substr(0, 400);
 }

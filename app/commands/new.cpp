@@ -28,8 +28,17 @@ static void requireWithinReach(const std::string& mesh, double metresPerUnit) {
                       mesh, x.lpNorm<Eigen::Infinity>(), reach));
 }
 
+// What is no plain character becomes one stroke, however many bytes it has.
+static std::string nameOf(const std::string& mesh) {
+  std::string out;
+  for (const char c : plainName(fs::path(mesh).stem().string()))
+    if (c != '_' || (!out.empty() && out.back() != '_')) out += c;
+  if (!out.empty() && out.back() == '_') out.pop_back();
+  return out.empty() ? "organ" : out;
+}
+
 int runNew(const NewOptions& options) {
-  const std::string name = plainName(fs::path(options.build.meshes[0]).stem().string());
+  const std::string name = nameOf(options.build.meshes[0]);
   const fs::path folder = options.folder;
   const auto file = [&](const char* ending) { return (folder / (name + ending)).string(); };
   const std::string scenePath = file(".xml"), trajectoryPath = file(".csv"), modelPath = file(".model.xml");
