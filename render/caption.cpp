@@ -19,11 +19,15 @@ float widestOf(const std::vector<std::string>& lines, float height) {
   return widest;
 }
 
-// How many letters of a word fit, at least one.
+// Bytes of as many letters of a word as fit, at least one's.
 std::size_t lettersThatFit(const std::string& word, float height, float width) {
-  std::size_t count = word.size();
-  while (count > 1 && textWidth(word.substr(0, count), height) > width) --count;
-  return count;
+  std::size_t end = 0;
+  for (std::size_t next = 1; next <= word.size(); ++next) {
+    if (next < word.size() && (word[next] & 0xC0) == 0x80) continue;  // within a letter of UTF-8
+    if (end > 0 && textWidth(word.substr(0, next), height) > width) break;
+    end = next;
+  }
+  return end;
 }
 
 // Between words; within one that is wider than a line.

@@ -29,7 +29,7 @@ class Ink {
 };
 
 // Letters of strokes, `height` px high from the line that they stand on to the top of capitals; a third of it more
-// below. Characters beyond ASCII are empty boxes.
+// below, as much above accents. Characters that glyphs.h does not know are empty boxes.
 float textWidth(const std::string& text, float height);                             // px
 void writeText(const std::string& text, glm::vec2 corner, float height, Ink& ink);  // corner: upper left
 

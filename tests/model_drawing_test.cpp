@@ -6,6 +6,7 @@
 
 #include "app/scene_view.h"
 #include "render/caption.h"
+#include "render/glyphs.h"
 #include "render/stroke_text.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
@@ -221,19 +222,49 @@ TEST(Caption, FitsIntoPicturesOfAnySize) {
   EXPECT_EQ(tiny.pixels, blackImage(16, 16).pixels);
 }
 
+// The characters of UTF-8, each by itself.
+std::vector<std::string> charactersOf(const std::string& text) {
+  std::vector<std::string> out;
+  for (const char c : text)
+    if ((c & 0xC0) == 0x80)
+      out.back() += c;
+    else
+      out.emplace_back(1, c);
+  return out;
+}
+
 TEST(StrokeText, EveryLetterDiffersFromTheOthersAndFromAMissingOne) {
   std::string letters;
   for (char c = '!'; c <= '~'; ++c) letters += c;
+  letters += "°±²³µ·×ßÆæŒœı–—„…";
+  letters += "ÀÁÂÃÄÅÇÈÉÊËÌÍÎÏÑÒÓÔÕÖØÙÚÛÜÝàáâãäåçèéêëìíîïñòóôõöøùúûüýÿ";
+  letters += "ĀāĂăĄąĆćČčĎďĐđĒēĖėĘęĚěĞğĪīĮįİŁłŃńŇňŌōŐőŔŕŘřŚśŞşŠšŢţŤťŪūŮůŰűŲųŸŹźŻżŽž";
   std::vector<std::vector<std::uint8_t>> seen;
-  for (const char c : letters + "\x01") {
-    Image image = blackImage(40, 60);
+  for (const std::string& letter : charactersOf(letters + "\x01")) {
+    Image image = blackImage(70, 72);
     Ink ink(image, {0, 0}, {image.width, image.height});
-    writeText(std::string(1, c), {4, 4}, 36, ink);
+    writeText(letter, {4, 16}, 36, ink);
     ink.apply({1, 1, 1}, 1);
-    EXPECT_EQ(std::count(seen.begin(), seen.end(), image.pixels), 0) << c;
+    const auto same = std::find(seen.begin(), seen.end(), image.pixels);
+    EXPECT_EQ(same, seen.end()) << letter << " as number " << same - seen.begin();
     seen.push_back(image.pixels);
+    EXPECT_EQ(isDrawable(letter), letter != "\x01") << letter;
   }
-  EXPECT_EQ(textWidth("\xc3\xa4", 6), textWidth("\x01", 6));  // one box for a letter of two bytes
+}
+
+TEST(StrokeText, WhatNobodyDrawsIsABoxPerCharacter) {
+  const float box = textWidth("\x01", 6);
+  EXPECT_EQ(textWidth("放す", 6), 2 * box);
+  EXPECT_EQ(textWidth("\xe6\x94", 6), 2 * box) << "cut within a character";
+  EXPECT_EQ(textWidth("\xff", 6), box);
+  EXPECT_EQ(textWidth("\xc3"
+                      "a",
+                      6),
+            box + textWidth("a", 6));
+  EXPECT_EQ(textWidth("é", 6), textWidth("e", 6));
+  EXPECT_FALSE(isDrawable("放す"));
+  EXPECT_FALSE(isDrawable("\xff"));
+  EXPECT_TRUE(isDrawable("Gallenblase “gelöst” – l’a lâché"));  // quotation marks are straight ones
 }
 
 }  // namespace medulla

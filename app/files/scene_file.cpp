@@ -15,6 +15,7 @@
 #include "app/scene.h"
 #include "physics/content_hash.h"
 #include "physics/model/rotation_between.h"
+#include "render/glyphs.h"
 #include "render/renderer.h"
 
 namespace medulla {
@@ -373,9 +374,8 @@ void readCaptions(const XmlElement& output, Scene& scene) {
     SceneCaption caption{readNumber(*e, "from", 0, kNotNegative), readNumber(*e, "to", 0, kNotNegative),
                          readText(*e, "text")};
     if (caption.text.empty()) refuse(*e, "text", "expected words");
-    const auto drawable = [](char c) { return ' ' <= c && c <= '~'; };  // others would be boxes
-    if (!std::all_of(caption.text.begin(), caption.text.end(), drawable))
-      refuse(*e, "text", "expected characters of ASCII alone");
+    if (!isDrawable(caption.text))
+      refuse(*e, "text", "expected Latin letters, digits and signs: others cannot be drawn");
     if (caption.to <= caption.from) refuse(*e, "to", "expected a later time than from");
     if (!scene.captions.empty() && caption.from < scene.captions.back().to)
       refuse(*e, "from", "expected no earlier time than the end of the caption before it");
