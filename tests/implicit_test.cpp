@@ -206,6 +206,27 @@ TEST_P(ImplicitLinks, RestsWhereTheExplicitStepRests) {
   }
 }
 
+// A load so small that what it accelerates in a step is of no account adds up all the same.
+TEST(Implicit, AMillionthOfALoadBendsAMillionthAsFar) {
+  for (const int order : {1, 2}) {
+    const auto wayUnder = [order](double share) {
+      BodyDescription body = tube(SurfaceMode::full, true, 1);
+      DeadLoad load;
+      load.node = static_cast<int>(body.model->restNodes.size()) - 1;
+      load.force = share * Vector3d(0.002, 0.004, -0.001);
+      body.deadLoads = {load};
+      World world(implicitly(0.02, order, {0, 0, 0}), {body});
+      run(world, 4);
+      DynamicsFrame frame;
+      world.readFrame(frame);
+      return (frame.bodies[0].nodes[load.node] - body.model->restNodes[load.node]).norm() / share;
+    };
+    const double expected = wayUnder(1e-2);
+    EXPECT_GT(expected, 1e-4);
+    EXPECT_NEAR(wayUnder(1e-8) / expected, 1, 0.01) << "order " << order;
+  }
+}
+
 // Free fall deforms nothing: stiffness has no part in it. Backward Euler falls n (n + 1) / 2 steps' ways.
 TEST_P(ImplicitLinks, ABodyFallsAsFastHoweverStiff) {
   const double step = 0.005, gravity = 9.81;

@@ -375,6 +375,31 @@ TEST(SurfaceParts, ATurningBodyKeepsMomentumWhereTheyJoin) {
   EXPECT_LT((left.angular - before.angular).norm(), 1e-4 * before.angular.norm());
 }
 
+// How fast the whole travels is nobody's business.
+TEST(SurfaceParts, ATravellingBodyTurnsAsOneThatStays) {
+  std::vector<std::vector<Vector3d>> spins;
+  for (const Vector3d& velocity : {Vector3d(0, 0, 0), Vector3d(0, 4, -3)}) {
+    World world = worldOf(tube(SurfaceMode::contact, false), Vector3d::Zero());
+    WorldData& d = world.data();
+    turn(d, {3, 0, 4});
+    for (int i = 0; i < d.spheres.count; ++i)
+      d.spheres.velocity[i] = quadOf(vectorOf(d.spheres.velocity[i]) + velocity);
+    for (const int i : d.ranges[0].node) setVector(d.nodes.velocity, i, vectorAt(d.nodes.velocity, i) + velocity);
+    Loads nothing = holding(world, kNode, Vector3d::Zero());
+    nothing.heldNodes[0].stiffness = nothing.heldNodes[0].damping = 0;
+    std::vector<Vector3d>& spin = spins.emplace_back();
+    int joined = 0;
+    for (int k = 0; k < 60; ++k) {
+      world.advance(k == 3 ? nothing : Loads());
+      joined = std::max(joined, world.dynamicNodes(0));
+      for (int i = 0; i < d.spheres.count; ++i) spin.push_back(vectorOf(d.spheres.angularVelocity[i]));
+    }
+    EXPECT_GT(joined, 0);
+    EXPECT_EQ(world.dynamicNodes(0), 0);
+  }
+  for (std::size_t k = 0; k < spins[0].size(); ++k) ASSERT_LT((spins[1][k] - spins[0][k]).norm(), 1e-6) << k;
+}
+
 // What joins a body under way goes with it from the start: a tube of which a tool wants nothing, drawn along by it.
 TEST(SurfaceParts, WhatJoinsAMovingBodyIsNotLeftBehind) {
   World world = worldOf(tube(SurfaceMode::contact, false), Vector3d::Zero());

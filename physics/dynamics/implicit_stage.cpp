@@ -242,7 +242,9 @@ bool search(WorldData& d, ImplicitData& s, const StageLoads& stage, double& left
 // Rounding stops some iterations of very stiff bodies just short of what is enough: within this.
 constexpr double kSettled = 10;
 
-// sqrt(J / kg): the residual per mass that accelerations of no account leave.
+// sqrt(J / kg): the residual per mass that accelerations of no account leave. Of what does no more than these, a share
+// counts (setEnough): all of it left in every step, a body under it would rest where it is.
+constexpr double kShareOfActing = 1e-3;
 double leastResidual(const ImplicitData& s) {
   constexpr double kLeastAcceleration = 1e-5;  // m/s2
   return s.duration * kLeastAcceleration;
@@ -262,14 +264,13 @@ namespace {
 void setEnough(const WorldData& d, ImplicitData& s, double share) {
   s.enough.resize(s.left.size());
   for (std::size_t b = 0; b < s.left.size(); ++b) {
-    const double least = leastResidual(s) * std::sqrt(s.bodyMass[b]);
-    double size = std::sqrt(s.left[b]);
-    if (s.turning[b] > 0) {
-      const double external = impulseEnergy(
-          d, d.ranges[b], [&](int quad) { return Vector3d(vectorOf(s.residual[quad]) - vectorOf(s.balance[quad])); });
-      const double weight = s.duration * vectorOf(d.gravity).norm() * std::sqrt(s.bodyMass[b]);
-      size = std::min(size, std::sqrt(external) + weight + s.turning[b] + std::sqrt(2 * s.bodies[b].elasticBefore));
-    }
+    const double weight = s.duration * vectorOf(d.gravity).norm() * std::sqrt(s.bodyMass[b]);
+    const double acting = weight + std::sqrt(impulseEnergy(d, d.ranges[b], [&](int quad) {
+                            return Vector3d(vectorOf(s.residual[quad]) - vectorOf(s.balance[quad]));
+                          }));
+    double size = std::sqrt(s.left[b]), least = leastResidual(s) * std::sqrt(s.bodyMass[b]);
+    if (acting > 0) least = std::min(least, kShareOfActing * acting);
+    if (s.turning[b] > 0) size = std::min(size, acting + s.turning[b] + std::sqrt(2 * s.bodies[b].elasticBefore));
     const double enough = share * size + least;
     s.enough[b] = enough * enough;
   }

@@ -167,7 +167,8 @@ void partsChanged(WorldData& d) {
 
 // Changing which parts move loses momentum: a node does not move exactly like its share of a turning sphere, and the
 // momentum that edges gave a node vanishes when it is carried again. A free body gets the difference back as one rigid
-// motion of the whole; at the hosts alone it would be a jolt.
+// motion of the whole; at the hosts alone it would be a jolt. What is kept about is the body's own centre: that of its
+// masses jumps by what nodes' shares lie off them, and about a fixed point a body that travels would begin to spin.
 void changeParts(WorldData& d) {
   std::vector<WholeMotion> before, now;
   wholeMotions(d, before);
@@ -175,7 +176,8 @@ void changeParts(WorldData& d) {
   wholeMotions(d, now);
   for (std::size_t b = 0; b < now.size(); ++b) {
     if (d.bodies[b].surface != SurfaceMode::contact || !isFree(d.ranges[b]) || now[b].mass == 0) continue;
-    addMomenta(d, static_cast<int>(b), now[b], before[b].linear - now[b].linear, before[b].angular - now[b].angular);
+    const Vector3d linear = before[b].linear - now[b].linear, spin = spinMomentum(before[b]) - spinMomentum(now[b]);
+    addMomenta(d, static_cast<int>(b), now[b], linear, spin + (now[b].moment / now[b].mass).cross(linear));
   }
 }
 
