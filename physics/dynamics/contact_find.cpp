@@ -118,7 +118,7 @@ bool outrunsContact(const WorldData& d, double time) {
   return false;
 }
 
-// Explicit substeps are as long as tissue allows, a whole frame where nothing gives. Where a ball outruns what is
+// Explicit substeps are as long as tissue allows, 10 ms where nothing gives. Where a ball outruns what is
 // looked at in any case (outrunsContact), all is looked at from as far away as the fastest may close within one, and
 // lists go further, too.
 static void foreseeReach(WorldData& d) {
