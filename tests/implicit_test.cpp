@@ -374,6 +374,22 @@ TEST(Implicit, ATurnedAndMovedWorldIsTheSameWorld) {
   EXPECT_LT((node(place) - node(Eigen::Isometry3d::Identity())).norm(), 1e-6);
 }
 
+// By contact a step may be long while no ball outruns what is looked at: where nothing stands still, but for how fast
+// all travel together.
+TEST(Implicit, WhereThereIsNothingToTouchASpeedCostsNothing) {
+  const auto node = [](ContactMode contact) {
+    WorldSettings settings = implicitly(0.01, 1, {0, 0, 0});
+    settings.contact = contact;
+    World world(settings, {tube(SurfaceMode::full, false)});
+    spin(world, {0, 8, -6}, {3, 8, 5});
+    run(world, 0.2);
+    DynamicsFrame frame;
+    world.readFrame(frame);
+    return frame.bodies[0].nodes.back();
+  };
+  EXPECT_LT((node(ContactMode::balls) - node(ContactMode::none)).norm(), 1e-12);
+}
+
 TEST(Implicit, AToolFeelsWhatTheBodyGets) {
   for (const int order : {1, 2}) {
     for (const SurfaceMode surface : {SurfaceMode::full, SurfaceMode::skin}) {

@@ -104,14 +104,22 @@ void findContacts(WorldData& d) {
   findStaticContacts(d, moved);
 }
 
+static Lanes ballVelocity(const WorldData& d, int i) {
+  return load(d.spheres.velocity[i]) + crossProduct(load(d.spheres.angularVelocity[i]), load(d.contact.arm[i]));
+}
+
 // Two balls that each move by half the reach are looked at before they touch; with half a radius more they overlap by
-// that at most before they are, which neither a centre nor the middle of what is thin passes.
+// that at most before they are, which neither a centre nor the middle of what is thin passes. Where nothing stands
+// still, how fast all travel together does not count: a body that falls alone would be halved for it, and damped less.
 bool outrunsContact(const WorldData& d, double time) {
   const ContactData& c = d.contact;
   if (c.mode == ContactMode::none) return false;
+  Lanes common = splat(0);
+  for (int i = 0; i < d.spheres.count && c.statics.empty(); ++i) common = common + ballVelocity(d, i);
+  common = splat(1.0 / std::max(d.spheres.count, 1)) * common;
   const double half = 0.5 * c.reach;
-  for (std::size_t i = 0; i < c.ball.size(); ++i) {
-    const Lanes v = load(d.spheres.velocity[i]) + crossProduct(load(d.spheres.angularVelocity[i]), load(c.arm[i]));
+  for (int i = 0; i < d.spheres.count; ++i) {
+    const Lanes v = ballVelocity(d, i) - common;
     const double farthest = half + 0.5 * c.ball[i].v[3];
     if (time * time * dotProduct(v, v) > farthest * farthest) return true;
   }
