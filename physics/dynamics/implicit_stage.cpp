@@ -242,9 +242,11 @@ bool search(WorldData& d, ImplicitData& s, const StageLoads& stage, double& left
 // Rounding stops some iterations of very stiff bodies just short of what is enough: within this.
 constexpr double kSettled = 10;
 
-// sqrt(J / kg): the residual per mass that accelerations of no account leave. Of what does no more than these, a share
-// counts (setEnough): all of it left in every step, a body under it would rest where it is.
+// Of what acts and does no more than accelerations of no account, this share is left at most: all of it left in every
+// step, a body under it would rest where it is.
 constexpr double kShareOfActing = 1e-3;
+
+// sqrt(J / kg): the residual per mass that accelerations of no account leave.
 double leastResidual(const ImplicitData& s) {
   constexpr double kLeastAcceleration = 1e-5;  // m/s2
   return s.duration * kLeastAcceleration;

@@ -175,7 +175,8 @@ void changeParts(WorldData& d) {
   partsChanged(d);
   wholeMotions(d, now);
   for (std::size_t b = 0; b < now.size(); ++b) {
-    if (d.bodies[b].surface != SurfaceMode::contact || !isFree(d.ranges[b]) || now[b].mass == 0) continue;
+    if (d.bodies[b].surface != SurfaceMode::contact || !isFree(d.ranges[b])) continue;
+    if (before[b].mass == 0 || now[b].mass == 0) continue;  // asleep
     const Vector3d linear = before[b].linear - now[b].linear, spin = spinMomentum(before[b]) - spinMomentum(now[b]);
     addMomenta(d, static_cast<int>(b), now[b], linear, spin + (now[b].moment / now[b].mass).cross(linear));
   }
