@@ -113,11 +113,25 @@ constexpr Glyph kGlyphs[] = {
     {U'·', 2, "0303"},
     {U'Æ', 8, "063060 303666 3353 1434"},
     {U'×', 6, "1236 3216"},
+    {U'Þ', 6, "0006 013142433404"},
     {U'ß', 5, "06011020312233352616"},
     {U'æ', 8, "3322120305162635 3236 34646352423335465665"},
+    {U'÷', 6, "0343 2121 2525"},
+    {U'þ', 5, "0008 0312223335261605"},
+    {U'ď', 6, "3036 3322120305162635 5051"},
+    {U'Ħ', 8, "1016 5056 1353 0161"},
+    {U'ħ', 6, "1016 1322324346 0131"},
     {U'ı', 2, "0206"},
+    {U'Ľ', 6, "000646 3031"},
+    {U'ľ', 4, "0006 2021"},
+    {U'Ŋ', 6, "0006 01103041473827"},
+    {U'ŋ', 5, "0206 03122233372818"},
     {U'Œ', 10, "20414526050120 80404686 4373"},
     {U'œ', 8, "122233352616050312 34646352423335465665"},
+    {U'ť', 5, "101526 0222 4041"},
+    {U'Ŧ', 6, "0040 2026 1333"},
+    {U'ŧ', 4, "101526 0222 0424"},
+    {U'ȷ', 3, "121708"},
     {U'–', 5, "0434"},
     {U'—', 7, "0454"},
     {U'‘', 2, "0100"},
@@ -139,17 +153,19 @@ struct Mark {
 };
 constexpr Mark kMarks[] = {
     {"2042", true, U"ÀAÈEÌIÒOÙUàaèeìıòoùu"},
-    {"2240", true, U"ÁAÉEÍIÓOÚUÝYĆCŃNŔRŚSŹZáaéeíıóoúuýyćcńnŕrśsźz"},
-    {"123052", true, U"ÂAÊEÎIÔOÛUâaêeîıôoûu"},
-    {"02214261", true, U"ÃAÑNÕOãañnõo"},
+    {"2240", true, U"ÁAÉEÍIÓOÚUÝYĆCĹLŃNŔRŚSŹZáaéeíıóoúuýyćcĺlńnŕrśsźz"},
+    {"123052", true, U"ÂAÊEÎIÔOÛUĈCĜGĤHĴJŜSŴWŶYâaêeîıôoûuĉcĝgĥhĵȷŝsŵwŷy"},
+    {"02214261", true, U"ÃAÑNÕOĨIŨUãañnõoĩıũu"},
     {"1111 5151", true, U"ÄAËEÏIÖOÜUŸYäaëeïıöoüuÿy"},
     {"204051524323121120", true, U"ÅAŮUåaůu"},
-    {"103250", true, U"ČCĎDĚEŇNŘRŠSŤTŽZčcďděeňnřršsťtžz"},
-    {"10224250", true, U"ĂAĞGăağg"},
-    {"3131", true, U"İIŻZĖEżzėe"},
+    {"103250", true, U"ČCĎDĚEŇNŘRŠSŤTŽZčcěeňnřršsžz"},
+    {"10224250", true, U"ĂAĞGĔEĬIŎOŬUăağgĕeĭıŏoŭu"},
+    {"3131", true, U"ĊCĖEĠGİIŻZċcėeġgżz"},
     {"1230 4260", true, U"ŐOŰUőoűu"},
     {"1151", true, U"ĀAĒEĪIŌOŪUāaēeīıōoūu"},
     {"262718", false, U"ÇCŞSŢTȘSȚTçcşsţtșsțt"},
+    {"2718", false, U"ĢGĶKĻLŅNŖRķkļlņnŗr"},
+    {"4022", true, U"ģg"},
     {"362738", false, U"ĄAĘEĮIŲUąaęeįiųu"},
     {"0632", false, U"ØOøo"},
     {"0412", false, U"ŁLłl"},
@@ -169,11 +185,11 @@ std::optional<Letter> findLetter(char32_t character) {
     for (const char32_t* at = mark.letters; *at; at += 2)
       if (at[0] == character) {
         const Glyph* glyph = findGlyph(at[1]);
-        const bool isCapital = at[1] <= U'Z';
+        const bool isTall = at[1] <= U'Z' || at[1] == U'h' || at[1] == U'l';
         return Letter{glyph,
                       mark.strokes,
                       mark.isAbove ? 0.5f : 1,
-                      {0.5f * (glyph->advance - 5), mark.isAbove && isCapital ? -2 : 0}};
+                      {0.5f * (glyph->advance - 5), mark.isAbove && isTall ? -2 : 0}};
       }
   return std::nullopt;
 }

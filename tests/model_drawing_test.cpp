@@ -236,9 +236,10 @@ std::vector<std::string> charactersOf(const std::string& text) {
 TEST(StrokeText, EveryLetterDiffersFromTheOthersAndFromAMissingOne) {
   std::string letters;
   for (char c = '!'; c <= '~'; ++c) letters += c;
-  letters += "°±²³µ·×ßÆæŒœı–—„…";
+  letters += "°±²³µ·×÷ßÆæŒœÞþıȷ–—„…";
   letters += "ÀÁÂÃÄÅÇÈÉÊËÌÍÎÏÑÒÓÔÕÖØÙÚÛÜÝàáâãäåçèéêëìíîïñòóôõöøùúûüýÿ";
-  letters += "ĀāĂăĄąĆćČčĎďĐđĒēĖėĘęĚěĞğĪīĮįİŁłŃńŇňŌōŐőŔŕŘřŚśŞşŠšŢţŤťŪūŮůŰűŲųŸŹźŻżŽž";
+  letters += "ĀāĂăĄąĆćČčĎĐđĒēĖėĘęĚěĞğĪīĮįİŁłŃńŇňŌōŐőŔŕŘřŚśŞşŠšŢţŤŪūŮůŰűŲųŸŹźŻżŽž";
+  letters += "ĈĉĊċďĔĕĜĝĠġĢģĤĥĦħĨĩĬĭĴĵĶķĹĺĻļĽľŅņŊŋŎŏŖŗŜŝťŦŧŨũŬŭŴŵŶŷ";
   std::vector<std::vector<std::uint8_t>> seen;
   for (const std::string& letter : charactersOf(letters + "\x01")) {
     Image image = blackImage(70, 72);
