@@ -47,13 +47,14 @@ static void requireFile(const Scene& scene, int line, const std::string& attribu
     throw valueError(scene, line, {attribute}, fmt::format("{} \"{}\" does not exist", what, path));
 }
 
-// As the build's command line says it, from that folder.
-static std::string fixText(const NodeChoice& choice, const std::filesystem::path& folder) {
+// As the build's command line says it.
+static std::string fixText(const NodeChoice& choice) {
   if (choice.verticesPath.empty()) return regionText(choice.region);
-  return "vertices=" + std::filesystem::proximate(choice.verticesPath, folder).string();
+  return "vertices=" + std::filesystem::absolute(choice.verticesPath).string();
 }
 
-// That of the model's own, identified for this body; run where the mesh lies, as that was.
+// That of the model's own, identified for this body; run where the mesh lies, as that was, which need not be where the
+// model does.
 static std::string identifyingCommand(const SceneBody& body) {
   const std::string& settings = body.model->settings;
   std::string out = settings.substr(0, settings.find(" --identify"));
@@ -61,10 +62,8 @@ static std::string identifyingCommand(const SceneBody& body) {
   const std::string form = " --link-form ";
   if (const std::size_t at = settings.find(form); at != std::string::npos)
     out += settings.substr(at, settings.find(' ', at + form.size()) - at);
-  const std::filesystem::path model = body.modelPath;
-  const std::filesystem::path folder = model.has_parent_path() ? model.parent_path() : ".";
-  for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix {}", shellWord(fixText(fix.nodes, folder)));
-  return out + " -o " + shellWord(model.filename().string());
+  for (const SceneFix& fix : body.fixes) out += fmt::format(" --fix {}", shellWord(fixText(fix.nodes)));
+  return out + " -o " + shellWord(std::filesystem::absolute(body.modelPath).string());
 }
 
 static std::vector<int> findNodes(const Scene& scene, int line, const NodeChoice& choice, const SceneBody& body) {

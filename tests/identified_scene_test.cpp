@@ -64,30 +64,31 @@ TEST_F(IdentifiedScene, RunsHeldByItsPatch) {
   EXPECT_GT(farthest, 0);
 }
 
+// Run in another folder than the model's, it writes that model and reads what the scene does.
 TEST_F(IdentifiedScene, WithoutItsNetworkPatchOrRatioItIsRefusedAndTheRightBuildNamed) {
+  const auto into = [&](const char* name) { return " -o " + (folder / name); };
   const std::string build =
       "; run where its mesh lies, this would make it: medulla build pear.obj --spheres 7 --identify --poisson ";
   EXPECT_EQ(refusal(scene(kHeld, "plain.xml")),
             "case.xml:3: body \"pear\" has identified links, and its model has none" + build +
-                "0.45 --fix plane=0,-1,0,0.02 -o plain.xml");
+                "0.45 --fix plane=0,-1,0,0.02" + into("plain.xml"));
   EXPECT_EQ(refusal(scene("<fix plane='0 -1 0 0.03'/>")),
             "case.xml:3: body \"pear\" has identified links, and its model was identified with another part of its "
             "surface fixed" +
-                build + "0.45 --fix plane=0,-1,0,0.03 -o pear.xml");
+                build + "0.45 --fix plane=0,-1,0,0.03" + into("pear.xml"));
   EXPECT_EQ(refusal(scene("")),
             "case.xml:3: body \"pear\" has identified links, and its model was identified with another part of its "
             "surface fixed" +
-                build + "0.45 -o pear.xml");
+                build + "0.45" + into("pear.xml"));
   folder.write("held nodes.csv", "0\n");
   EXPECT_EQ(refusal(scene("<fix vertices='held nodes.csv'/>")),
             "case.xml:3: body \"pear\" has identified links, and its model was identified with another part of its "
             "surface fixed" +
-                build + "0.45 --fix 'vertices=held nodes.csv' -o pear.xml")
-      << "as it lies from the model's own folder";
+                build + "0.45 --fix 'vertices=" + (folder / "held nodes.csv") + "'" + into("pear.xml"));
   EXPECT_EQ(refusal(scene(kHeld, "pear.xml", 0.3)),
             "case.xml:3: body \"pear\" has identified links, and its model was identified for a Poisson's ratio of "
             "0.45" +
-                build + "0.3 --fix plane=0,-1,0,0.02 -o pear.xml");
+                build + "0.3 --fix plane=0,-1,0,0.02" + into("pear.xml"));
 }
 
 TEST_F(IdentifiedScene, PatchesHoldWhollyAndInsteadOfSpheres) {
