@@ -50,13 +50,15 @@ struct LiveServo::Data {
   TickTimes cpu;
   std::atomic<long> ticks{0}, lateTicks{0}, standingTicks{0};
   std::atomic<double> latest{0};  // s
-  std::atomic<bool> stop{false}, failed{false};
+  std::atomic<bool> stopped{false}, failed{false};
   std::exception_ptr failure;  // written before `failed`
   std::thread thread;
 
   explicit Data(Simulation& s);
+  void start();
+  void stop();
   void run();
-  void wait(Clock::time_point deadline);
+  void noteLateness(Clock::time_point deadline);
 };
 
 static Clock::duration toDuration(double seconds) {
@@ -77,8 +79,23 @@ LiveServo::Data::Data(Simulation& s) : simulation(s), handedOver({emptyRecord(s)
   handedOver.publish();
 }
 
-void LiveServo::Data::wait(Clock::time_point deadline) {
-  std::this_thread::sleep_until(deadline);
+void LiveServo::Data::start() {
+  thread = std::thread([this] {
+    try {
+      run();
+    } catch (...) {
+      failure = std::current_exception();
+      failed = true;
+    }
+  });
+}
+
+void LiveServo::Data::stop() {
+  stopped = true;
+  if (thread.joinable()) thread.join();
+}
+
+void LiveServo::Data::noteLateness(Clock::time_point deadline) {
   const double lateness = std::chrono::duration<double>(Clock::now() - deadline).count();
   if (lateness > simulation.tickDuration()) ++lateTicks;
   if (lateness > latest) latest = lateness;
@@ -89,11 +106,14 @@ void LiveServo::Data::run() {
   const int ticksPerFrame = simulation.ticksPerFrame();
   std::vector<ToolSample> inputs;
   simulation.sampleInputs(0, inputs);
-  const Clock::time_point start = Clock::now();
+  const Clock::time_point begin = Clock::now();
   int within = 0;  // tick of the frame; the first blends from rest to rest
-  for (long tick = 1; !stop; ++tick) {
+  for (long tick = 1;; ++tick) {
     const double time = static_cast<double>(tick) * simulation.tickDuration();
-    wait(start + toDuration(time));
+    const Clock::time_point deadline = begin + toDuration(time);
+    std::this_thread::sleep_until(deadline);
+    if (stopped) return;
+    noteLateness(deadline);
     const double before = threadCpuSeconds();
     if (within == ticksPerFrame && servo.beginFrame()) {
       handedOver.publish();  // not before, or a fast dynamics' surface would take the place of one that still waits
@@ -120,23 +140,14 @@ void LiveServo::Data::run() {
   }
 }
 
-LiveServo::LiveServo(Simulation& simulation) : data_(std::make_unique<Data>(simulation)) {
-  data_->thread = std::thread([&d = *data_] {
-    try {
-      d.run();
-    } catch (...) {
-      d.failure = std::current_exception();
-      d.failed = true;
-    }
-  });
-}
+LiveServo::LiveServo(Simulation& simulation) : data_(std::make_unique<Data>(simulation)) {}
 
 LiveServo::~LiveServo() {
-  data_->stop = true;
-  data_->thread.join();
+  data_->stop();
 }
 
 void LiveServo::advanceFrame() {
+  if (!data_->thread.joinable()) data_->start();
   constexpr auto pause = std::chrono::microseconds(100);  // of frames of 20 ms; a signal would cost the servo a lock
   while (!data_->handedOver.take()) {
     if (data_->failed) std::rethrow_exception(data_->failure);
@@ -146,7 +157,8 @@ void LiveServo::advanceFrame() {
   data_->simulation.advanceFrame(data_->handedOver.reading());
 }
 
-LiveReport LiveServo::report() const {
+LiveReport LiveServo::stop() {
+  data_->stop();
   const Data& d = *data_;
   return {d.ticks, d.lateTicks, d.standingTicks, d.latest, d.cpu.quantile(0.5), d.cpu.quantile(0.999), d.cpu.longest};
 }

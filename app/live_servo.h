@@ -6,7 +6,7 @@
 
 namespace medulla {
 
-// How a live servo has kept time so far, and what its ticks cost.
+// How a live servo kept time, and what its ticks cost.
 struct LiveReport {
   long ticks = 0;
   long lateTicks = 0;                            // woken more than a tick after their time
@@ -24,13 +24,14 @@ struct LiveReport {
 // dynamics is late, the surface stands still meanwhile.
 class LiveServo {
  public:
-  explicit LiveServo(Simulation& simulation);  // starts it
-  ~LiveServo();                                // ends it
+  explicit LiveServo(Simulation& simulation);
+  ~LiveServo();
 
-  // One dynamics frame, as soon as the servo hands over. Throws what the servo or the dynamics could not go on with.
+  // One dynamics frame, as soon as the servo hands over; the first starts it. Throws what the servo or the dynamics
+  // could not go on with.
   void advanceFrame();
 
-  LiveReport report() const;  // of a servo that may be running: figures of a moment each
+  LiveReport stop();  // after the last frame: what follows is no part of the run that the servo kept time with
 
  private:
   struct Data;

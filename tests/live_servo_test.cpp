@@ -51,12 +51,26 @@ TEST(LiveServo, RunsAgainstTheClockAndFeelsContact) {
     for (const ToolState& tool : simulation.record().tools.back())
       ASSERT_TRUE(tool.proxy.allFinite() && tool.force.allFinite());
   }
-  const LiveReport report = live.report();
+  const LiveReport report = live.stop();
   EXPECT_GE(report.ticks, (simulation.frame() - 1) * simulation.ticksPerFrame());
   EXPECT_GT(simulation.totals().forceMax, 0.05);
   EXPECT_GT(report.cpuMedian, 0);
   EXPECT_LE(report.cpuMedian, report.cpu999);
   EXPECT_LE(report.cpu999, report.cpuMax);
+}
+
+TEST(LiveServo, TicksFromTheFirstFrameToTheLast) {
+  const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(20)); };
+  const LoadedScene loaded = gallbladder(0.1);
+  Simulation simulation(loaded), unused(loaded);
+  LiveServo live(simulation), waiting(unused);
+  pause();
+  EXPECT_EQ(waiting.stop().ticks, 0);
+  while (!simulation.finished()) live.advanceFrame();
+  const long ticks = live.stop().ticks;
+  EXPECT_GE(ticks, (simulation.frame() - 1) * simulation.ticksPerFrame());
+  pause();
+  EXPECT_EQ(live.stop().ticks, ticks);
 }
 
 TEST(LiveServo, WhatTheServoRefusesReachesTheCaller) {

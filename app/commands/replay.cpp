@@ -26,19 +26,23 @@ int runReplay(const RunOptions& options) {
   const double cpuStart = processCpuSeconds();
   const double start = wallSeconds();
   std::optional<LiveServo> live;
+  LiveReport report;
   std::function<void()> advance;
   if (options.realtime) {
     live.emplace(simulation);
     advance = [&] { live->advanceFrame(); };
   }
+  const auto finish = [&] {
+    if (live) report = live->stop();
+    progress.end();
+  };
   const std::vector<Result> forces = runToEnd(
-      loaded, options, simulation, [&] { progress.update(simulation.time()); }, [&] { progress.end(); }, advance);
+      loaded, options, simulation, [&] { progress.update(simulation.time()); }, finish, advance);
   const double wall = wallSeconds() - start;
   std::vector<Result> results = runResults(simulation, processCpuSeconds() - cpuStart, wall);
   if (options.untilRest) results.insert(results.begin(), {"rest_at", fmt::format("{:.6g}", simulation.time()), "s"});
   results.insert(results.end(), forces.begin(), forces.end());
   if (live) {
-    const LiveReport report = live->report();
     const std::vector<Result> more = liveResults(report);
     results.insert(results.end(), more.begin(), more.end());
     if (report.lateTicks > 0 || report.standingTicks > 0)
