@@ -35,10 +35,12 @@ SurfaceShape shapeOf(const TriangleMesh& mesh, const Eigen::Isometry3d& worldFro
 void drawnPositions(const SceneBody& body, const SurfaceSmoothing& smoothing, const std::vector<Eigen::Vector3d>& nodes,
                     std::vector<glm::vec3>& out) {
   const RenderSurface& surface = body.model->renderSurface;
-  if (smoothing.share.empty())
-    evaluateRenderSurface(surface, nodes, out);
-  else
-    evaluateRenderSurface(surface, smoothed(smoothing, nodes), out);
+  if (smoothing.share.empty()) return evaluateRenderSurface(surface, nodes, out);
+  // A state cache keeps nodes as floats: what is drawn of it shall not differ.
+  std::vector<Eigen::Vector3d> single;
+  single.reserve(nodes.size());
+  for (const Eigen::Vector3d& node : nodes) single.emplace_back(node.cast<float>().cast<double>());
+  evaluateRenderSurface(surface, smoothed(smoothing, single), out);
 }
 
 // The filling spheres' balls.

@@ -68,8 +68,8 @@ TEST(SurfaceSmoothing, TheShapeAtRestAndRigidMotionsStay) {
   }
 }
 
-TEST(SurfaceSmoothing, AStepBetweenHostsIsASlopeInThePicture) {
-  const auto model = fineTube();
+// Where a picture shows the nodes.
+static std::vector<glm::vec3> inPicture(const std::shared_ptr<const SoftBodyModel>& model, const Points& nodes) {
   LoadedScene loaded;
   SceneBody body;
   body.model = model;
@@ -82,20 +82,34 @@ TEST(SurfaceSmoothing, AStepBetweenHostsIsASlopeInThePicture) {
   state.frame.bodies[0].spheres.resize(model->spheres.size());
   Renderer renderer(rendererSettings(32, 32, "auto", Quality::draft));
   const SceneView view(loaded, state.frame, renderer);
-  const Points stepped = thinnedBeyond(0.08, model->restNodes);
-  state.frame.bodies[0].nodes = stepped;
+  state.frame.bodies[0].nodes = nodes;
   Picture picture;
   view.compose(state, ViewKind::tissue, {}, picture);
+  return picture.surfaces[0].positions;
+}
+
+TEST(SurfaceSmoothing, AStepBetweenHostsIsASlopeInThePicture) {
+  const auto model = fineTube();
+  const Points stepped = thinnedBeyond(0.08, model->restNodes);
+  const std::vector<glm::vec3> shown = inPicture(model, stepped);
   Points drawn;
-  for (const glm::vec3& p : picture.surfaces[0].positions) drawn.emplace_back(p.x, p.y, p.z);
+  for (const glm::vec3& p : shown) drawn.emplace_back(p.x, p.y, p.z);
   EXPECT_GT(steepest(*model, stepped), 0.7);
   EXPECT_LT(steepest(*model, drawn), 0.35);
   std::vector<glm::vec3> asItIs;
   evaluateRenderSurface(model->renderSurface, stepped, asItIs);
   for (std::size_t i = 0; i < asItIs.size(); ++i) {
     if (offMiddle(*model, i) < 0.015 || offMiddle(*model, i) > kWall) continue;
-    ASSERT_LT(glm::length(asItIs[i] - picture.surfaces[0].positions[i]), 1e-4f);
+    ASSERT_LT(glm::length(asItIs[i] - shown[i]), 1e-4f);
   }
+}
+
+TEST(SurfaceSmoothing, NodesOfAStateCacheAreDrawnAsThoseOfTheRun) {
+  const auto model = fineTube();
+  const Points stepped = thinnedBeyond(0.08, model->restNodes);
+  Points cached;
+  for (const Vector3d& p : stepped) cached.emplace_back(p.cast<float>().cast<double>());
+  EXPECT_TRUE(inPicture(model, stepped) == inPicture(model, cached));
 }
 
 // As deep as the tip of a tool of 5 mm radius dents soft tissue, and as wide.
