@@ -344,6 +344,21 @@ TEST_F(LoadCase, ARunThatFindsNoRestSaysSoAndKeepsNothing) {
   EXPECT_EQ(runProgram({"replay", scene(kHeld, "0.9"), "--until-rest"}).exitCode, 0);
 }
 
+// Slow enough that no node moves by as much as counts from frame to frame.
+TEST_F(LoadCase, ADrivenBodyIsNeverAtRest) {
+  const auto until = [&](const std::string& motion) {
+    const std::string drive = fmt::format("<drive sphere='0' axis='1 0 0' frequency='1e-3' {}/>", motion);
+    return runProgram({"replay", scene(drive, "4"), "--set", "dynamics.gravity=0 0 0", "--until-rest"});
+  };
+  for (const char* motion : {"amplitude='1e-3'", "amplitude='0' velocity='1e-9 0 0'"}) {
+    const ProgramResult run = until(motion);
+    EXPECT_EQ(run.exitCode, 4) << run.out;
+    EXPECT_EQ(complaints(run), std::vector<std::string>{"medulla: never at rest: sphere 0 of body 'pear' is driven all "
+                                                        "the time, expected a run without --until-rest"});
+  }
+  EXPECT_EQ(until("amplitude='0'").exitCode, 0);
+}
+
 // Of ticks of 1/1200 s the one at 0.58 s is recorded at 0.5800000000000001 s, past the end of its frame.
 TEST_F(LoadCase, ARecordRestsWhenItsRunDid) {
   std::string text = readFile(scene(kHeld, "2"));

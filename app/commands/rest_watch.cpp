@@ -18,11 +18,21 @@ double farthest(const std::vector<Vector3d>& from, const std::vector<Vector3d>& 
   return std::sqrt(squared);
 }
 
+// At its turning points, or before its ramp has begun, it would seem to rest.
+void requireUndriven(const SceneBody& body) {
+  for (const DrivenSphere& drive : body.driven)
+    if (drive.amplitude > 0 || !drive.velocity.isZero())
+      throw NotAtRest(fmt::format(
+          "never at rest: sphere {} of body '{}' is driven all the time, expected a run without --until-rest",
+          drive.sphere, body.name));
+}
+
 }  // namespace
 
 RestWatch::RestWatch(const LoadedScene& loaded, const Simulation& simulation) {
   constexpr double kLeastPeriod = 0.1;  // s
   for (const SceneBody& body : loaded.scene.bodies) {
+    requireUndriven(body);
     for (const DeadLoad& load : body.deadLoads) busyUntil_ = std::max(busyUntil_, load.to);
     const int k = static_cast<int>(bodies_.size());
     Body& watched = bodies_.emplace_back();

@@ -19,6 +19,7 @@ struct NotAtRest : std::runtime_error {
 // of a resting contact trembles.
 class RestWatch {
  public:
+  // Throws NotAtRest where a body is driven and never will be.
   RestWatch(const LoadedScene& loaded, const Simulation& simulation);
   void afterFrame(const Simulation& simulation);
   bool atRest() const;
