@@ -108,5 +108,15 @@ TEST_F(Surroundings, GoldenImagesBehindLinksFindTheirScenes) {
   EXPECT_TRUE(fs::exists(folder / "golden/organ_10.png"));
 }
 
+TEST_F(Surroundings, ASceneInALinkedFolderReadsWhatLiesBesideThat) {
+  std::string scene = read("own/organ.xml");
+  const std::string named = "trajectory=\"";
+  fs::create_directories(folder / "far/away");
+  folder.write("far/away/organ.xml", scene.insert(scene.find(named) + named.size(), "../"));
+  fs::copy(folder / "own/organ.csv", folder / "far/organ.csv");
+  fs::create_directory_symlink("far/away", folder / "linked");
+  EXPECT_EQ(shell("$M check linked/organ.xml"), 0);
+}
+
 }  // namespace
 }  // namespace medulla

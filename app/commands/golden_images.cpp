@@ -25,20 +25,13 @@ std::vector<std::string> filesOf(const fs::path& folder, const std::string& exte
   return paths;
 }
 
-// As it is called, or, where ".." after that would lead elsewhere since there are links in it, where it is.
-fs::path folderOf(const std::string& file) {
-  const fs::path called = fs::path(file).parent_path();
-  const fs::path place = placeOf(called.string());
-  return place == fs::absolute(called).lexically_normal() ? called : place;
-}
-
 StrayImage lookInto(const std::string& path) {
   StrayImage image{path, stemOf(path), "", ""};
   try {
     std::vector<PngText> texts;
     readPng(path, &texts);
     const std::string scene = textOf(texts, kSceneKey);
-    if (!scene.empty()) image.scene = (folderOf(path) / scene).lexically_normal().string();
+    if (!scene.empty()) image.scene = normalised(fs::path(path).parent_path() / scene).string();
   } catch (const std::runtime_error& error) {
     image.fault = error.what();
   }

@@ -49,6 +49,12 @@ std::filesystem::path placeOf(const std::string& path) {
   return place.has_filename() ? place : place.parent_path();
 }
 
+std::filesystem::path normalised(const std::filesystem::path& path) {
+  const std::filesystem::path called = path.lexically_normal();
+  if (placeOf(called.string()) == placeOf(path.string())) return called;
+  return placeOf(path.parent_path().string()) / path.filename();
+}
+
 void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
   std::set<std::filesystem::path> read, written;
   for (const std::string& input : inputs)

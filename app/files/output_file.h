@@ -13,6 +13,10 @@ namespace medulla {
 // paths lead to one place where these are equal.
 std::filesystem::path placeOf(const std::string& path);
 
+// A file's path without "./" and "..": as it is called, or, where links in it make that another place, in the folder
+// where it is.
+std::filesystem::path normalised(const std::filesystem::path& path);
+
 // Throws std::runtime_error when a command would write one file twice, or over a file that it reads, by their
 // places; empty names are skipped.
 void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "app/files/output_file.h"
+
 namespace medulla {
 
 Eigen::Vector3d readVector(const XmlElement& element, const std::string& attribute, const Eigen::Vector3d& fallback,
@@ -30,7 +32,7 @@ Eigen::Isometry3d readPlacement(const XmlElement& element) {
 
 std::string readPath(const XmlElement& element, const std::string& attribute, const std::string& namedIn) {
   const std::filesystem::path folder = std::filesystem::path(namedIn).parent_path();
-  return (folder / readText(element, attribute)).lexically_normal().string();
+  return normalised(folder / readText(element, attribute)).string();
 }
 
 }  // namespace medulla
