@@ -108,6 +108,13 @@ TEST_F(Surroundings, GoldenImagesBehindLinksFindTheirScenes) {
   EXPECT_TRUE(fs::exists(folder / "golden/organ_10.png"));
 }
 
+TEST_F(Surroundings, GoldenImagesLieBesideTheFolderOfTheirSceneHoweverItIsCalled) {
+  fs::create_directory(folder / "own/deep");
+  EXPECT_EQ(shell("cd own; $M golden --update ./organ.xml"), 0);
+  EXPECT_TRUE(fs::exists(folder / "golden_images/organ_10.png"));
+  EXPECT_EQ(shell("cd own/deep; $M golden ../organ.xml"), 0);
+}
+
 TEST_F(Surroundings, ASceneInALinkedFolderReadsWhatLiesBesideThat) {
   std::string scene = read("own/organ.xml");
   const std::string named = "trajectory=\"";

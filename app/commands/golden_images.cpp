@@ -96,7 +96,7 @@ std::string stemOf(const std::string& path) {
 
 std::string goldenFolderOf(const std::string& scene, const GoldenOptions& options) {
   if (!options.folder.empty()) return options.folder;
-  return (fs::absolute(scene).parent_path().parent_path() / "golden_images").lexically_normal().string();
+  return (normalised(fs::absolute(scene)).parent_path().parent_path() / "golden_images").string();
 }
 
 std::vector<std::string> goldenScenes(const GoldenOptions& options) {
