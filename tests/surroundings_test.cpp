@@ -108,6 +108,13 @@ TEST_F(Surroundings, GoldenImagesBehindLinksFindTheirScenes) {
   EXPECT_TRUE(fs::exists(folder / "golden/organ_10.png"));
 }
 
+TEST_F(Surroundings, AGoldenSceneByALinkOfAnotherNameIsFoundUnderThat) {
+  fs::create_symlink("own/organ.xml", folder / "alias.xml");
+  fs::copy(folder / "own/organ.csv", folder / "organ.csv");  // beside the link
+  EXPECT_EQ(shell("$M golden --dir golden --update alias.xml"), 0);
+  EXPECT_EQ(shell("$M golden --dir golden"), 0);
+}
+
 TEST_F(Surroundings, GoldenImagesLieBesideTheFolderOfTheirSceneHoweverItIsCalled) {
   fs::create_directory(folder / "own/deep");
   EXPECT_EQ(shell("cd own; $M golden --update ./organ.xml"), 0);

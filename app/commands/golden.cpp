@@ -182,7 +182,10 @@ Update updateOf(const std::string& path, const GoldenOptions& options, const std
   Update update;
   update.folder = goldenFolderOf(path, options);
   requireNameFree(path, update.folder);
-  const std::string scene = fs::proximate(fs::absolute(path), fs::absolute(update.folder)).string();
+  // A link to a scene is a scene of its own name.
+  const fs::path called = fs::absolute(path);
+  const fs::path place = placeOf(called.parent_path().string()) / called.filename();
+  const std::string scene = place.lexically_proximate(placeOf(update.folder)).string();
   const bool whole = std::any_of(options.update.begin(), options.update.end(),
                                  [&](const std::string& name) { return namesScene(name, path); });
   const bool none = momentsOf(readScene(path)).empty();  // any more: what is stored goes
