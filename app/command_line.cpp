@@ -97,9 +97,11 @@ static CLI::Validator within(double low, double high, const std::string& what) {
   const std::string expected =
       what + (std::isinf(high) ? fmt::format(" of {:g} or more", low) : fmt::format(" from {:g} to {:g}", low, high));
   return CLI::Validator(
-      [=](const std::string& word) {
+      [=](std::string& word) -> std::string {
         const std::optional<T> value = parseNumber<T>(word);
-        return value && low <= *value && *value <= high ? "" : fmt::format("{}: expected {}", word, expected);
+        if (!value || !(low <= *value && *value <= high)) return fmt::format("{}: expected {}", word, expected);
+        word = fmt::format("{}", *value);  // for transform(): CLI11 would take 010 for octal
+        return {};
       },
       std::isinf(high) ? "" : fmt::format("in [{:g} - {:g}]", low, high));
 }

@@ -134,7 +134,7 @@ Verb addStability(CLI::App& app) {
       ->type_name("MS,MS,...");
   a.options.threads = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 64U));
   c->add_option("--threads", a.options.threads, "trials that run side by side; the results are the same")
-      ->check(wholeNumberFrom(1, 64))
+      ->transform(wholeNumberFrom(1, 64))
       ->capture_default_str();
   return {c, [arguments] { return runStability(stabilityOptions(*arguments)); }};
 }

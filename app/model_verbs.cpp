@@ -47,7 +47,7 @@ void addCoverOptions(CLI::App& c, BuildArguments& a) {
                                       "number of filling spheres, of --method cover; of several meshes together: "
                                       "shared out so that the largest gap, in metres, "
                                       "is about the same for all")
-                             ->check(wholeNumberFrom(1, kSpheresMax))
+                             ->transform(wholeNumberFrom(1, kSpheresMax))
                              ->capture_default_str();
   CLI::Option* gap =
       c.add_option(
@@ -131,7 +131,7 @@ Verb addBuild(CLI::App& app) {
   c->add_option("--render-levels", a.options.renderLevels,
                 "subdivisions of the mesh for the drawn surface [2, of fine meshes fewer: 200000 triangles at most, or "
                 "the mesh's own]")
-      ->check(wholeNumberFrom(0, 4));
+      ->transform(wholeNumberFrom(0, 4));
   c->add_option("--report", a.options.reportPath, "write the quality report as CSV too")->type_name("FILE.csv");
   addIdentification(*c, a);
   return {c, [arguments] { return runBuild(buildOptions(*arguments)); }};
@@ -146,7 +146,7 @@ Verb addNew(CLI::App& app) {
       ->type_name("DIR")
       ->required();
   c->add_option("--spheres", o.build.settings.spheres, "number of filling spheres")
-      ->check(wholeNumberFrom(1, kSpheresMax))
+      ->transform(wholeNumberFrom(1, kSpheresMax))
       ->capture_default_str();
   c->add_option("--unit", o.build.unit, "unit of the mesh file")
       ->check(CLI::IsMember(lengthUnits()))

@@ -29,7 +29,7 @@ void refuseOtherKinds(const std::string& option, const std::string& path, const 
 inline constexpr double kEndless = std::numeric_limits<double>::infinity();
 // Checks an option's words, each of them. CLI::Range lets NaN pass. `what`: how errors begin to say what is expected.
 CLI::Validator numberFrom(double low, double high, const std::string& what = "a number");
-CLI::Validator wholeNumberFrom(int low, int high);
+CLI::Validator wholeNumberFrom(int low, int high);  // for transform()
 
 // Options as typed; turned into RunOptions after parsing.
 struct RunArguments {

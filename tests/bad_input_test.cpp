@@ -283,6 +283,14 @@ TEST_F(BadInput, NumbersOfABuildThatAreNoneAreWrongUsage) {
   expectRefused(run({"build", mesh, "-o", "m.xml", "--identify", "--spheres", "301"}), "at most 300", 2);
 }
 
+TEST_F(BadInput, WholeNumbersAreDecimalWhateverStandsBeforeThem) {
+  for (const char* ten : {"010", "+10", "10"}) {
+    const ProgramResult r =
+        run({"build", MEDULLA_SOURCE_DIR "/assets/gallbladder/gallbladder.obj", "-o", "m.xml", "--spheres", ten});
+    EXPECT_EQ(valueOf(r.out, "spheres"), "10") << ten << ": " << r.err;
+  }
+}
+
 TEST_F(BadInput, WhatSaysNothingOfASkeletonIsWrongUsageWithIt) {
   const std::string mesh = MEDULLA_SOURCE_DIR "/assets/gallbladder/gallbladder.obj";
   for (const auto& [option, value] : {std::pair("--spheres", "7"), {"--overshoot", "0"}, {"--gap", "5"}})
