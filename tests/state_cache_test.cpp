@@ -207,6 +207,11 @@ TEST_F(CacheOfScene, CompareNamesTheFirstPictureAndFieldThatDiffer) {
   EXPECT_LT(picture, 10) << seen.out;
   EXPECT_NE(seen.out.find("\nfield organ."), std::string::npos) << seen.out;
   EXPECT_EQ(run({"compare", "organ.cache", "other.cache", "--tolerance", "2"}).exitCode, 0);
+  replay("clock.duration=0.46");  // as many pictures
+  const ProgramResult end = run({"compare", "organ.cache", "other.cache"});
+  EXPECT_EQ(end.exitCode, 3);
+  EXPECT_TRUE(end.out.starts_with("equal no\nfield state_hash\na ")) << end.out;
+  EXPECT_EQ(run({"compare", "organ.cache", "other.cache", "--tolerance", "1e-9"}).exitCode, 0);
   replay("clock.duration=0.4");
   EXPECT_EQ(run({"compare", "organ.cache", "other.cache"}).out, "equal no\npictures_a 12\npictures_b 10\n");
   replay("output.fps=50");

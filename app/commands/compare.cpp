@@ -114,6 +114,10 @@ std::string describe(const CacheLayout& layout) {
   return out;
 }
 
+std::vector<Result> hashes(std::uint64_t a, std::uint64_t b) {
+  return {{"field", "state_hash", ""}, {"a", fmt::format("{:016x}", a), ""}, {"b", fmt::format("{:016x}", b), ""}};
+}
+
 int compareCaches(const CompareOptions& options) {
   CacheReader a(options.a), b(options.b);
   const CacheLayout &ofA = a.layout(), &ofB = b.layout();
@@ -129,22 +133,21 @@ int compareCaches(const CompareOptions& options) {
     valuesOf(state, inA);
     const std::uint64_t hashB = b.read(n, state);
     valuesOf(state, inB);
-    const auto difference = [&](const std::string& field, const std::string& valueA, const std::string& valueB) {
-      return std::vector<Result>{{"picture", fmt::format("{}", n), ""},
-                                 {"t", fmt::format("{}", inA[0]), "s"},
-                                 {"field", field, ""},
-                                 {"a", valueA, ""},
-                                 {"b", valueB, ""}};
+    const auto difference = [&](std::vector<Result> field) {
+      field.insert(field.begin(), {{"picture", fmt::format("{}", n), ""}, {"t", fmt::format("{}", inA[0]), "s"}});
+      return field;
     };
     for (std::size_t k = 0; k < inA.size(); ++k)
       if (options.tolerance > 0 ? std::abs(inA[k] - inB[k]) > options.tolerance * scale[k] : inA[k] != inB[k])
-        return differing(difference(fields[k], fmt::format("{}", inA[k]), fmt::format("{}", inB[k])));
-    if (options.tolerance == 0 && hashA != hashB && unseen.empty())
-      unseen = difference("state_hash", fmt::format("{:016x}", hashA), fmt::format("{:016x}", hashB));
+        return differing(difference(
+            {{"field", fields[k], ""}, {"a", fmt::format("{}", inA[k]), ""}, {"b", fmt::format("{}", inB[k]), ""}}));
+    if (options.tolerance == 0 && hashA != hashB && unseen.empty()) unseen = difference(hashes(hashA, hashB));
   }
   if (a.pictures() != b.pictures())
     return differing(
         {{"pictures_a", fmt::format("{}", a.pictures()), ""}, {"pictures_b", fmt::format("{}", b.pictures()), ""}});
+  if (unseen.empty() && options.tolerance == 0 && a.finalHash() != b.finalHash())
+    unseen = hashes(a.finalHash(), b.finalHash());
   if (!unseen.empty()) return differing(unseen);
   printResults({{"equal", "yes", ""}, {"pictures", fmt::format("{}", a.pictures()), ""}});
   return 0;
