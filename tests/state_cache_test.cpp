@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "app/commands/commands.h"
+#include "app/interrupt.h"
 #include "tests/complaint.h"
 #include "tests/own_scene.h"
 
@@ -220,6 +222,27 @@ TEST_F(CacheOfScene, CompareNamesTheFirstPictureAndFieldThatDiffer) {
             "b 50 pictures per second, organ of 7 spheres and 235 nodes, probe\n");
   folder.write("log.csv", "t,x\n0,1\n");
   expectRefused(run({"compare", "organ.cache", "log.csv"}), "organ.cache is a state cache, log.csv is none");
+}
+
+// Large ones take minutes.
+TEST_F(CacheOfScene, ComparingEndsAtAnInterrupt) {
+  const std::string cache = folder / "organ.cache";
+  for (const double tolerance : {0., 1e-6}) {
+    const pid_t child = fork();
+    if (child == 0) {
+      watchInterrupts();
+      std::raise(SIGINT);
+      try {
+        runCompare({cache, cache, tolerance});
+      } catch (const Interrupted&) {
+        _exit(130);
+      }
+      _exit(0);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_EQ(WEXITSTATUS(status), 130) << tolerance;
+  }
 }
 
 }  // namespace

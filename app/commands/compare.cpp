@@ -6,6 +6,7 @@
 #include "app/commands/commands.h"
 #include "app/files/log_table.h"
 #include "app/files/state_cache.h"
+#include "app/interrupt.h"
 #include "app/standard_streams.h"
 #include "app/tool_fields.h"
 
@@ -89,6 +90,7 @@ std::vector<double> scales(CacheReader& a, CacheReader& b, const std::vector<std
   PictureState state;
   for (CacheReader* cache : {&a, &b})
     for (int n = 0; n < cache->pictures(); ++n) {
+      checkInterrupt();
       cache->read(n, state);
       valuesOf(state, values);
       out.resize(values.size());
@@ -129,6 +131,7 @@ int compareCaches(const CompareOptions& options) {
   std::vector<double> inA, inB;
   std::vector<Result> unseen;  // the first difference of what no picture shows, such as speeds
   for (int n = 0; n < std::min(a.pictures(), b.pictures()); ++n) {
+    checkInterrupt();
     const std::uint64_t hashA = a.read(n, state);
     valuesOf(state, inA);
     const std::uint64_t hashB = b.read(n, state);

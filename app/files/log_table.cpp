@@ -8,6 +8,7 @@
 #include "app/files/input_error.h"
 #include "app/files/number_text.h"
 #include "app/files/text_file.h"
+#include "app/interrupt.h"
 
 namespace medulla {
 
@@ -36,6 +37,7 @@ LogTable readLog(const std::string& path, bool mayBeCut) {
   const std::string expected = fmt::format("{} as in the header", table.columns.size());
   const std::ptrdiff_t open = mayBeCut ? openLine(text) : 0;
   while (rows.next()) {
+    checkInterrupt();
     table.isCut = endsWithin(rows, open, table.columns.size());
     if (table.isCut) break;
     rows.requireCells(table.columns.size(), expected);
