@@ -176,6 +176,13 @@ std::shared_ptr<const SoftBodyModel> scaledModel(const SoftBodyModel& m, double 
   return out;
 }
 
+void scaleRegion(Region& r, double s) {
+  r.box = {s * r.box.min(), s * r.box.max()};
+  r.centre *= s;
+  r.radius *= s;
+  r.distance *= s;
+}
+
 // Every other sphere a hundred times as heavy, those between a hundred times as light.
 std::shared_ptr<const SoftBodyModel> unevenModel(const SoftBodyModel& m) {
   auto out = std::make_shared<SoftBodyModel>(m);
@@ -238,7 +245,11 @@ std::function<void(BodyDescription&)> stiffer(double factor) {
   return [factor](BodyDescription& b) { b.tissue.young *= factor; };
 }
 std::function<void(BodyDescription&)> scaled(double factor) {
-  return [factor](BodyDescription& b) { b.model = scaledModel(*b.model, factor); };
+  return [factor](BodyDescription& b) {
+    b.model = scaledModel(*b.model, factor);
+    for (SteeredLinks& steered : b.steered)
+      if (steered.where) scaleRegion(*steered.where, factor);
+  };
 }
 void stretchByHalf(WorldData& d, const Eigen::AlignedBox3d& box) {
   stretch(d, box, 1.5);

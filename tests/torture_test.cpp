@@ -92,6 +92,20 @@ TEST(TortureOfExplicitSteps, OfAModelThatKeepsTheFormulasLikewise) {
     EXPECT_TRUE(torture(tubeThatKeepsFormulas(), tortureMethods()[0], trial, 1e-4).survived) << trial;
 }
 
+// A part of space that holds all links holds them at any scale.
+TEST(TortureOfExplicitSteps, LinksThatAreSteeredGrowWithTheBody) {
+  Region all;
+  all.shape = Region::Shape::halfSpace;
+  all.distance = 0.1;
+  for (const char* trial : {"scale_0.1", "scale_10"}) {
+    BodyDescription body = heldTube();
+    body.steered = {{{1, 50, 1}, {}}};
+    const double everywhere = tortureSteps(body, trial, 1e-4);
+    body.steered[0].where = all;
+    EXPECT_EQ(tortureSteps(body, trial, 1e-4), everywhere) << trial;
+  }
+}
+
 TEST(TortureOfExplicitSteps, UnknownTrialsAndFreeBodiesAreRefused) {
   EXPECT_THROW(torture(heldTube(), tortureMethods()[0], "tickled", 0.01), std::runtime_error);
   BodyDescription body = heldTube();
