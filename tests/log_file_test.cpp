@@ -62,7 +62,6 @@ std::shared_ptr<SoftBodyModel> mendedModel() {
 }
 
 TEST(SurfaceFile, KeepsTheVertexOrderOfTheMeshFile) {
-  const TemporaryFolder folder;
   std::vector<BodyDescription> bodies(2);
   bodies[0].name = "first";
   bodies[1].name = "second";
@@ -71,8 +70,7 @@ TEST(SurfaceFile, KeepsTheVertexOrderOfTheMeshFile) {
   frame.bodies.resize(2);
   frame.bodies[0].nodes = {{0, 0, 0}, {0.1, 0, 0}, {0, 1. / 3, 0}};
   frame.bodies[1].nodes = {{2, 0, 0}, {3, 0, 0}, {4, 0, 0}};
-  writeSurface(folder / "s.obj", bodies, frame);
-  EXPECT_EQ(readTextFile(folder / "s.obj"),
+  EXPECT_EQ(surfaceText(bodies, frame),
             "o first\n"
             "v 0.10000000000000001 0 0\n"  // dropped: where the first kept one is
             "v 0.10000000000000001 0 0\n"

@@ -284,6 +284,23 @@ TEST_F(Outputs, AFullDiskStopsTheRunAndLeavesNothing) {
   EXPECT_TRUE(contents().empty());
 }
 
+TEST_F(Outputs, OfARunThatOneFileHasNoRoomForNoneAppears) {
+  const std::vector<std::string> words{"replay", "own/organ.xml", "--log",    "a.csv", "--surface-at",
+                                       "end",    "a.obj",         "--record", "b.csv"};
+  ASSERT_EQ(run(words).exitCode, 0);
+  const auto sizeOf = [&](const char* name) { return static_cast<long>(read(name).size()); };
+  const long log = sizeOf("a.csv"), surface = sizeOf("a.obj"), record = sizeOf("b.csv");
+  ASSERT_LT(log, surface);
+  ASSERT_LT(surface, record);
+  for (const char* name : {"a.csv", "a.obj", "b.csv"}) fs::remove(folder / name);
+  ProgramOptions full;
+  full.fileSizeLimit = record - 1;
+  expectRefused(run(words, full), "b.csv: cannot be written: File too large");
+  full.fileSizeLimit = surface - 1;
+  expectRefused(run({words.begin(), words.end() - 2}, full), "a.obj: cannot be written: File too large");
+  EXPECT_TRUE(contents().empty()) << contents()[0];
+}
+
 TEST_F(Outputs, WithoutAnyContextTheReasonsAreSaid) {
   ProgramOptions none;  // Mesa is told to offer OpenGL 2.1 alone
   none.environment = {{"MESA_GL_VERSION_OVERRIDE", "2.1"}};

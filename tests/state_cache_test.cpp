@@ -41,7 +41,8 @@ PictureState stateAtNumber(int number) {
 void writeCache(const std::string& path, int pictures) {
   CacheWriter writer(path, layoutOf());
   for (int n = 0; n < pictures; ++n) writer.write(stateAtNumber(n), 1000u + unsigned(n));
-  writer.commit(77);
+  writer.finish(77);
+  writer.commit();
 }
 
 std::string readingComplaint(const std::string& path, int picture = -1) {

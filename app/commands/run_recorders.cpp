@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <deque>
 #include <optional>
 #include <stdexcept>
 
@@ -32,19 +33,25 @@ class SurfaceRecorder {
     }
   }
   void afterFrame(const Simulation& simulation, bool last) { recordFrames(simulation, last, moments_); }
-  void write(const Simulation& simulation) const {
+  void finish(const Simulation& simulation) {
     for (std::size_t k = 0; k < requests_.size(); ++k) {
-      const SurfaceRequest& request = requests_[k];
-      writeSurface(request.path, simulation.world().bodies(), moments_[k].frame);
+      OutputFile& file = files_.emplace_back(requests_[k].path);
+      file.write(surfaceText(simulation.world().bodies(), moments_[k].frame));
+      file.finish();
+    }
+  }
+  void commit(const Simulation& simulation) {
+    for (OutputFile& file : files_) file.commit();
+    for (const SurfaceRequest& request : requests_)
       if (request.time.value_or(0) > simulation.time() + 1e-9)
         tell("note: {} is the shape at rest, at {:.6g} s: the run ended before {:.6g} s\n", request.path,
              simulation.time(), *request.time);
-    }
   }
 
  private:
   std::vector<RecordedFrame> moments_;
   std::vector<SurfaceRequest> requests_;  // one each
+  std::deque<OutputFile> files_;          // likewise; many would be too many to be open
 };
 
 class CacheRecorder {
@@ -59,8 +66,11 @@ class CacheRecorder {
     pictures_->afterFrame(simulation,
                           [&](int, const PictureState& state) { file_->write(state, simulation.world().stateHash()); });
   }
-  void commit(const Simulation& simulation) {
-    if (file_) file_->commit(simulation.world().stateHash());
+  void finish(const Simulation& simulation) {
+    if (file_) file_->finish(simulation.world().stateHash());
+  }
+  void commit() {
+    if (file_) file_->commit();
   }
 
  private:
@@ -96,6 +106,9 @@ class LogRecorder {
       file_->write(row_);
     }
   }
+  void finish() {
+    if (file_) file_->finish();
+  }
   void commit() {
     if (file_) file_->commit();
   }
@@ -121,6 +134,10 @@ class MotionRecorder {
       for (std::size_t k = 0; k < files_.size(); ++k)
         if (files_[k]) files_[k]->write(record.inputs[tick][k], record.tools[tick][k].force);
   }
+  void finish() {
+    for (const auto& file : files_)
+      if (file) file->finish();
+  }
   void commit() {
     for (const auto& file : files_)
       if (file) file->commit();
@@ -145,6 +162,9 @@ class FrameTimesRecorder {
     appendNumber(row, simulation.time());
     row += fmt::format(",{:.4g},{:.4g},{:.4g}\n", 1e3 * times.servo, 1e3 * times.dynamics, 1e3 * times.surface);
     file_->write(row);
+  }
+  void finish() {
+    if (file_) file_->finish();
   }
   void commit() {
     if (file_) file_->commit();
@@ -192,11 +212,16 @@ void RunRecorders::afterFrame(const Simulation& simulation, bool last) {
 }
 
 void RunRecorders::commit(const Simulation& simulation) {
+  data_->log.finish();
+  data_->cache.finish(simulation);
+  data_->motions.finish();
+  data_->frameTimes.finish();
+  data_->surfaces.finish(simulation);
   data_->log.commit();
-  data_->cache.commit(simulation);
+  data_->cache.commit();
   data_->motions.commit();
   data_->frameTimes.commit();
-  data_->surfaces.write(simulation);
+  data_->surfaces.commit(simulation);
 }
 
 std::vector<Result> RunRecorders::forceResults() const {

@@ -32,6 +32,7 @@ class LogFile {
  public:
   LogFile(const std::string& path, const std::vector<std::string>& tools, const std::vector<std::string>& bodies);
   void write(const LogRow& row);
+  void finish() { file_.finish(); }
   void commit() { file_.commit(); }
 
  private:

@@ -34,9 +34,14 @@ void OutputFile::write(const std::string& bytes) {
   if (buffer_.size() >= flushAt) flush();
 }
 
-void OutputFile::commit() {
+void OutputFile::finish() {
+  if (!to_.isOpen()) return;
   flush();
   if (!to_.close()) throw unwritable(path_);
+}
+
+void OutputFile::commit() {
+  finish();
   file_.commit();
 }
 

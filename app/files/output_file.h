@@ -22,12 +22,13 @@ std::filesystem::path normalised(const std::filesystem::path& path);
 void requireDistinctFiles(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
 
 // Written bit by bit, a file appears under its name only when whole (render/partial_file.h); ^C becomes an exception
-// (app/interrupt.h), and so leaves nothing either. The constructor throws what PartialFile's throws, write() and
-// commit() std::runtime_error with path and reason where the system fails (disk full).
+// (app/interrupt.h), and so leaves nothing either. The constructor throws what PartialFile's throws, write(), finish()
+// and commit() std::runtime_error with path and reason where the system fails (disk full).
 class OutputFile {
  public:
   explicit OutputFile(const std::string& path);
   void write(const std::string& bytes);
+  void finish();  // the last byte is written: of several files one that is full keeps all from appearing
   void commit();  // once, last
 
  private:

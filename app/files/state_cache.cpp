@@ -226,14 +226,14 @@ void CacheWriter::write(const PictureState& state, std::uint64_t stateHash) {
   ++pictures_;
 }
 
-void CacheWriter::commit(std::uint64_t finalHash) {
+void CacheWriter::finish(std::uint64_t finalHash) {
   std::string tail;
   Appender to(tail);
   to.raw(pictures_);
   to.raw(finalHash);
   to.raw(contentHash(tail, contentHash(head_)));
   file_.write(tail);
-  file_.commit();
+  file_.finish();
 }
 
 CacheReader::CacheReader(const std::string& path) : path_(path) {

@@ -36,7 +36,8 @@ class CacheWriter {
   CacheWriter(const std::string& path, const CacheLayout& layout);  // throws as OutputFile does
   // The next picture; `stateHash` is that of the dynamics frame which it lies in.
   void write(const PictureState& state, std::uint64_t stateHash);
-  void commit(std::uint64_t finalHash);  // once, last: the file appears
+  void finish(std::uint64_t finalHash);  // once, after the last picture
+  void commit() { file_.commit(); }      // then: the file appears
 
  private:
   OutputFile file_;

@@ -3,7 +3,6 @@
 #include <cassert>
 
 #include "app/files/number_text.h"
-#include "app/files/output_file.h"
 
 namespace medulla {
 
@@ -42,9 +41,8 @@ std::vector<int> nodesOfVertices(const SoftBodyModel& model) {
 
 }  // namespace
 
-void writeSurface(const std::string& path, const std::vector<BodyDescription>& bodies, const DynamicsFrame& frame) {
+std::string surfaceText(const std::vector<BodyDescription>& bodies, const DynamicsFrame& frame) {
   assert(bodies.size() == frame.bodies.size());
-  OutputFile file(path);
   std::string out;
   std::size_t before = 0;  // vertices of the bodies so far: OBJ counts through the whole file
   for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -67,8 +65,7 @@ void writeSurface(const std::string& path, const std::vector<BodyDescription>& b
     }
     before += nodes.size();
   }
-  file.write(out);
-  file.commit();
+  return out;
 }
 
 }  // namespace medulla

@@ -11,7 +11,7 @@ namespace medulla {
 // body. Vertices come in the order of the mesh file that the model was built from, so that line k is vertex k of every
 // moment. A vertex that mesh repair dropped keeps its number and takes the place of the kept one before it (the first
 // kept one where none is before): its own position was not simulated and no face uses it. Nodes that no input vertex
-// became follow at the end of their body. Errors are those of OutputFile.
-void writeSurface(const std::string& path, const std::vector<BodyDescription>& bodies, const DynamicsFrame& frame);
+// became follow at the end of their body.
+std::string surfaceText(const std::vector<BodyDescription>& bodies, const DynamicsFrame& frame);
 
 }  // namespace medulla

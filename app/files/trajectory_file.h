@@ -28,6 +28,7 @@ class TrajectoryFile {
  public:
   explicit TrajectoryFile(const std::string& path);
   void write(const ToolSample& sample, const Eigen::Vector3d& force);
+  void finish() { file_.finish(); }
   void commit() { file_.commit(); }
 
  private:
