@@ -226,6 +226,11 @@ TEST(StarterScene, IsCheckedWhateverTheMeshIsCalled) {
   EXPECT_TRUE(
       makeStarter(folder, folder / "\u0441\u0435\u0440\u0434\u0446\u0435.obj").out.ends_with("mine/organ.xml\n"));
   EXPECT_TRUE(makeStarter(folder, folder / "tube n\u00e0 m\u00eb.obj").out.ends_with("mine/tube_n_m.xml\n"));
+  const std::string hyphens = "left--" + std::string(230, 'o');
+  std::filesystem::copy_file(kMesh, folder / (hyphens + ".obj"));
+  const std::string cut = "left-" + std::string(195, 'o');
+  EXPECT_TRUE(makeStarter(folder, folder / (hyphens + ".obj")).out.ends_with("mine/" + cut + ".xml\n"));
+  EXPECT_EQ(runProgram({"check", folder / ("mine/" + cut + ".xml")}).out, "valid yes\n");
   const std::string model = readFile(folder / "mine/my_organ.model.xml");
   EXPECT_NE(model.find("settings=\"medulla build 'my organ.obj' --"), std::string::npos) << model.substr(0, 400);
 }

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "app/commands/commands.h"
@@ -28,11 +29,13 @@ static void requireWithinReach(const std::string& mesh, double metresPerUnit) {
                       mesh, x.lpNorm<Eigen::Infinity>(), reach));
 }
 
-// What is no plain character becomes one stroke, however many bytes it has.
+// What is no plain character becomes one stroke, however many bytes it has; nor are there two hyphens, which would end
+// a comment in XML.
 static std::string nameOf(const std::string& mesh) {
   std::string out;
   for (const char c : plainName(fs::path(mesh).stem().string()))
-    if (c != '_' || (!out.empty() && out.back() != '_')) out += c;
+    if ((c != '_' && c != '-') || (!out.empty() && out.back() != c)) out += c;
+  out.resize(std::min(out.size(), kLongestName));
   if (!out.empty() && out.back() == '_') out.pop_back();
   return out.empty() ? "organ" : out;
 }

@@ -36,10 +36,9 @@ bool readBool(const XmlElement& element, const std::string& attribute, bool fall
 
 // Names stand in override paths, column names, object names and file names.
 std::string readName(const XmlElement& element) {
-  constexpr std::size_t kLongest = 200;  // so that files may be named after them, with what is put before and behind
   std::string name = readText(element, "name");
   if (name != plainName(name)) refuse(element, "name", "expected letters, digits, _ and - only");
-  if (name.size() > kLongest) refuse(element, "name", fmt::format("expected at most {} letters", kLongest));
+  if (name.size() > kLongestName) refuse(element, "name", fmt::format("expected at most {} letters", kLongestName));
   return name;
 }
 

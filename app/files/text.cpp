@@ -99,9 +99,6 @@ std::size_t editsBetween(const std::string& a, const std::string& b) {
   return last[b.size()];
 }
 
-// Nobody mistypes more, and what stands for a name may be a file without an end.
-constexpr std::size_t kLongestName = 200;
-
 struct NearName {
   std::string name;
   std::size_t edits = std::numeric_limits<std::size_t>::max();

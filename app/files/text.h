@@ -13,6 +13,10 @@ std::string inQuotes(std::string_view word, char mark = '\'');
 // Quoted where a shell would take it for several words or more: for commands that are printed to be pasted.
 std::string shellWord(std::string_view word);
 
+// Letters: so that files may be named after a name, with what is put before and behind. Of longer words, which may be
+// files without an end, no more is compared with names.
+inline constexpr std::size_t kLongestName = 200;
+
 // A name for results, curves, bodies and scenes, of what may be any: letters, digits, _ and - of it, _ for the rest.
 std::string plainName(std::string_view text);
 
