@@ -100,7 +100,7 @@ struct GapCostByBlocks {
   }
   template <typename Array>
   float sum(const Array& values) const {
-    return (values * (1 / scale)).cube().square().sum() / static_cast<float>(gaps.size());
+    return gapCost(values * (1 / scale), gaps.size());
   }
   // No ball of these least gaps can bring the cost below this.
   template <typename Column>
@@ -192,8 +192,7 @@ struct OpenPoints {
     const Eigen::Vector3f centre = scaledCentre(ball, targets.diagonal);
     const float radius = scaledRadius(ball, targets.diagonal);
     const auto distance = (surface.colwise() - centre).colwise().norm().transpose().array();
-    const float sum = ((distance - radius).max(0.f).min(gaps) * (1 / weights.scale)).cube().square().sum();
-    const float gapPart = sum / static_cast<float>(targets.surface.cols());
+    const float gapPart = gapCost((distance - radius).max(0.f).min(gaps) * (1 / weights.scale), targets.surface.cols());
     if (weights.volumeWeight == 0) return gapPart;
     const auto open = ((volume.colwise() - centre).colwise().squaredNorm().array() > radius * radius).count();
     return gapPart + weights.volumeWeight * static_cast<float>(open) / static_cast<float>(targets.volume.cols());

@@ -41,11 +41,11 @@ struct Reach {
 };
 Reach reachOf(const ScaledTargets& targets, const std::vector<Ball>& balls);
 
-// Mean of (gap / scale)^6. The sixth power is the largest gap to within a few per cent and still tells which way is
-// down where many points share it.
+// Sum of gap^6 over so many points: the largest gap to within a few per cent, which still tells which way is down where
+// many points share it.
 template <typename Array>
-float gapCost(const Array& gaps, float scale) {
-  return (gaps * (1 / scale)).cube().square().sum() / static_cast<float>(gaps.size());
+float gapCost(const Array& gaps, Eigen::Index points) {
+  return gaps.cube().square().sum() / static_cast<float>(points);
 }
 
 }  // namespace medulla

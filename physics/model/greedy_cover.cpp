@@ -77,7 +77,7 @@ int bestAddition(const GapTable& gaps, const Gaps& least, const std::vector<char
   float bestCost = 0;
   for (int c = 0; c < gaps.cols(); ++c) {
     if (taken[c]) continue;
-    const float cost = gapCost(least.min(gaps.col(c)), 1);
+    const float cost = gapCost(least.min(gaps.col(c)), gaps.rows());
     if (best < 0 || cost < bestCost) {
       best = c;
       bestCost = cost;
