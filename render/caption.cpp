@@ -10,7 +10,7 @@
 namespace medulla {
 namespace {
 
-constexpr float kReadable = 7, kLegible = 5;   // px
+constexpr float kReadable = 7;                 // px
 constexpr float kPad = 0.9f, kLeading = 1.6f;  // of the letters' height: on all sides; from line to line
 
 float widestOf(const std::vector<std::string>& lines, float height) {
@@ -51,7 +51,7 @@ std::vector<std::string> wrapped(const std::string& text, float height, float wi
 
 bool drawCaption(const std::string& text, int width, Image& image) {
   constexpr float kHighest = 0.3f;  // of the picture
-  constexpr glm::vec3 kPaper{0.004f, 0.005f, 0.007f}, kLetters{0.85f, 0.86f, 0.88f};
+  constexpr glm::vec3 kLetters{0.85f, 0.86f, 0.88f};
   const float margin = std::round(0.03f * float(image.height));
   const float whole = std::max(kReadable, 0.032f * float(image.height));
   const float widest = float(width) - 2 * margin;
@@ -66,7 +66,7 @@ bool drawCaption(const std::string& text, int width, Image& image) {
   if (high.x > float(width) || high.y > std::max(kHighest * float(image.height), low.y + 3 * height)) return false;
   Ink ink(image, low, high);
   ink.fill(low, high);
-  ink.apply(kPaper, 0.72f);
+  ink.apply(kPaper, kPaperOpacity);
   for (std::size_t k = 0; k < lines.size(); ++k)
     writeText(lines[k], low + kPad * height + glm::vec2(0, kLeading * height * float(k)), height, ink);
   ink.apply(kLetters, 1);

@@ -11,9 +11,9 @@ namespace {
 
 using glm::vec2;
 
-constexpr glm::vec3 kPaper{0.004f, 0.005f, 0.007f}, kGrid{0.12f, 0.13f, 0.15f}, kGrey{0.50f, 0.52f, 0.55f};
+constexpr glm::vec3 kGrid{0.12f, 0.13f, 0.15f}, kGrey{0.50f, 0.52f, 0.55f};
 
-constexpr float kReadable = 6.5f, kLegible = 5;  // px, the height of letters: those of forces, and any
+constexpr float kReadable = 6.5f;  // px, the least height of the letters of forces
 
 // Corners and sizes in pixels.
 struct Layout {
@@ -121,7 +121,7 @@ void drawStripChart(const StripChart& chart, Image& image) {
   const Layout layout(image);
   Ink ink(image, layout.low, layout.high);
   ink.fill(layout.low, layout.high);
-  ink.apply(kPaper, 0.72f);
+  ink.apply(kPaper, kPaperOpacity);
   drawGrid(chart, layout, ink);
   if (layout.text > 0) writeLabels(chart, layout, ink);
   for (const StripCurve& curve : chart.curves) drawCurve(chart, curve, layout, ink);

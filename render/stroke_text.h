@@ -28,6 +28,11 @@ class Ink {
   std::vector<std::size_t> touched_;
 };
 
+// What letters and curves lie on, and the least height of letters that can be read.
+inline constexpr glm::vec3 kPaper{0.004f, 0.005f, 0.007f};
+inline constexpr float kPaperOpacity = 0.72f;
+inline constexpr float kLegible = 5;  // px
+
 // Letters of strokes, `height` px high from the line that they stand on to the top of capitals; a third of it more
 // below, as much above accents. Characters that glyphs.h does not know are empty boxes.
 float textWidth(const std::string& text, float height);                             // px
