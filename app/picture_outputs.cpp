@@ -29,13 +29,6 @@ int numberOf(const fs::path& path) {
   return number >= 0 && path.filename() == pngName(number) ? number : -1;
 }
 
-bool isPng(const fs::path& path) {
-  constexpr char signature[] = {'\x89', 'P', 'N', 'G', '\r', '\n', '\x1a', '\n'};
-  std::ifstream file(path, std::ios::binary);
-  char first[sizeof signature] = {};
-  return file.read(first, sizeof first) && std::memcmp(first, signature, sizeof first) == 0;
-}
-
 // A file that a power cut left short has its name already; its last chunk is missing then.
 bool isWholePng(const fs::path& path) {
   constexpr char end[] = {0, 0, 0, 0, 'I', 'E', 'N', 'D', '\xae', '\x42', '\x60', '\x82'};
@@ -144,7 +137,7 @@ int PngFolder::finish() {
 // behind one is somebody's own.
 int PngFolder::removeLater() const {
   int number = slice_.last;
-  for (; isPng(folder_ / pngName(number)); ++number) fs::remove(folder_ / pngName(number));
+  for (; isPng((folder_ / pngName(number)).string()); ++number) fs::remove(folder_ / pngName(number));
   return number - slice_.last;
 }
 

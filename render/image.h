@@ -24,6 +24,7 @@ struct PngText {
 void writePng(const std::string& path, const Image& image, const std::vector<PngText>& texts = {});
 // What writePng() writes.
 std::string encodePng(const Image& image, const std::vector<PngText>& texts = {});
+bool isPng(const std::string& path);  // as far as its first bytes tell; false where it cannot be read
 // Throws std::runtime_error when the file is missing or no PNG. `texts`, if given, receives the tEXt chunks.
 Image readPng(const std::string& path, std::vector<PngText>* texts = nullptr);
 

@@ -113,6 +113,12 @@ void writePng(const std::string& path, const Image& image, const std::vector<Png
   writeFile(path, encodePng(image, texts));
 }
 
+bool isPng(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  char first[sizeof kSignature] = {};
+  return file.read(first, sizeof first) && std::memcmp(first, kSignature, sizeof first) == 0;
+}
+
 Image readPng(const std::string& path, std::vector<PngText>* texts) {
   if (std::filesystem::is_directory(path)) throw std::runtime_error(path + ": is a folder, expected a PNG file");
   std::ifstream file(path, std::ios::binary);
