@@ -26,6 +26,7 @@ TEST(PlaneSection, EllipseAndItsHalves) {
   const PowerSites sites{{{0, -1, 0}, {0, 1, 0}, {5, 1, 0}}, {0, 0, 0}, {9, 9, 9}};
   EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 1}).area / area, 1, 3e-3);
   EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 2}).area / area, 0.5, 3e-3);
+  EXPECT_NEAR(planeSection(mesh, plane, &sites, {0, 0}).area / area, 0.5, 3e-3);
 }
 
 // Of the region between `low(v)` and `high(v)` for 0 < v < `height`, about the centroid that symmetry or the table

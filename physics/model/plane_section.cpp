@@ -123,16 +123,17 @@ SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const 
   if (outline.empty()) return {};
   const auto [low, high] = heightsOf(outline);
   const double step = (high - low) / kScanLines;
+  const std::array<int, 2> cells{pair.first, pair.second};
+  const std::size_t count = pair.first == pair.second ? 1 : 2;
   // Of the scan line at `b`, what is inside: one span after the other.
   const auto visitSpans = [&](double b, const auto& visit) {
-    std::array<Span, 2> parts = {{{-1e30, 1e30}, {0, 0}}};
-    if (sites != nullptr) {
-      const Vector3d start = plane.origin + b * plane.v;
-      parts = {cellSpan(*sites, pair.first, start, plane.u), cellSpan(*sites, pair.second, start, plane.u)};
-    }
+    std::array<Span, 2> parts = {{{-1e30, 1e30}}};
+    for (std::size_t p = 0; sites != nullptr && p < count; ++p)
+      parts[p] = cellSpan(*sites, cells[p], plane.origin + b * plane.v, plane.u);
     const std::vector<double> crossings = crossingsOf(outline, b);
     for (std::size_t k = 0; k + 1 < crossings.size(); k += 2)
-      for (const Span& part : parts) visit(std::max(crossings[k], part.low), std::min(crossings[k + 1], part.high));
+      for (std::size_t p = 0; p < count; ++p)
+        visit(std::max(crossings[k], parts[p].low), std::min(crossings[k + 1], parts[p].high));
   };
   std::vector<SectionSpan> spans;
   for (int line = 0; line < kScanLines; ++line) {

@@ -23,7 +23,7 @@ struct SectionMoments {
 };
 
 // Section of the solid inside the mesh, on scan lines along u. With `sites`, only the part within the power cells of
-// the two spheres `pair` counts. Area 0 where the plane misses. Exact along u; the midpoint rule across.
+// the spheres `pair`, which may be one, counts. Area 0 where the plane misses. Exact along u; the midpoint rule across.
 SectionMoments planeSection(const TriangleMesh& mesh, const Plane& plane, const PowerSites* sites = nullptr,
                             std::pair<int, int> pair = {0, 0});
 

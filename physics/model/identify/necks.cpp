@@ -198,7 +198,7 @@ double sectionWidth(const TriangleMesh& mesh, const Neck& neck) {
     const Vector3d normal = Eigen::Vector3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1).cast<double>();
     if (normal.isZero(0)) continue;
     const SectionMoments s = planeSection(mesh, planeAcross(neck.place, normal.normalized()), &near, {0, 0});
-    if (s.holdsOrigin) least = std::min(least, s.area / 2);  // the same cell twice
+    if (s.holdsOrigin) least = std::min(least, s.area);
   }
   return std::isinf(least) ? neck.width : 2 * std::sqrt(least / pi);
 }
