@@ -55,7 +55,7 @@ std::filesystem::path placeOf(const std::string& path) {
 }
 
 std::filesystem::path normalised(const std::filesystem::path& path) {
-  const std::filesystem::path called = path.lexically_normal();
+  std::filesystem::path called = path.lexically_normal();
   if (placeOf(called.string()) == placeOf(path.string())) return called;
   return placeOf(path.parent_path().string()) / path.filename();
 }
