@@ -50,7 +50,8 @@ struct StaticNeighbour {
 // Four lines of the cache: contacts of a heap outgrow it, and all are read in every pass.
 struct alignas(64) Contact {
   std::uint64_t key;  // which pair: what ties it to the substep before
-  std::int32_t ends = 0, firstSideEnds = 0;
+  std::int16_t ends = 0, firstSideEnds = 0;
+  bool misses = false;  // as it moves now
   std::array<std::uint32_t, 4> sphere;
   std::array<double, 4> weight;        // < 0 on the side that the normal points away from
   std::array<double, 2> reach;         // m, per side: from the ball's centre to the point of contact, along the normal
@@ -129,6 +130,7 @@ struct ContactData {
   std::vector<Quad> arm;   // m, per sphere: from its frame to the ball's centre; w = 0
   std::vector<Contact> contacts;
   std::vector<ContactSphere> spheres;
+  std::vector<double> blow;                // m/s, per body: the fastest that strikes it
   std::vector<char> groupIsAsked;          // per four of them: set in this substep
   std::vector<signed char> changedInPass;  // per sphere: the solver's last pass that changed it by more than a little
 

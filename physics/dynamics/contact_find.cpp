@@ -32,7 +32,7 @@ BallAt ballAt(const ContactData& c, const Collider& of, double along) {
   return {b, b[3]};
 }
 
-void addContact(WorldData& d, std::uint32_t i, std::uint32_t j, double s, double t) {
+Contact& addContact(WorldData& d, std::uint32_t i, std::uint32_t j, double s, double t) {
   ContactData& c = d.contact;
   const Collider &a = c.colliders[i], &b = c.colliders[j];
   const BallAt p = ballAt(c, a, s), q = ballAt(c, b, t);
@@ -49,10 +49,11 @@ void addContact(WorldData& d, std::uint32_t i, std::uint32_t j, double s, double
   contact.firstSideEnds = contact.ends;
   addSide(b, t, 1, contact);
   contact.reach = {p.radius + 0.5 * contact.gap, -(q.radius + 0.5 * contact.gap)};
+  return contact;
 }
 
 // Whether the two balls in which the colliders are nearest come to touch within the substep, as they move now: what is
-// fast, or far apart, would otherwise be turned aside by what it misses.
+// fast, or far apart, would otherwise be turned aside by what it misses. What is near may still be pushed against it.
 bool willTouch(const WorldData& d, const PairGroup& g, int lane, const ConeContact& closest) {
   const ContactData& c = d.contact;
   const auto velocityAt = [&](const Collider& of, double along) -> Eigen::Vector3d {
@@ -69,25 +70,31 @@ bool willTouch(const WorldData& d, const PairGroup& g, int lane, const ConeConta
 
 }  // namespace
 
+static Lanes velocityOfBall(const WorldData& d, std::size_t i) {
+  return load(d.spheres.velocity[i]) + crossProduct(load(d.spheres.angularVelocity[i]), load(d.contact.arm[i]));
+}
+
 Eigen::Vector3d ballVelocity(const WorldData& d, std::uint32_t sphere) {
-  const Lanes turning = crossProduct(load(d.spheres.angularVelocity[sphere]), load(d.contact.arm[sphere]));
-  const Lanes v = load(d.spheres.velocity[sphere]) + turning;
+  const Lanes v = velocityOfBall(d, sphere);
   return {v[0], v[1], v[2]};
 }
 
 void findPairContacts(WorldData& d, double moved) {
   ContactData& c = d.contact;
   const double reach = c.reach;
-  const bool asks = reach > leastReach(d);
+  const double least = leastReach(d);
   const Lanes farAtList = splat(reach + 2 * moved), near = splat(reach);
   for (const PairGroup& g : c.pairs) {
     const Lanes perhaps = isLess(g.gapAtList, farAtList);
     if (!any(perhaps)) continue;
     const ConeContact closest = closestOfPairs(c, g);
     const int hits = _mm256_movemask_pd(masked(perhaps, isLess(closest.gap, near)));
-    for (int k = 0; k < 4; ++k)
-      if ((hits >> k & 1) != 0 && (!asks || !(closest.gap[k] > 0) || willTouch(d, g, k, closest)))
-        addContact(d, g.collider0[k], g.collider1[k], closest.s[k], closest.t[k]);
+    for (int k = 0; k < 4; ++k) {
+      if ((hits >> k & 1) == 0) continue;
+      const bool misses = reach > least && closest.gap[k] > 0 && !willTouch(d, g, k, closest);
+      if (misses && closest.gap[k] > least) continue;
+      addContact(d, g.collider0[k], g.collider1[k], closest.s[k], closest.t[k]).misses = misses;
+    }
   }
 }
 
@@ -104,10 +111,6 @@ void findContacts(WorldData& d) {
   findStaticContacts(d, moved);
 }
 
-static Lanes ballVelocity(const WorldData& d, int i) {
-  return load(d.spheres.velocity[i]) + crossProduct(load(d.spheres.angularVelocity[i]), load(d.contact.arm[i]));
-}
-
 // Two balls that each move by half the reach are looked at before they touch; with half a radius more they overlap by
 // that at most before they are, which neither a centre nor the middle of what is thin passes. Where nothing stands
 // still, how fast all travel together does not count: a body that falls alone would be halved for it, and damped less.
@@ -115,11 +118,11 @@ bool outrunsContact(const WorldData& d, double time) {
   const ContactData& c = d.contact;
   if (c.mode == ContactMode::none) return false;
   Lanes common = splat(0);
-  for (int i = 0; i < d.spheres.count && c.statics.empty(); ++i) common = common + ballVelocity(d, i);
+  for (int i = 0; i < d.spheres.count && c.statics.empty(); ++i) common = common + velocityOfBall(d, i);
   common = splat(1.0 / std::max(d.spheres.count, 1)) * common;
   const double half = 0.5 * c.reach;
   for (int i = 0; i < d.spheres.count; ++i) {
-    const Lanes v = ballVelocity(d, i) - common;
+    const Lanes v = velocityOfBall(d, i) - common;
     const double farthest = half + 0.5 * c.ball[i].v[3];
     if (time * time * dotProduct(v, v) > farthest * farthest) return true;
   }

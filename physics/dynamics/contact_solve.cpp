@@ -141,12 +141,47 @@ void chooseTangent(Contact& c) {
   c.tangent0 = across / splat(std::sqrt(dotProduct(across, across)));
 }
 
-// False where nothing can move, or where the two part or are too slow to meet within the substep.
+double closingSpeed(const WorldData& d, const Contact& c) {
+  return -dotProduct(relativeVelocity(d, c), c.normal);
+}
+
+// Wakes bodies that others, awake, will press on within the substep; whether there was any.
+bool wakePressed(WorldData& d) {
+  if (d.awake.bodies == static_cast<int>(d.bodies.size())) return false;
+  std::vector<int> pressed;
+  for (const Contact& c : d.contact.contacts) {
+    const auto [a, b] = bodiesOf(d, c.key);
+    if (b < 0 || d.rest[a].asleep == d.rest[b].asleep || c.misses) continue;
+    if (!(c.gap > d.substep * closingSpeed(d, c))) pressed.push_back(d.rest[a].asleep ? a : b);
+  }
+  for (const int body : pressed) wake(d, body);
+  return !pressed.empty();
+}
+
+// Per body, how fast it is struck at most in this substep. A body struck is no faster for it than what strikes it.
+void findBlows(WorldData& d) {
+  std::vector<double>& blow = d.contact.blow;
+  blow.assign(d.bodies.size(), 0);
+  for (const Contact& c : d.contact.contacts) {
+    const double speed = closingSpeed(d, c);
+    if (c.gap > d.substep * speed) continue;
+    for (const int body : bodiesOf(d, c.key))
+      if (body >= 0) blow[body] = std::max(blow[body], speed);
+  }
+}
+
+double blowOn(const WorldData& d, const Contact& c) {
+  const auto [a, b] = bodiesOf(d, c.key);
+  return b < 0 ? d.contact.blow[a] : std::max(d.contact.blow[a], d.contact.blow[b]);
+}
+
+// False where nothing can move, or where the two are too slow to meet within the substep, even if one of them is struck
+// by a third.
 bool prepare(const WorldData& d, Contact& c) {
-  const double h = d.substep;
-  if (c.gap > 0 && c.gap + h * dotProduct(relativeVelocity(d, c), c.normal) > 0) return false;
+  const double h = d.substep, speed = c.gap > 0 ? closingSpeed(d, c) : 0;
+  if (c.gap > 0 && c.gap > h * (speed + blowOn(d, c))) return false;
   const ContactLaw law = contactLaw(d, c, h);
-  c.bias = law.bias;
+  c.bias = c.misses ? std::max(law.bias, speed) : law.bias;
   if (!(c.gap > 0)) c.softness = law.softness;  // until they touch: no further than that, and hard
   const Lanes mobility = mobilityAlong(d, c, c.normal);
   const double alongNormal = dotProduct(mobility, c.normal);
@@ -287,6 +322,11 @@ void solveContacts(WorldData& d) {
     return;
   }
   prepareSpheres(d);
+  while (wakePressed(d)) {  // who then stands on what bears him, which is no contact while he sleeps
+    findContacts(d);
+    prepareSpheres(d);
+  }
+  findBlows(d);
   std::erase_if(c.contacts, [&](Contact& contact) { return !prepare(d, contact); });
   notePenetration(c);
   startFrom(d, c.carried);

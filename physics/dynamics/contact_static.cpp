@@ -131,7 +131,7 @@ Touches touchesOf(const StaticContactShape& shape, const TriangleDistance* begin
   return touches;
 }
 
-void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int ordinal) {
+void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int ordinal, bool misses) {
   ContactData& c = d.contact;
   const Quad& ball = c.ball[n.sphere];
   const Vector3d point = vectorOf(ball) - at.distance * at.normal;
@@ -148,6 +148,7 @@ void addContact(WorldData& d, const StaticNeighbour& n, const Nearest& at, int o
   contact.sphere[0] = n.sphere;
   contact.weight[0] = 1;
   contact.reach[1] = -(ball.v[3] + 0.5 * contact.gap);
+  contact.misses = misses;
 }
 
 double distanceFrom(const WorldData& d, const StaticNeighbour& n, const Vector3d& p) {
@@ -230,14 +231,16 @@ void findStaticContacts(WorldData& d, double moved) {
     const double within = c.ball[n.sphere].v[3] + reach, always = c.ball[n.sphere].v[3] + leastReach(d);
     if (shape.kind != StaticShape::Kind::mesh) {
       const Nearest at = nearestOn(shape, p);
-      if (at.distance < within && willTouch(d, n, at.distance)) addContact(d, n, at, 0);
+      const bool misses = at.distance < within && !willTouch(d, n, at.distance);
+      if (at.distance < (misses ? always : within)) addContact(d, n, at, 0, misses);
       continue;
     }
     const TriangleDistance* near = c.nearTriangles.data();
     const Depth depth{within, always};
     const Touches touches = touchesOf(shape, near + n.firstTriangle, near + n.endTriangle, p, depth, moved);
-    if (touches.count > 0 && !willTouch(d, n, touches.at[0].distance)) continue;
-    for (int k = 0; k < touches.count; ++k) addContact(d, n, touches.at[k], k);
+    const bool misses = touches.count > 0 && !willTouch(d, n, touches.at[0].distance);
+    for (int k = 0; k < touches.count; ++k)
+      if (!misses || touches.at[k].distance < always) addContact(d, n, touches.at[k], k, misses);
   }
 }
 

@@ -243,8 +243,7 @@ void fallAsleep(WorldData& d, const Loads& loads) {
   d.contact.listsAreOld = true;
 }
 
-// Wakes the body and its island; does nothing if it is awake.
-static void wake(WorldData& d, int body) {
+void wake(WorldData& d, int body) {
   if (!d.rest[body].asleep) return;
   const std::vector<int> island = islandsOf(d, d.contact.resting);
   for (std::size_t b = 0; b < island.size(); ++b)

@@ -67,7 +67,8 @@ void layOutRest(WorldData&);  // all bodies awake
 void fallAsleep(WorldData&, const Loads& loads);
 // With all that rests on them or bears them; their contacts go on with the impulses they had.
 void wakeLoaded(WorldData&, const Loads& loads);  // the bodies that tools touch
-void wakeTouched(WorldData&);                     // those that bodies awake press on in this substep
+void wake(WorldData&, int body);                  // if it sleeps
+void wakeTouched(WorldData&);                     // those that bodies awake have pressed on in this substep
 
 // All forces of the current state, left in Spheres::force, torque and Nodes::force.
 inline void evaluateForces(WorldData& d, const Batch& batch) {

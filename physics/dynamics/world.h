@@ -138,12 +138,13 @@ class World {
   double stableSubstep() const;  // s, the estimate of the largest stable step
   double time() const;           // s; below 0 until the settling frames are through
   // One dynamics frame: substeps under gravity and `loads`. Returns the N s that each tool gave to the bodies (index:
-  // tool). Throws NotFinite naming body, time and cause when the state stops being finite.
+  // tool; up to the last that `loads` name). Throws NotFinite naming body, time and cause when the state stops being
+  // finite.
   std::vector<Eigen::Vector3d> advance(const Loads& loads);
 
   void readFrame(DynamicsFrame& out) const;  // resized once and reused
   Energies energies() const;                 // evaluates the attachments anew: not beside any other call
-  double volumeRatio(int body) const;        // enclosed by the nodes, over rest
+  double volumeRatio(int body) const;        // enclosed by the nodes, over rest; 1 without nodes
   double lowestFrequency(int body) const;    // rad/s, of what deforms at rest; 0: nothing does
   // Per body and node, within one dynamics frame: of all at once, since it takes as long as to make the world.
   std::vector<std::vector<NodeGive>> nodeGive() const;
@@ -152,7 +153,7 @@ class World {
   PenetrationReport penetration() const;
   const std::vector<BodyOverlap>& startOverlaps() const;
   const CreepReport& creep() const;
-  // Whether cells of identified links that lie side by side have ever been turned against each other by more than 90
+  // Whether two cells that an identified link joins have ever been turned against each other by more than 90
   // degrees: no tissue's are. Links and skin are fitted to small turns, and let a cell go over under loads of more than
   // Young's modulus over its surface.
   bool hasTurnedOver(int body) const;
