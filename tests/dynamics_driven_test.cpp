@@ -234,4 +234,27 @@ TEST(AmbientDrag, SlowsEveryPartAlike) {
   }
 }
 
+// Beyond the drive's motion a held sphere moves backwards: damped, it would be carried along.
+TEST(DrivenSphere, LeavesAHeldOneWhereItIs) {
+  const auto model = synthetic::chainModel(synthetic::straightTube(5, 0.08, 0.012, 10, 12));
+  for (const SurfaceMode surface : {SurfaceMode::skin, SurfaceMode::full}) {
+    BodyDescription b = synthetic::body(model, 5e3, {{0, FixedFreedom::translation}});
+    b.tissue.damping = 0.3;
+    b.surface = surface;
+    DrivenSphere drive;
+    drive.sphere = 4;
+    drive.freedom = FixedFreedom::all;
+    drive.velocity = Vector3d(0, 0.005, 0);
+    b.driven = {drive};
+    WorldSettings s;
+    s.gravity.setZero();
+    World world(s, {b});
+    DynamicsFrame before, after;
+    world.readFrame(before);
+    for (int k = 0; k < 100; ++k) world.advance({});
+    world.readFrame(after);
+    EXPECT_EQ(after.bodies[0].spheres[0].position, before.bodies[0].spheres[0].position);
+  }
+}
+
 }  // namespace medulla

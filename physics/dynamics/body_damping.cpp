@@ -112,6 +112,7 @@ template <bool turns>
 void dampAgainst(const RigidLanes& rigid, double lost, const BodyRange& r, WorldData& d) {
   Spheres& s = d.spheres;
   for (const int i : spheresOf(r)) {
+    if (s.groups[i / 4].inverseMass[i % 4] == 0) continue;  // held, or moved by a drive
     const Lanes v = load(s.velocity[i]), spin = load(s.angularVelocity[i]);
     Lanes beyond = v - rigid.linear, spinBeyond = spin;
     if constexpr (turns) {

@@ -25,10 +25,11 @@ std::vector<PlacedPoint> supportPoints(const BodyDescription& body) {
   return out;
 }
 
-// The sphere that keeps its orientation, or -1.
+// The sphere that keeps its orientation and leads, or -1.
 int turnlessSphere(const BodyDescription& body) {
   for (const FixedSphere& f : body.fixed)
     if (f.freedom == FixedFreedom::all) return f.sphere;
+  if (isHeld(body)) return -1;
   for (const DrivenSphere& f : body.driven)
     if (f.freedom == FixedFreedom::all) return f.sphere;
   return -1;
