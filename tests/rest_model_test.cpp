@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -159,6 +160,52 @@ TEST(RotaryInertia, ThatBoundsNoStepStaysWhatItIs) {
   BodyMechanics after = before;
   raiseRotaryInertia(RestModel(body, after), after);
   for (int i = 0; i < kSpheres; ++i) EXPECT_EQ(after.sphereInertia[i], before.sphereInertia[i]) << i;
+}
+
+// Three in a row stretch as (1, -2, 1), which a start vector that grows evenly along them knows nothing of.
+TEST(RestModel, ThreeLikeSpheresInARowHideNoMode) {
+  for (const LinkModel links : {LinkModel::springs, LinkModel::beam}) {
+    BodyDescription b = synthetic::body(synthetic::chainModel(synthetic::straightTube(3, 0.09, 0.012, 8, 10)), 2e4);
+    b.surface = SurfaceMode::skin;
+    b.links = links;
+    const BodyMechanics mechanics = bodyMechanics(b);
+    const RestModel rest(b, mechanics);
+    MatrixXd k(rest.size(), rest.size()), mass = MatrixXd::Zero(rest.size(), rest.size());
+    for (int i = 0; i < rest.size(); ++i) k.col(i) = rest.stiffnessTimes(VectorXd::Unit(rest.size(), i), 1, 1);
+    for (int i = 0; i < 3; ++i) {
+      mass.block<3, 3>(6 * i, 6 * i) = mechanics.sphereMass[i] * Matrix3d::Identity();
+      mass.block<3, 3>(6 * i + 3, 6 * i + 3) = mechanics.sphereInertia[i];
+    }
+    const double expected = eigenvaluesOf(k, mass).maxCoeff();
+    EXPECT_NEAR(largest(b, mechanics) / expected, 1, 1e-3);
+  }
+}
+
+// Critical damping of the lowest mode may take more of a substep's motion than the step was chosen for.
+TEST(Settling, OfShortBodiesIsStableInTheStepThatWasChosenAtRest) {
+  for (const double length : {0.4, 0.55, 0.7, 0.85, 1., 1.2, 1.5, 3.}) {
+    for (const LinkModel links : {LinkModel::springs, LinkModel::beam}) {
+      BodyDescription b =
+          synthetic::body(synthetic::chainModel(synthetic::straightTube(2, 0.04 * length, 0.012, 8, 10)), 2e4);
+      b.tissue.damping = 0.005;
+      b.surface = SurfaceMode::skin;
+      b.links = links;
+      WorldSettings s;
+      s.gravity.setZero();
+      s.frameDuration = 0.02;
+      s.settleFrames = 200;
+      World world(s, {b});
+      world.data().spheres.velocity[0] = quadOf(Eigen::Vector3d(1e-3, -2e-3, 1e-3));
+      world.data().spheres.velocity[1] = quadOf(Eigen::Vector3d(-2e-3, 1e-3, 0.5e-3));
+      const double start = world.energies().kinetic;
+      double most = 0;
+      for (int k = 0; k < 200; ++k) {
+        world.advance({});
+        most = std::max(most, world.energies().kinetic + world.energies().elastic);
+      }
+      EXPECT_LT(most, 2 * start) << length;
+    }
+  }
 }
 
 }  // namespace medulla

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <cstdint>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -159,8 +160,10 @@ MatrixXd RestModel::onSpheres(const MatrixXd& forces) const {
 }
 
 double RestModel::startValue(int i) {
-  const double a = 0.6180339887498949 * (i + 1);
-  return a - std::floor(a) - 0.5;
+  std::uint64_t x = (static_cast<std::uint64_t>(i) + 1) * 0x9e3779b97f4a7c15U;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9U;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebU;
+  return static_cast<double>(x >> 11) * 0x1p-53 - 0.5;
 }
 
 VectorXd RestModel::carriedBy(const VectorXd& spheres) const {

@@ -36,7 +36,8 @@ class RestModel {
   Eigen::MatrixXd carried(const Eigen::MatrixXd& motions) const;
   Eigen::MatrixXd onSpheres(const Eigen::MatrixXd& forces) const;
 
-  // A repeatable, structureless start vector: the fractional parts of multiples of the golden ratio.
+  // A repeatable, structureless start vector (SplitMix64: Steele, Lea and Flood 2014). Of what grows evenly from one
+  // sphere to the next second differences are 0, and with them the share of a mode of three like spheres in a row.
   static double startValue(int i);
 
  private:

@@ -229,6 +229,7 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
                     limits.stable, kLeastSubstep));
   data_->substeps = settings.substeps > 0 ? settings.substeps : chosenSubsteps(settings, data_->bodies, limits.safe);
   data_->substep = settings.frameDuration / data_->substeps;
+  for (BodyRange& r : data_->ranges) r.settlingDamping = std::min(r.settlingDamping, 1 / data_->substep);
   data_->keptByDrag = 1 / (1 + data_->substep * settings.ambientDrag);
   for (std::size_t b = 0; b < mechanics.size(); ++b) {  // of like bodies the first one's say all
     const int like = mechanics[b].firstLike;
@@ -327,6 +328,7 @@ double World::volumeRatio(int body) const {
   const BodyRange& r = data_->ranges.at(body);
   thread_local std::vector<Quad> nodes;  // kept: asked in every frame
   nodes.resize(r.node.size());
+  if (nodes.empty()) return 1;
   for (std::size_t i = 0; i < r.node.size(); ++i) nodes[i] = quadOf(vectorAt(data_->nodes.position, r.node[i]));
   // About the first node, as in enclosedVolume().
   const Lanes origin = load(nodes[0]);

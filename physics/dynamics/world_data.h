@@ -215,10 +215,11 @@ struct Springs {
 struct BodyRange {
   int firstSphere = 0, sphereCount = 0;
   int firstLink = 0, linkCount = 0;
-  std::vector<int> node;       // index in Nodes of every model node
-  double restVolume = 0;       // m3, enclosed by the rest nodes
-  double massDamping = 0;      // 1/s, Rayleigh's alpha
-  double settlingDamping = 0;  // 1/s, the same before time 0
+  std::vector<int> node;   // index in Nodes of every model node
+  double restVolume = 0;   // m3, enclosed by the rest nodes
+  double massDamping = 0;  // 1/s, Rayleigh's alpha
+  // 1/s, the same before time 0; at most half of the motion in a substep, as more would ask for shorter ones.
+  double settlingDamping = 0;
   double lowestFrequency = 0;  // rad/s, BodyMechanics
   int firstNodeGroup = 0;      // of its nodes, which lie together
   RigidSupport support;        // damped is motion against the rigid motions that it leaves
