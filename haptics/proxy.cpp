@@ -167,6 +167,7 @@ static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& tou
     }
   }
   proxy.device = device;
+  proxy.surfaceMotion.setZero();  // jaws that close look twice in a tick
 }
 
 static double sumOf(const std::array<double, 3>& pressure, int count) {
@@ -403,6 +404,7 @@ Vector3d Proxy::feltNormal() const {
 Proxy placeProxy(const Buckets& buckets, const Vector3d& device, double toolRadius) {
   Proxy proxy;
   proxy.toolRadius = toolRadius;
+  proxy.device = device;
   proxy.centre = outOfBodies(buckets, 1, kStandOff * toolRadius, device);
   proxy.radius = std::min(toolRadius, distanceToSurface(buckets.surface(), 1, proxy.centre));
   return proxy;

@@ -33,8 +33,9 @@ struct DynamicsFrame {
   std::vector<BodyFrame> bodies;
 };
 
-// Blending transition between the two last dynamics frames (paper 5); alpha in 0..1, 0 gives `from` exactly and 1 gives
-// `to` exactly. The servo blends the few points it touches, the picture whole frames: both through these.
+// Blending transition between the two last dynamics frames (paper 5); alpha in 0..1, 0 gives `from` and 1 gives `to`:
+// points exactly, orientations to rounding, of either sign of the quaternion. The servo blends the few points it
+// touches, the picture whole frames: both through these.
 inline Eigen::Vector3d blendPoint(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double alpha) {
   return (1 - alpha) * from + alpha * to;
 }

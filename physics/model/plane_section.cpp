@@ -21,6 +21,7 @@ constexpr int kScanLines = 64;  // second moments of a disc to 0.1 %
 struct Span {
   double low, high;
 };
+constexpr Span kNothing{1e30, -1e30};
 using Outline = std::vector<std::array<Vector2d, 2>>;
 
 // Where the triangles cut the plane. A vertex on the plane counts as above it: outlines stay closed.
@@ -51,7 +52,7 @@ Span cellSpan(const PowerSites& sites, int site, const Vector3d& start, const Ve
   const Vector3d& a = sites.centres[site];
   const double middle = (a - start).dot(along), reach = sites.reaches[site];
   const double chord = reach * reach - (start + middle * along - a).squaredNorm();
-  if (chord <= 0) return {0, 0};
+  if (chord <= 0) return kNothing;
   Span part{middle - std::sqrt(chord), middle + std::sqrt(chord)};
   for (std::size_t k = 0; k < sites.centres.size(); ++k) {
     if (static_cast<int>(k) == site) continue;
@@ -65,7 +66,7 @@ Span cellSpan(const PowerSites& sites, int site, const Vector3d& start, const Ve
     else if (slope < 0)
       part.low = std::max(part.low, -at / slope);
     else if (at > 0)
-      return {0, 0};
+      return kNothing;
   }
   return part;
 }
@@ -100,7 +101,7 @@ std::vector<double> crossingsOf(const Outline& outline, double b) {
 }
 
 Span heightsOf(const Outline& outline) {
-  Span out{1e30, -1e30};
+  Span out = kNothing;
   for (const std::array<Vector2d, 2>& e : outline) {
     out.low = std::min({out.low, e[0].y(), e[1].y()});
     out.high = std::max({out.high, e[0].y(), e[1].y()});
