@@ -92,8 +92,12 @@ static double pushFelt(const BlendedSurface& surface, double alpha, const Vector
   const double push = pushKeptToTissue(surface, alpha, normal, tissue, tool, tool.estimate);
   const WayAndChange ways = recentWays(tool.motion, alpha);
   const double off = normal.dot(motionError(ways, alpha, tool.motion.error));
-  if (push > 0) noteFelt(std::min(push, tool.settings.forceMax) * normal, ways, tool.motion.error);
-  return pushKeptToTissue(surface, alpha, normal, tissue, tool, std::max(0.0, push - off));
+  // Rounding leaves of tissue that swings away 1e-17 N, or none: a tool that rests there would seem to press, or not.
+  constexpr double kNothing = 1e-9;
+  const double least = kNothing * tool.largestPush;
+  if (push > least) noteFelt(std::min(push, tool.settings.forceMax) * normal, ways, tool.motion.error);
+  const double felt = pushKeptToTissue(surface, alpha, normal, tissue, tool, std::max(0.0, push - off));
+  return felt > least ? felt : 0;
 }
 
 // Likewise across it: a proxy on the late surface slips, or sticks, where the tissue itself does not.
