@@ -72,7 +72,7 @@ TEST(ContactBlow, WhatPassesByIsNotTurnedAside) {
 // Of sleepers no contact with what bears them is listed: before a blow they wake.
 TEST(ContactBlow, ASleeperThatIsStruckStandsOnWhatBearsIt) {
   for (const double height : {0.1, 0.3, 0.5}) {
-    double depth[2];
+    double depth[2] = {0, 0};
     for (const double sleepAfter : {0., 0.3}) {
       WorldSettings s = settings({0, -9.81, 0});
       s.sleepAfter = sleepAfter;
