@@ -60,7 +60,7 @@ TEST(ContactBlow, WhatIsStruckStopsAtWhatItIsPushedAgainst) {
   }
 }
 
-// At another's side, which a third misses, it is not held up.
+// Near enough to be listed, and half a millimetre apart when it passes.
 TEST(ContactBlow, WhatPassesByIsNotTurnedAside) {
   World world(settings(), {ball("near", kRadius, {0, 0, 0}), ball("passing", kRadius, {-0.1, 2.05 * kRadius, 0})});
   synthetic::throwBody(world, 1, {8, 0, 0});
