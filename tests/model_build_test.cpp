@@ -318,6 +318,17 @@ TEST(ModelBuild, RingStaysClosed) {
   EXPECT_GE(report.links, report.spheres);
 }
 
+// Straight links between neighbours leave so thin a ring, the last as the others: without it the ring was an open C,
+// ten times as soft.
+TEST(ModelBuild, ARingThatItsLinksLeaveIsClosed) {
+  BuildReport report;
+  BuildSettings settings;
+  settings.spheres = 9;
+  build(torusMesh(0.1, 0.008, 64, 12), settings, report);
+  EXPECT_EQ(report.links, 9);
+  EXPECT_EQ(report.degreeMax, 2);
+}
+
 TEST(ModelBuild, ThinPlatesWorkOrAreRefused) {
   const auto plate = [](double thickness) {
     TriangleMesh mesh = ellipsoidMesh(4, {1, 1, 1});

@@ -103,6 +103,20 @@ TEST(RenderSurface, OffsetReachesTheFineShape) {
   for (const Vector3d& p : draw(s, coarse.vertices).points) EXPECT_NEAR(p.norm(), 1, 2e-3);
 }
 
+// From a flat side, which is its own fine shape, rays would go on to the opposite one.
+TEST(RenderSurface, AFlatSideOfAPlateStaysThere) {
+  TriangleMesh plate = ellipsoidMesh(4, {1, 1, 1});
+  for (Vector3d& x : plate.vertices) x = (x / x.cwiseAbs().maxCoeff()).cwiseProduct(Vector3d(0.1, 0.005, 0.1));
+  const RenderSurface s = makeRenderSurface(plate, 1, &plate);
+  int seen = 0;
+  for (const Vector3d& p : draw(s, plate.vertices).points) {
+    if (std::abs(p.x()) > 0.06 || std::abs(p.z()) > 0.06) continue;
+    ++seen;
+    ASSERT_NEAR(std::abs(p.y()), 0.005, 1e-7);
+  }
+  EXPECT_GT(seen, 300);
+}
+
 TEST(RenderSurface, AFineShapeThatLiesElsewhereIsRefused) {
   const TriangleMesh coarse = ellipsoidMesh(2, {1, 1, 1});
   TriangleMesh fine = ellipsoidMesh(3, {9, 9, 9});

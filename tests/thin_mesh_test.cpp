@@ -1,11 +1,15 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
+#include <map>
 
+#include "physics/model/build.h"
 #include "physics/model/identify/slits.h"
 #include "physics/model/identify/thin_parts.h"
+#include "physics/model/mesh_repair.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 #include "tests/test_shapes.h"
@@ -118,6 +122,70 @@ TriangleMesh blocks(double gap) {
   for (const Vector3d& x : one.vertices) both.vertices.push_back(x + (0.01 + gap) * Vector3d::UnitY());
   for (const auto& [a, b, c] : one.triangles) both.triangles.push_back({a + first, b + first, c + first});
   return both;
+}
+
+std::vector<double> evenly(double from, double to, int parts) {
+  std::vector<double> out;
+  for (int k = 0; k <= parts; ++k) out.push_back(std::lerp(from, to, double(k) / parts));
+  return out;
+}
+
+// The surface of those cells of a grid that are solid.
+template <class Solid>
+TriangleMesh gridMesh(const std::array<std::vector<double>, 3>& cuts, const Solid& isSolid) {
+  TriangleMesh mesh;
+  std::map<std::array<int, 3>, int> numbers;
+  const auto solid = [&](const std::array<int, 3>& c) {
+    for (int a = 0; a < 3; ++a)
+      if (c[a] < 0 || c[a] + 1 >= int(cuts[a].size())) return false;
+    return isSolid(c);
+  };
+  const auto vertex = [&](const std::array<int, 3>& at) {
+    const auto [entry, fresh] = numbers.try_emplace(at, int(mesh.vertices.size()));
+    if (fresh) mesh.vertices.emplace_back(cuts[0][at[0]], cuts[1][at[1]], cuts[2][at[2]]);
+    return entry->second;
+  };
+  const auto addFace = [&](std::array<int, 3> corner, int axis, bool isHigh) {
+    corner[axis] += isHigh ? 1 : 0;
+    std::array<int, 4> face{};
+    for (int k = 0; k < 4; ++k) {
+      std::array<int, 3> at = corner;
+      at[(axis + 1) % 3] += k == 1 || k == 2 ? 1 : 0;
+      at[(axis + 2) % 3] += k >= 2 ? 1 : 0;
+      face[isHigh ? k : 3 - k] = vertex(at);
+    }
+    mesh.triangles.push_back({face[0], face[1], face[2]});
+    mesh.triangles.push_back({face[0], face[2], face[3]});
+  };
+  std::array<int, 3> c{};
+  for (c[0] = 0; c[0] + 1 < int(cuts[0].size()); ++c[0])
+    for (c[1] = 0; c[1] + 1 < int(cuts[1].size()); ++c[1])
+      for (c[2] = 0; c[2] + 1 < int(cuts[2].size()); ++c[2])
+        for (int axis = 0; axis < 3 && solid(c); ++axis)
+          for (const int way : {-1, 1}) {
+            std::array<int, 3> next = c;
+            next[axis] += way;
+            if (!solid(next)) addFace(c, axis, way > 0);
+          }
+  return mesh;
+}
+
+// A fin of 2.4 mm on a cube of 120 mm, two per cent of the whole, is thinner than voxels are, and stands on a column of
+// them or between two.
+TEST(ThinMesh, AFinKeepsItsSpheresWhereverItStands) {
+  for (const double x : {0.055, 0.058}) {
+    SCOPED_TRACE(x);
+    std::vector<double> across = evenly(0, x, 6);
+    for (const double cut : evenly(x + 0.0024, 0.12, 6)) across.push_back(cut);
+    const TriangleMesh mesh = gridMesh({across, evenly(0, 0.24, 24), evenly(0, 0.12, 12)},
+                                       [](const std::array<int, 3>& c) { return c[1] < 12 || c[0] == 6; });
+    BuildSettings settings;
+    settings.spheres = 20;
+    BuildReport report;
+    const SoftBodyModel model = buildModel(repairMesh(mesh), nullptr, settings, report);
+    EXPECT_EQ(model.spheres.size(), 20u);
+    EXPECT_LT(report.gapMax, 10);
+  }
 }
 
 TEST(ThinMesh, SlitsThinnerThanACellAreFoundAndCreasesAreNone) {

@@ -84,6 +84,13 @@ void warnOfCover(const BuildJob& job) {
        chosen ? "; do more of them (--spheres) fit it better?" : "");
 }
 
+void noteDropped(const BuildJob& job) {
+  const BuildSettings& asked = job.settings;
+  if (asked.method == BuildMethod::cover && asked.gap == 0 && job.report.spheres < asked.spheres)
+    tell("{}: note: {} spheres, not {}: the others would have no material of their own\n", job.meshPath,
+         job.report.spheres, asked.spheres);
+}
+
 // What no number of spheres makes good.
 void warnOfShape(const BuildJob& job) {
   constexpr double kManyLinks = 0.25;
@@ -326,6 +333,7 @@ int runBuild(const BuildOptions& options) {
   for (BuildJob& job : jobs) job.model.settings = repeatingCommand(job, options);
   const std::vector<Result> results = resultsOf(jobs);
   for (const BuildJob& job : jobs) writeModel(job.modelPath, job.model);
+  for (const BuildJob& job : jobs) noteDropped(job);
   for (const BuildJob& job : jobs) warnOfCover(job);
   for (const BuildJob& job : jobs) warnOfShape(job);
   for (const BuildJob& job : jobs) warnOfDrawnSurface(job);

@@ -55,11 +55,14 @@ void requireDrawable(std::size_t triangles, int levels) {
                                          triangles, levels, triangles << (2 * levels), kMost));
 }
 
+bool isEmpty(const MassProperties& cell) {
+  return cell.volume <= 0;
+}
+
 // Spheres without material of their own are dropped; links to them pass to the nearest other sphere.
 void dropEmptyCells(const VoxelBody& voxels, const MassProperties& exact, SpheresAndLinks& s) {
   for (;;) {
-    const auto empty =
-        std::find_if(s.cells.cells.begin(), s.cells.cells.end(), [](const MassProperties& c) { return c.volume <= 0; });
+    const auto empty = std::find_if(s.cells.cells.begin(), s.cells.cells.end(), isEmpty);
     if (empty == s.cells.cells.end()) return;
     if (s.balls.size() == 1) throw std::runtime_error("the mesh is too thin for a single sphere");
     const int gone = static_cast<int>(empty - s.cells.cells.begin());
@@ -82,6 +85,19 @@ void dropEmptyCells(const VoxelBody& voxels, const MassProperties& exact, Sphere
   }
 }
 
+// Columns are whole or empty along x and y, and a fin that stands between them has no voxel: where a cell stays empty
+// even voxels are asked, which are many times the work.
+void fillCells(const BodyShape& shape, SpheresAndLinks& s) {
+  const int target = voxelsFor(static_cast<int>(s.balls.size()));
+  const auto divide = [&](const VoxelBody& voxels) { s.cells = divideByPower(voxels, s.balls, shape.exact); };
+  const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, target);
+  divide(voxels);
+  if (std::none_of(s.cells.cells.begin(), s.cells.cells.end(), isEmpty)) return;
+  const VoxelBody even = voxeliseEvenly(shape.mesh, shape.exact.volume, target);
+  divide(even);
+  dropEmptyCells(even, shape.exact, s);
+}
+
 // The paper's raw result: skeleton nodes are spheres of inscribed radius, skeleton edges are links.
 SpheresAndLinks spheresOfSkeleton(const BodyShape& shape, const Skeleton& skeleton) {
   SpheresAndLinks s;
@@ -94,9 +110,7 @@ SpheresAndLinks spheresOfSkeleton(const BodyShape& shape, const Skeleton& skelet
                       node.x(), node.y(), node.z()));
   }
   for (const std::array<int, 2>& link : skeleton.links) s.links.push_back({link[0], link[1]});
-  const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, voxelsFor(static_cast<int>(s.balls.size())));
-  s.cells = divideByPower(voxels, s.balls, shape.exact);
-  dropEmptyCells(voxels, shape.exact, s);
+  fillCells(shape, s);
   std::vector<Vector3d> centres;
   for (const Ball& ball : s.balls) centres.push_back(ball.centre);
   joinComponents(centres, s.links);
@@ -107,9 +121,7 @@ SpheresAndLinks spheresOfSkeleton(const BodyShape& shape, const Skeleton& skelet
 SpheresAndLinks spheresByCover(const BodyShape& shape, std::vector<Ball> balls) {
   SpheresAndLinks s;
   s.balls = std::move(balls);
-  const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, voxelsFor(static_cast<int>(s.balls.size())));
-  s.cells = divideByPower(voxels, s.balls, shape.exact);
-  dropEmptyCells(voxels, shape.exact, s);
+  fillCells(shape, s);
   s.links = linkCells(shape.tree, s.cells, s.balls);
   return s;
 }

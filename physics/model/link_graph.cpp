@@ -10,7 +10,7 @@ namespace medulla {
 namespace {
 
 struct Candidate {
-  double score;
+  double contactRatio, score;
   std::array<int, 2> spheres;
 };
 
@@ -25,9 +25,8 @@ std::vector<Candidate> candidatesOf(const SurfaceTree& tree, const PowerCells& c
   for (const auto& [pair, area] : cells.contactArea) {
     const MassProperties &a = cells.cells[pair.first], &b = cells.cells[pair.second];
     const double side = std::cbrt(std::min(a.volume, b.volume));
-    double score = area / (side * side);
-    if (!staysInside(tree, a.centroid, b.centroid)) score *= 1e-3;
-    candidates.push_back({score, {pair.first, pair.second}});
+    const double ratio = area / (side * side), last = staysInside(tree, a.centroid, b.centroid) ? 1 : 1e-3;
+    candidates.push_back({ratio, last * ratio, {pair.first, pair.second}});
   }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
@@ -52,7 +51,7 @@ SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const st
   for (const Candidate& c : candidates)
     if (sets.join(c.spheres[0], c.spheres[1]))
       add(c.spheres);
-    else if (c.score > contactRatioMin)
+    else if (c.contactRatio > contactRatioMin)
       further.push_back(c);
   for (const Candidate& c : further)
     if (degree[c.spheres[0]] < degreeMax && degree[c.spheres[1]] < degreeMax) add(c.spheres);

@@ -113,8 +113,10 @@ void requireNoFarVertex(const TriangleMesh& input) {
   for (std::size_t v = 0; v < input.vertices.size(); ++v) {
     if (distances[v] <= kFarFromMiddle * usual || shortest[v] <= kFarFromNeighbours * medianEdge) continue;
     const char* unused = std::isinf(shortest[v]) ? "; no triangle uses it" : "";
-    throw std::runtime_error(fmt::format("vertex {} at {} lies {:.3g} times further out than the rest of the mesh{}", v,
-                                         place(input.vertices[v]), distances[v] / usual, unused));
+    throw std::runtime_error(
+        fmt::format("vertex {} at {} lies {:.3g} times further out than the rest of the mesh{}; expected "
+                    "{} times at most, or vertices between",
+                    v, place(input.vertices[v]), distances[v] / usual, unused, kFarFromMiddle));
   }
 }
 
