@@ -296,6 +296,8 @@ TEST_F(Outputs, OfARunThatOneFileHasNoRoomForNoneAppears) {
   ProgramOptions full;
   full.fileSizeLimit = record - 1;
   expectRefused(run(words, full), "b.csv: cannot be written: File too large");
+  expectRefused(render({"--size", "16x16", "--frames", "0:1", "-o", "a.gif", "--record", "b.csv"}, full),
+                "b.csv: cannot be written: File too large");
   full.fileSizeLimit = surface - 1;
   expectRefused(run({words.begin(), words.end() - 2}, full), "a.obj: cannot be written: File too large");
   EXPECT_TRUE(contents().empty()) << contents()[0];

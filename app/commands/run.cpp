@@ -99,6 +99,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
     recorders.afterFrame(simulation, last);
     afterFrame();
   }
+  recorders.finish(simulation);
   if (finish) finish();
   recorders.commit(simulation);
   printNotes(loaded, simulation.totals(), simulation.world());

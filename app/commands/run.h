@@ -86,11 +86,12 @@ std::map<std::string, std::string> filesOfTools(const std::string& option, const
 
 LoadedScene loadRun(const RunOptions& options);
 
-// Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` after the last, before
-// records, log and surfaces appear under their names: what fails there leaves those as they were. Until rest: as
-// RestWatch finds it; surfaces asked for at a later time are those at rest. Returns
-// results of their own: how the force of tools whose trajectory has a measured one compares with that. Throws
-// NotAtRest, and Interrupted after a signal. `advance` makes the next dynamics frame; empty: in logical time.
+// Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` when records, log and
+// surfaces are written and before they appear under their names: what fails there leaves those as they were, and a disk
+// that is full keeps `finish` from being called. Until rest: as RestWatch finds it; surfaces asked for at a later time
+// are those at rest. Returns results of their own: how the force of tools whose trajectory has a measured one compares
+// with that. Throws NotAtRest, and Interrupted after a signal. `advance` makes the next dynamics frame; empty: in
+// logical time.
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
                              const std::function<void()>& afterFrame, const std::function<void()>& finish = {},
                              const std::function<void()>& advance = {});

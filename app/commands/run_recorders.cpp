@@ -211,12 +211,15 @@ void RunRecorders::afterFrame(const Simulation& simulation, bool last) {
   data_->cache.afterFrame(simulation);
 }
 
-void RunRecorders::commit(const Simulation& simulation) {
+void RunRecorders::finish(const Simulation& simulation) {
   data_->log.finish();
   data_->cache.finish(simulation);
   data_->motions.finish();
   data_->frameTimes.finish();
   data_->surfaces.finish(simulation);
+}
+
+void RunRecorders::commit(const Simulation& simulation) {
   data_->log.commit();
   data_->cache.commit();
   data_->motions.commit();

@@ -14,6 +14,7 @@ class RunRecorders {
   RunRecorders(const LoadedScene& loaded, const RunOptions& options);
   ~RunRecorders();
   void afterFrame(const Simulation& simulation, bool last);
+  void finish(const Simulation& simulation);  // the last bytes; then commit(): each file under its name
   void commit(const Simulation& simulation);
   // How the force of tools whose trajectory has a measured one compares with that.
   std::vector<Result> forceResults() const;
