@@ -267,8 +267,11 @@ void setEnough(const WorldData& d, ImplicitData& s, double share) {
   s.enough.resize(s.left.size());
   for (std::size_t b = 0; b < s.left.size(); ++b) {
     const double weight = s.duration * vectorOf(d.gravity).norm() * std::sqrt(s.bodyMass[b]);
+    // Of what is free to move: to hold a body at rest takes what rounding leaves of its links' torques, and a
+    // thousandth of that no iteration comes to.
     const double acting = weight + std::sqrt(impulseEnergy(d, d.ranges[b], [&](int quad) {
-                            return Vector3d(vectorOf(s.residual[quad]) - vectorOf(s.balance[quad]));
+                            const Vector3d free = vectorOf(s.freedom[quad]).cwiseProduct(vectorOf(s.balance[quad]));
+                            return Vector3d(vectorOf(s.residual[quad]) - free);
                           }));
     double size = std::sqrt(s.left[b]), least = leastResidual(s) * std::sqrt(s.bodyMass[b]);
     if (acting > 0) least = std::min(least, kShareOfActing * acting);
