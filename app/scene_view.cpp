@@ -69,6 +69,7 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   const double closed = std::min(input.grip / kGripCloses, 1.0);
   instrument.jawAngle = float(kOpenJaw + (kHoldingJaw - kOpenJaw) * closed + (kClosedJaw - kHoldingJaw) * firm);
   instrument.hold = float(state.grasp * firm * firm * (3 - 2 * firm));
+  instrument.grasp = float(state.grasp);
   // A dent as deep as Hertz's contact has it for a tip of 3 mm in tissue of some 10 kPa, up to what stays a dent.
   constexpr double kDeepest = 4e-3, kSoft = 0.15;  // m, at scale 1; N
   // What a grip holds does not give way.
@@ -76,7 +77,7 @@ void addTool(const SceneTool& tool, const ToolSample& input, const ToolState& st
   const double deep = kDeepest * instrument.scale * (1 - std::exp(-force / kSoft)) * (1 - state.grasp);
   if (force > 0) instrument.press = toGlm(-deep / force * state.steadyForce);
   constexpr double kShown = 1e-6;  // m
-  instrument.touching = deep > kShown || instrument.hold > 1e-3f;
+  instrument.touching = deep > kShown || state.grasp > 1e-3;
   // The picture shows the proxy: an instrument never enters the tissue, its device may. What holds is drawn where the
   // hand is: its proxy hangs on the tissue, and the instrument would jump when it lets go. The proxy is a sphere, the
   // jaws reach to its far side along the shaft.
@@ -166,6 +167,8 @@ void SceneView::compose(const PictureState& state, ViewKind view, const Shown& s
   const Scene& scene = loaded_->scene;
   picture.view = view;
   picture.camera = cameraAt(scene.camera, state.time);
+  const float height =
+      heightAtTarget(picture.camera);  // not as a tall picture widens it: lines would be as much thicker
   if (widening_ > 1)
     picture.camera.fovDegrees =
         glm::degrees(2 * std::atan(widening_ * std::tan(0.5f * glm::radians(picture.camera.fovDegrees))));
@@ -180,8 +183,7 @@ void SceneView::compose(const PictureState& state, ViewKind view, const Shown& s
     const BodyFrame& frame = state.frame.bodies[b];
     drawnPositions(scene.bodies[b], smoothings_[b], frame.nodes, picture.surfaces[b].positions);
     ballsOf(*scene.bodies[b].model, frame, picture.surfaces[b].balls);
-    if (view != ViewKind::tissue)
-      drawBodyModel(scene.bodies[b], frame, shown, heightAtTarget(picture.camera), picture.model);
+    if (view != ViewKind::tissue) drawBodyModel(scene.bodies[b], frame, shown, height, picture.model);
   }
   for (std::size_t k = 0; k < scene.tools.size(); ++k) {
     addTool(scene.tools[k], state.inputs[k], state.tools[k], picture);

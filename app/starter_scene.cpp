@@ -229,12 +229,12 @@ std::string trajectoryText(const Layout& l) {
   const Vector3d far = l.touch + 0.4 * l.size * l.normal;
   out += "# approach\n";
   key(0, far, straight, 0);
-  key(1, above(0.06), straight, 0.3);
-  out += "# press and hold\n";
-  key(1.8, above(-0.05), straight, 0.3);
-  key(2.4, above(-0.05), straight, 0.3);
+  key(1, above(0.06), straight, 1);
+  out += "# press and hold; jaws that closed in the air hold nothing\n";
+  key(1.8, above(-0.05), straight, 1);
+  key(2.4, above(-0.05), straight, 1);
   out += "# back, open, touch, grab\n";
-  key(3.1, above(0.05), straight, 0);
+  key(3.1, above(0.05), straight, 1);
   key(3.8, above(0), straight, 0);
   key(4.2, above(-0.08), straight, 1);  // on its way in as it closes: a body that swings freely is touched then
   out += "# pull\n";

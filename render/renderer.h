@@ -75,6 +75,7 @@ struct Instrument {
   bool touching = false;                // tissue blanches around the tip
   glm::vec3 press{0};                   // m: what it gives way by under the tip, which is drawn so much deeper
   float hold = 0;                       // 0..1: by how much it rises between the jaws instead
+  float grasp = 0;                      // 0..1: how far the tool holds, open or not: what it holds loses its blood
 };
 
 struct DrawnBall {  // not Ball: the model has one of its own

@@ -75,7 +75,8 @@ Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
 // A smooth surface stays behind the held nodes that it hangs on, up to kReach; the jaws bite kBite of it, and between
 // them stands a fold, as thick as they are apart there and wider than they are: so far beyond the tip of a tool that
 // stands upright. Jaws that lie along the surface have it stand up beside them, as far as they close across it, not
-// from above and below.
+// from above and below. It loses its blood with the grasp, not as it rises: jaws that open let it down before the tool
+// lets go, and it blinked red between the one and the dent that is left.
 static void riseBetweenJaws(const Instrument& instrument, float blanched, SceneMesh& mesh) {
   constexpr float kWidth = 0.0055f, kReach = 0.014f, kBite = 0.0035f;  // m, at scale 1, as all here
   constexpr float kFold = 0.0090f, kRidge = 0.0062f, kFoldThickness = 0.0013f, kFoldWidth = 0.0040f;
@@ -84,7 +85,7 @@ static void riseBetweenJaws(const Instrument& instrument, float blanched, SceneM
   if (!held.part) return;
   const glm::vec3 offset = instrument.tip + kBite * axis - held.position;
   const float around = std::max(instrument.scale * kWidth, 1.3f * glm::length(offset));
-  displace(*held.part, {held.position, instrument.hold * offset, glm::mat3(1 / around), blanched, instrument.hold},
+  displace(*held.part, {held.position, instrument.hold * offset, glm::mat3(1 / around), blanched, instrument.grasp},
            mesh);
   const float thickness = std::max(kFoldThickness, 0.8f * held.spacing / instrument.scale);  // else facets stand out
   const float wide = std::max(kFoldWidth, thickness);
@@ -110,7 +111,7 @@ void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
   if (pressed > 0)
     for (const MeshPart& part : mesh.parts)
       if (!part.instrument) displace(part, dent, mesh);
-  if (instrument.hold > 0) riseBetweenJaws(instrument, blanched, mesh);
+  if (instrument.grasp > 0) riseBetweenJaws(instrument, blanched, mesh);
 }
 
 void shadeAround(const Instrument& instrument, SceneMesh& mesh) {
