@@ -63,7 +63,7 @@ StripChart ForceView::chart(const PictureState& state) {
 }
 
 void ForceView::addArrows(const PictureState& state, Picture& picture) const {
-  const float height = heightAtTarget(picture.camera);
+  const float height = heightAtTarget(cameraAt(loaded_->scene.camera, state.time));  // not as a tall picture widens it
   for (std::size_t k = 0; k < sizes_.size(); ++k) {
     const Eigen::Vector3d& force = state.tools[k].force;
     if (force.norm() <= 0.005 * range_) continue;

@@ -127,10 +127,12 @@ void drawMesh(const SoftBodyModel& model, const BodyFrame& frame, float height, 
 
 void drawSpheres(const SceneBody& body, const BodyFrame& frame, Drawing& out) {
   const SoftBodyModel& model = *body.model;
-  // Bodies that lie together are told apart by a share of what they look like.
-  constexpr float kOwn = 0.5f;
+  // Bodies that lie together are told apart by the hue of what they look like, for the most part: mixed half and half,
+  // or as dark as wet tissue is, it would seem the grey of what is held.
+  constexpr float kOwn = 0.7f;
   const Look& look = findLook(body.look);
-  const glm::vec4 own(0.5f * (look.albedoLow + look.albedoHigh), kSphereColour.a);
+  const glm::vec3 looks = look.albedoLow + look.albedoHigh;
+  const glm::vec4 own(kSphereColour.r / std::max({looks.r, looks.g, looks.b, 1e-3f}) * looks, kSphereColour.a);
   const glm::vec4 colour = glm::mix(kSphereColour, own, kOwn);
   for (std::size_t i = 0; i < model.spheres.size(); ++i) {
     const FillingSphere& sphere = model.spheres[i];

@@ -121,7 +121,7 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
 // Polished metal and the sheath's lacquer mirror the cavity: dim red below, pale tissue above, black where the port and
 // the gaps between organs are, and the lamp's wide reflector, seen beside the lens. What is mirrored lies in the lamp's
 // cone even where the shaft itself leaves it. In haze it mirrors that, and half as much of dark things in it; beside
-// the model the grey of a studio.
+// the model the grey of a studio, before whose light ground jaws that shine white are lost.
 void lightMetal(const Shading& v, vec3 tangent, const Surroundings& s, LitVertex& out) {
   const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
   // The outline's vertices look away by up to an edge; as they are, they would mirror what is behind them, black.
@@ -145,7 +145,7 @@ void lightMetal(const Shading& v, vec3 tangent, const Surroundings& s, LitVertex
   out.direct = v.albedo * (std::max(glm::dot(v.normal, v.toLight), 0.f) * v.falloff * 0.10f * visible);
   const vec3 mirror = v.albedo * 1.15f + 0.022f + 0.10f * edge;
   const vec3 shine = mirror * vec3(0.60f, 0.58f, 0.55f) * lamp + (0.60f * v.albedo + 0.20f) * streak;
-  out.ambient = (mirror * around + s.lamp * shine * lit) * (v.openness * visible);
+  out.ambient = (mirror * around + (s.studio ? 0.5f : 1.f) * s.lamp * shine * lit) * (v.openness * visible);
 }
 
 // Can the highlight be seen anywhere within the slopes of the relief? (Most pixels of tissue cannot: they go to a
