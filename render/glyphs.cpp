@@ -105,12 +105,14 @@ constexpr Glyph kGlyphs[] = {
     {U'|', 2, "0007"},
     {U'}', 4, "00111223141506"},
     {U'~', 6, "04133443"},
+    {U'«', 5, "221426 423446"},
     {U'°', 3, "1021120110"},
     {U'±', 6, "0343 2125 0646"},
     {U'²', 3, "001020110222"},
     {U'³', 3, "002011222103"},
     {U'µ', 5, "0208 05162635 3236"},
     {U'·', 2, "0303"},
+    {U'»', 5, "122416 324436"},
     {U'Æ', 8, "063060 303666 3353 1434"},
     {U'×', 6, "1236 3216"},
     {U'Þ', 6, "0006 013142433404"},
@@ -124,6 +126,7 @@ constexpr Glyph kGlyphs[] = {
     {U'ı', 2, "0206"},
     {U'Ľ', 6, "000646 3031"},
     {U'ľ', 4, "0006 2021"},
+    {U'ł', 3, "1016 0422"},
     {U'Ŋ', 6, "0006 01103041473827"},
     {U'ŋ', 5, "0206 03122233372818"},
     {U'Œ', 10, "20414526050120 80404686 4373"},
@@ -132,6 +135,7 @@ constexpr Glyph kGlyphs[] = {
     {U'Ŧ', 6, "0040 2026 1333"},
     {U'ŧ', 4, "101526 0222 0424"},
     {U'ȷ', 3, "121708"},
+    {U'ẞ', 6, "0601103041233344453616"},
     {U'–', 5, "0434"},
     {U'—', 7, "0454"},
     {U'‘', 2, "0100"},
@@ -140,6 +144,7 @@ constexpr Glyph kGlyphs[] = {
     {U'”', 4, "0001 2021"},
     {U'„', 4, "0607 2627"},
     {U'…', 6, "0606 2626 4646"},
+    {U'€', 6, "5140201115264655 0333 0434"},
 };
 constexpr Glyph kBox{U'\0', 6, "0040460600"};
 
@@ -168,9 +173,9 @@ constexpr Mark kMarks[] = {
     {"4022", true, U"ģg"},
     {"362738", false, U"ĄAĘEĮIŲUąaęeįiųu"},
     {"0632", false, U"ØOøo"},
-    {"0412", false, U"ŁLłl"},
+    {"0412", false, U"ŁL"},
     {"0323", false, U"ĐDÐDðd"},
-    {"1131", false, U"đd"},
+    {"2141", false, U"đd"},
 };
 
 const Glyph* findGlyph(char32_t character) {
@@ -219,10 +224,12 @@ std::vector<Letter> lettersOf(std::string_view text) {
   return out;
 }
 
-bool isDrawable(std::string_view text) {
-  while (!text.empty())
-    if (!findLetter(nextCharacter(text))) return false;
-  return true;
+std::string_view firstUndrawn(std::string_view text) {
+  while (!text.empty()) {
+    const std::string_view from = text;
+    if (!findLetter(nextCharacter(text))) return from.substr(0, from.size() - text.size());
+  }
+  return {};
 }
 
 }  // namespace medulla

@@ -24,6 +24,6 @@ struct Letter {
 
 // Of UTF-8, in order; what nobody draws is an empty box.
 std::vector<Letter> lettersOf(std::string_view text);
-bool isDrawable(std::string_view text);  // without a box
+std::string_view firstUndrawn(std::string_view text);  // the first such character; empty: there is none
 
 }  // namespace medulla

@@ -24,6 +24,9 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(s.dynamics.ambientDrag, 0.3);
   EXPECT_EQ(s.dynamics.substeps, 16);
   EXPECT_EQ(s.dynamics.contact, ContactMode::swept);
+  EXPECT_EQ(s.dynamics.integrator, Integrator::implicit);
+  EXPECT_EQ(s.dynamics.order, 2);
+  EXPECT_EQ(s.dynamics.sleepAfter, 0.5);
   ASSERT_EQ(s.bodies.size(), 2u);
   const SceneBody& body = s.bodies[0];
   EXPECT_EQ(body.line, 9);
@@ -38,6 +41,8 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(body.neighbours, std::vector<int>{1});
   EXPECT_EQ(s.bodies[1].neighbours, std::nullopt);
   EXPECT_EQ(body.surface, SurfaceMode::skin);
+  EXPECT_EQ(body.links, LinkModel::springs);
+  EXPECT_EQ(body.referencePath, folder + "/fem.txt");
   EXPECT_EQ(body.steered, (std::vector<SteeredLinks>{{{2, 3, 0.5}}}));
   EXPECT_EQ(body.worldFromModel.translation(), Eigen::Vector3d(0.1, 0.2, 0.3));
   // A quarter turn about y, given with three digits: a rotation to the last bit nevertheless.
@@ -280,9 +285,9 @@ TEST_F(SceneFile, WrongValuesOfTimesDynamicsAndBodiesNameTheLineAndWhatWasExpect
       {"ambient_drag=\"0.3\"", "ambient_drag=\"-1\"",
        R"(x.xml:5: <dynamics> ambient_drag="-1": expected 1 number >= 0)"},
       {"sleep_after=\"0.5\"", "sleep_after=\"-1\"", R"(x.xml:5: <dynamics> sleep_after="-1": expected 1 number >= 0)"},
-      {"\"explicit\"", "\"mixed\"", R"(x.xml:5: <dynamics> integrator="mixed": expected one of explicit, implicit)"},
-      {"order=\"1\"", "order=\"3\"", R"(x.xml:5: <dynamics> order="3": expected one of 1, 2)"},
-      {"order=\"1\"", "order=\"2\"",
+      {"\"implicit\"", "\"mixed\"", R"(x.xml:5: <dynamics> integrator="mixed": expected one of explicit, implicit)"},
+      {"order=\"2\"", "order=\"3\"", R"(x.xml:5: <dynamics> order="3": expected one of 1, 2)"},
+      {"\"implicit\"", "\"explicit\"",
        R"(x.xml:5: <dynamics> order="2": expected 1 with integrator="explicit": order 2 needs integrator="implicit")"},
       {"substeps=\"16\"", "substeps=\"1.5\"",
        R"(x.xml:5: <dynamics> substeps="1.5": expected 1 integer >= 0 and <= 1e+05)"},
@@ -386,7 +391,7 @@ TEST_F(SceneFile, WrongValuesOfThePictureLikewise) {
       {"640 480", "641 480", R"(x.xml:25: <output> size="641 480": expected even width and height (video needs them))"},
       {"640 480", "640 8", R"(x.xml:25: <output> size="640 8": expected 2 integers >= 16 and <= 8192)"},
       {"let go", "放す",
-       R"(x.xml:25: <caption> text="放す": expected Latin letters, digits and signs: others cannot be drawn)"},
+       R"(x.xml:25: <caption> text="放す": expected Latin letters, digits and signs, not "放")"},
       {"0.5 3 7", "0.5 13", R"(x.xml:25: <output> golden="0.5 13": a time beyond the scene's duration)"},
       {"0.5 3 7", "3 0.5", R"(x.xml:25: <output> golden="3 0.5": expected increasing times)"},
   });

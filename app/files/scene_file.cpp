@@ -373,8 +373,8 @@ void readCaptions(const XmlElement& output, Scene& scene) {
     SceneCaption caption{readNumber(*e, "from", 0, kNotNegative), readNumber(*e, "to", 0, kNotNegative),
                          readText(*e, "text")};
     if (caption.text.empty()) refuse(*e, "text", "expected words");
-    if (!isDrawable(caption.text))
-      refuse(*e, "text", "expected Latin letters, digits and signs: others cannot be drawn");
+    if (const std::string_view undrawn = firstUndrawn(caption.text); !undrawn.empty())
+      refuse(*e, "text", fmt::format("expected Latin letters, digits and signs, not \"{}\"", undrawn));
     if (caption.to <= caption.from) refuse(*e, "to", "expected a later time than from");
     if (!scene.captions.empty() && caption.from < scene.captions.back().to)
       refuse(*e, "from", "expected no earlier time than the end of the caption before it");
