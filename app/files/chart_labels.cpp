@@ -34,7 +34,9 @@ void ChartLabels::addLine(Place from, Place to) {
 std::optional<ChartLabels::Place> ChartLabels::place(Place mark, std::size_t characters) {
   const double halfWidth = 0.5 * kCharacter * static_cast<double>(characters), halfHeight = 0.5 * kTextHeight;
   const double up = kHalfMark + halfHeight, aside = kHalfMark + halfWidth;
-  for (const Place& way : std::array<Place, 4>{{{0, up}, {0, -up}, {aside, 0}, {-aside, 0}}}) {
+  const std::array<Place, 8> ways{
+      {{0, up}, {0, -up}, {aside, 0}, {-aside, 0}, {aside, up}, {-aside, up}, {aside, -up}, {-aside, -up}}};
+  for (const Place& way : ways) {
     const Place centre{mark.x + way.x, mark.y + way.y};
     const Box box{{centre.x - halfWidth, centre.y - halfHeight}, {centre.x + halfWidth, centre.y + halfHeight}};
     if (!isFree(box)) continue;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "app/files/chart_labels.h"
@@ -21,13 +22,13 @@ constexpr double kRowHeight = 17, kFirstRow = 12;  // of the rim
 struct Curve {
   std::string name;
   std::string colour;
-  int symbol = 0;        // gnuplot's
+  int symbol = 0;        // gnuplot's; open for implicit steps, where they often lie on those of explicit ones
   bool isOther = false;  // of the reference's own program
   int row = -1;          // on the rim; -1: nothing of it failed
 };
 
 std::vector<Curve> curvesOf(const std::vector<ChartPoint>& points) {
-  constexpr int kFilled[] = {5, 7, 9, 11, 13}, kPentagon = 15;
+  constexpr int kFilled[] = {5, 7, 9, 11, 13}, kPentagon = 15;  // the open one of each comes before it
   std::vector<Curve> out;
   std::size_t own = 0;
   int rows = 0;
@@ -36,8 +37,9 @@ std::vector<Curve> curvesOf(const std::vector<ChartPoint>& points) {
     if (curve == out.end()) {
       const bool other = p.nodes > 0;
       const std::size_t style = p.style >= 0 ? static_cast<std::size_t>(p.style) : own;
+      const int open = p.curve.find("implicit") != std::string::npos ? 1 : 0;
       out.push_back({p.curve, other ? kBlack : kCurveColours[style % std::size(kCurveColours)],
-                     other ? kPentagon : kFilled[style % std::size(kFilled)], other});
+                     other ? kPentagon : kFilled[style % std::size(kFilled)] - open, other});
       own += other ? 0 : 1;
       curve = out.end() - 1;
     }
@@ -125,6 +127,8 @@ std::string axes(const std::string& title, const Frame& f, ChartCost cost) {
 // `points`: by step, as curves join them.
 std::string labels(const std::vector<ChartPoint>& points, const std::vector<Curve>& curves, const Frame& frame) {
   ChartLabels places;
+  const std::array<ChartLabels::Place, 4> corners{{{kLeft, kBottom}, {kRight, kBottom}, {kRight, kTop}, {kLeft, kTop}}};
+  for (std::size_t k = 0; k < 4; ++k) places.addLine(corners[k], corners[(k + 1) % 4]);
   struct Marked {
     const ChartPoint* point;
     const Curve* curve;

@@ -146,6 +146,10 @@ std::vector<Panel> panelsOf(const LogTable& log, const Series& time) {
   energy.logarithmic = true;
   energy.curves.push_back(line("elastic", 0, 1.8, scaled(column(log, "energy.elastic"), 1e3)));
   energy.curves.push_back(line("kinetic", 1, 1.8, scaled(column(log, "energy.kinetic"), 1e3)));
+  const auto isZero = [](const Curve& c) {
+    return std::all_of(c.values.begin(), c.values.end(), [](double v) { return v == 0; });
+  };
+  if (std::all_of(nodes.curves.begin(), nodes.curves.end(), isZero)) nodes.curves.clear();  // skins alone
   for (Panel* panel : {&volume, &energy, &nodes}) {
     if (panel->curves.empty()) continue;
     shadeLikeAll(log, time, tools, *panel);
@@ -183,7 +187,7 @@ std::string quotedName(const std::string& name) {
 std::string block(const std::string& name, const Series& time, const Series& values) {
   constexpr std::size_t kBins = 1000;
   std::string rows;
-  const auto add = [&](std::size_t k) { rows += fmt::format("{:.10g} {:.5g}\n", time[k], values[k]); };
+  const auto add = [&](std::size_t k) { rows += fmt::format("{:.10g} {:.7g}\n", time[k], values[k]); };
   const std::size_t width = time.size() > 2 * kBins ? (time.size() + kBins - 1) / kBins : 1;
   for (std::size_t k = 0; k < time.size(); k += width) {
     const auto first = values.begin() + static_cast<std::ptrdiff_t>(k),
@@ -274,13 +278,15 @@ std::string plotScript(const LogTable& log, const LogTable* frameTimes, const st
       "set xrange [{:.10g}:{:.10g}]\nset lmargin at screen 0.065\nset rmargin at screen 0.85\n"
       "set multiplot\nset label 1 {} noenhanced at screen 0.065, screen {:.5f} left font ',16'\n",
       kGrey, format == PlotFormat::svg ? 0.95 : 1.2, begin, end, quotedName(title), 1 - 0.36 * kHead / height);
+  const auto hasShades = [](const Panel& panel) { return !panel.contact.empty() || !panel.held.empty(); };
+  const auto explaining = std::find_if(panels.begin(), panels.end(), hasShades) - panels.begin();
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const double top = kHead + static_cast<double>(p) * (kPanel + kGap), bottom = top + kPanel;
     if (p + 1 == panels.size()) out += "set format x '%g'\nset xlabel 'time, s' offset 0,0.4\n";
     if (p == 0) out += "set format x ''\n";
     out += fmt::format("set tmargin at screen {:.5f}\nset bmargin at screen {:.5f}\n", 1 - top / height,
                        1 - bottom / height);
-    out += drawingOf(panels[p], p, p == 0 && !panels[p].contact.empty());
+    out += drawingOf(panels[p], p, static_cast<std::ptrdiff_t>(p) == explaining);
     if (p == 0) out += "unset label 1\n";
   }
   return out + "unset multiplot\n";

@@ -54,11 +54,11 @@ std::string keyLabels() {
   std::string out;
   double x = 0.2;
   for (const Grade& g : kGrades) {
-    out += fmt::format("set label '{}' at screen {:.2f}, 0.012 left point {} lc '{}' ps 1.1 offset 1,0\n", g.meaning, x,
-                       g.points, g.colour);
+    out += fmt::format("set label '{}' at screen {:.2f}, 0.012 left point {} lc '{}' ps 1.1 offset 1,-0.35\n",
+                       g.meaning, x, g.points, g.colour);
     x += 0.22;
   }
-  return out + "set label 'dashed: explicit limit' at screen 0.72, 0.012 left\n";
+  return out + "set label 'dashed: explicit limit' at screen 0.72, 0.012 left offset 1,-0.35\n";
 }
 
 }  // namespace
@@ -98,6 +98,8 @@ std::string stabilityScript(const std::string& title, const std::vector<Stabilit
       low = std::min(low, p.step);
       high = std::max(high, p.step);
     }
+  const auto [softest, stiffest] = std::minmax_element(
+      map.begin(), map.end(), [](const StabilityPoint& a, const StabilityPoint& b) { return a.young < b.young; });
   out += fmt::format("set xrange [{:.6g}:{:.6g}]\nset multiplot title '{}'\n", 500 * low, 2000 * high, title);
   const double width = 0.84 / static_cast<double>(methods.size());
   for (std::size_t m = 0; m < methods.size(); ++m) {
@@ -106,8 +108,8 @@ std::string stabilityScript(const std::string& title, const std::vector<Stabilit
         m == 0 ? "set ylabel \"Young's modulus, Pa\"\nset format y '1e%T'\n" : "unset ylabel\nset format y ''\n";
     out += fmt::format(
         "set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen 0.92\nset bmargin at screen "
-        "0.57\nset logscale y\nset autoscale y\nset ytics auto\nset title '{}'\n{}",
-        left, left + 0.9 * width, spaced(methods[m]), y);
+        "0.57\nset logscale y\nset yrange [{:.6g}:{:.6g}]\nset ytics auto\nset title '{}'\n{}",
+        left, left + 0.9 * width, 0.4 * softest->young, 2.5 * stiffest->young, spaced(methods[m]), y);
     out += fmt::format("plot $limit using 1:2 with lines lw 2 dt 2 lc '{}' notitle, \\\n  {}\n", kGrey,
                        plotOf(fmt::format("map{}_", m), 1.1));
   }
