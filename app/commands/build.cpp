@@ -100,19 +100,21 @@ void warnOfShape(const BuildJob& job) {
         "results may be off by a third, mostly too soft\n",
         job.meshPath, 1e3 * coarse->edge, 1e3 * coarse->thickness, 500 * coarse->thickness);
   if (!job.model.identified && job.report.hollowLinks > kManyLinks * job.report.links)
-    tell("{}: note: {} of {} links lie in a hollow or beside the body: beams may be far too soft; use --identify\n",
-         job.meshPath, job.report.hollowLinks, job.report.links);
+    tell(
+        "{}: note: {} of {} links lie in a hollow or beside the body: beams may be far too soft; use medulla build "
+        "--identify\n",
+        job.meshPath, job.report.hollowLinks, job.report.links);
   constexpr double kFewNodes = 0.01;
   if (!job.model.identified && job.report.attachmentsCrossing > kFewNodes * double(job.model.restNodes.size()))
     tell(
         "{}: note: {} of {} surface nodes hang on what lies outside of their part of the body, and a fin or limb may "
-        "be torn where it bends: more spheres (--spheres) reach into it, or use --identify\n",
+        "be torn where it bends: more spheres (--spheres) reach into it, or use medulla build --identify\n",
         job.meshPath, job.report.attachmentsCrossing, job.model.restNodes.size());
   constexpr double kMostLinks = 0.5;
   if (!job.model.identified && job.report.sheetLinks > kMostLinks * job.report.links)
     tell(
         "{}: note: {} of {} links lie in a sheet: beams resist its bending by a third to a half too much; use "
-        "--identify\n",
+        "medulla build --identify\n",
         job.meshPath, job.report.sheetLinks, job.report.links);
 }
 

@@ -66,13 +66,10 @@ std::runtime_error withoutMoments(const std::string& path) {
 
 std::vector<Moment> momentsOf(const Scene& scene) {
   std::vector<Moment> moments;
-  for (const double time : scene.goldenTimes) {
+  for (const int picture : goldenPictures(scene)) {
     Moment moment;
-    moment.frame = std::min(static_cast<int>(std::lround(time * scene.fps)), pictureCount(scene) - 1);
-    moment.name = fmt::format("{}_{}", stemOf(scene.path), moment.frame);
-    if (!moments.empty() && moments.back().frame == moment.frame)
-      throw std::runtime_error(
-          fmt::format("{}: two golden moments are picture {} at {:.6g} Hz", scene.path, moment.frame, scene.fps));
+    moment.frame = picture;
+    moment.name = fmt::format("{}_{}", stemOf(scene.path), picture);
     moments.push_back(std::move(moment));
   }
   return moments;

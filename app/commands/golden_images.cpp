@@ -61,6 +61,9 @@ std::vector<std::string> scenesNamedIn(const std::string& folder) {
   std::set<std::string> known;
   for (const StrayImage& image : strayImages(folder, {}))
     if (!image.scene.empty()) known.insert(image.scene);
+  std::error_code failure;
+  const fs::directory_iterator readable(folder, failure);
+  if (failure) throw std::runtime_error(fmt::format("{}: {}", folder, failure.message()));
   if (known.empty())
     throw std::runtime_error(
         folder + ": no golden image here names its scene: expected a SCENE, or --update SCENE to make them");

@@ -154,18 +154,20 @@ void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wa
   const double cpuStart = processCpuSeconds();
   const double start = wallSeconds();
   times.start("simulate");
-  const auto afterFrame = [&] {
+  RunHooks hooks;
+  hooks.afterFrame = [&] {
     if (options.view.shown.force) forceView.afterFrame(simulation);
     pictures.afterFrame(simulation, [&](int number, const PictureState& state) {
       artist.draw(number, state, options.view.shown.force ? &forceView : nullptr, times);
     });
     times.start("simulate");
   };
-  const std::vector<Result> forces = runToEnd(loaded, options.run, simulation, afterFrame, [&] {
+  hooks.finish = [&] {
     times.start("wait");
     artist.finish();
     times.stop();
-  });
+  };
+  const std::vector<Result> forces = runToEnd(loaded, options.run, simulation, hooks);
   const double wall = wallSeconds() - start;
   if (options.timings) printTimings(timings, artist, wanted.count());
   printFiles(options, artist, wall);

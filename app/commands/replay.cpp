@@ -27,17 +27,17 @@ int runReplay(const RunOptions& options) {
   const double start = wallSeconds();
   std::optional<LiveServo> live;
   LiveReport report;
-  std::function<void()> advance;
+  RunHooks hooks;
   if (options.realtime) {
     live.emplace(simulation);
-    advance = [&] { live->advanceFrame(); };
+    hooks.advance = [&] { live->advanceFrame(); };
   }
-  const auto finish = [&] {
+  hooks.afterFrame = [&] { progress.update(simulation.time()); };
+  hooks.ended = [&] {
     if (live) report = live->stop();
     progress.end();
   };
-  const std::vector<Result> forces = runToEnd(
-      loaded, options, simulation, [&] { progress.update(simulation.time()); }, finish, advance);
+  const std::vector<Result> forces = runToEnd(loaded, options, simulation, hooks);
   const double wall = wallSeconds() - start;
   std::vector<Result> results = runResults(simulation, processCpuSeconds() - cpuStart, wall);
   if (options.untilRest) results.insert(results.begin(), {"rest_at", fmt::format("{:.6g}", simulation.time()), "s"});

@@ -64,6 +64,18 @@ int pictureCount(const Scene& scene) {
   return static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9));
 }
 
+std::vector<int> goldenPictures(const Scene& scene) {
+  std::vector<int> pictures;
+  for (const double time : scene.goldenTimes) {
+    const int picture = std::min(static_cast<int>(std::lround(time * scene.fps)), pictureCount(scene) - 1);
+    if (!pictures.empty() && pictures.back() == picture)
+      throw std::runtime_error(
+          fmt::format("{}: two golden moments are picture {} at {:.6g} Hz", scene.path, picture, scene.fps));
+    pictures.push_back(picture);
+  }
+  return pictures;
+}
+
 std::vector<double> pictureTimes(const Scene& scene, int first, int last) {
   std::vector<double> times;
   times.reserve(std::max(0, last - first));
@@ -80,16 +92,15 @@ void PictureTimes::afterFrame(const Simulation& simulation, const std::function<
 }
 
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
-                             const std::function<void()>& afterFrame, const std::function<void()>& finish,
-                             const std::function<void()>& advance) {
+                             const RunHooks& hooks) {
   RunRecorders recorders(loaded, options);
   std::optional<RestWatch> rest;
   if (options.untilRest) rest.emplace(loaded, simulation);
   printWarnings(loaded, options, simulation.world());
   for (bool last = false; !last;) {
     checkInterrupt();
-    if (advance)
-      advance();
+    if (hooks.advance)
+      hooks.advance();
     else
       simulation.advanceFrame();
     if (rest) rest->afterFrame(simulation);
@@ -97,10 +108,11 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
     if (rest && !isAtRest && simulation.finished()) rest->fail(!outputFiles(options).empty());
     last = simulation.finished() || isAtRest;
     recorders.afterFrame(simulation, last);
-    afterFrame();
+    if (hooks.afterFrame) hooks.afterFrame();
   }
+  if (hooks.ended) hooks.ended();
   recorders.finish(simulation);
-  if (finish) finish();
+  if (hooks.finish) hooks.finish();
   recorders.commit(simulation);
   printNotes(loaded, simulation.totals(), simulation.world());
   return recorders.forceResults();

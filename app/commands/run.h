@@ -71,6 +71,8 @@ class PictureTimes {
 // Pictures [first, last) of a scene at its own rate; how many it has in all.
 std::vector<double> pictureTimes(const Scene& scene, int first, int last);
 int pictureCount(const Scene& scene);
+// Numbers of the pictures of the scene's golden moments, increasing. Throws std::runtime_error where two are one.
+std::vector<int> goldenPictures(const Scene& scene);
 
 // What tells one run from another: everything that its motion follows from, this program's version and the sources of
 // its physics included; or everything that its pictures do, but for options of the drawing.
@@ -86,15 +88,21 @@ std::map<std::string, std::string> filesOfTools(const std::string& option, const
 
 LoadedScene loadRun(const RunOptions& options);
 
-// Runs the simulation to its end; `afterFrame` is called after every dynamics frame, `finish` when records, log and
-// surfaces are written and before they appear under their names: what fails there leaves those as they were, and a disk
-// that is full keeps `finish` from being called. Until rest: as RestWatch finds it; surfaces asked for at a later time
-// are those at rest. Returns results of their own: how the force of tools whose trajectory has a measured one compares
-// with that. Throws NotAtRest, and Interrupted after a signal. `advance` makes the next dynamics frame; empty: in
-// logical time.
+// What a run calls besides its own; empty ones are none.
+struct RunHooks {
+  std::function<void()> advance;     // makes the next dynamics frame; empty: in logical time
+  std::function<void()> afterFrame;  // after every one
+  std::function<void()> ended;       // after the last
+  // When records, log and surfaces are written, before they appear under their names: what fails here leaves those as
+  // they were, and a disk that is full for them keeps this from being called.
+  std::function<void()> finish;
+};
+
+// Runs the simulation to its end. Until rest: as RestWatch finds it; surfaces asked for at a later time are those at
+// rest. Returns results of their own: how the force of tools whose trajectory has a measured one compares with that.
+// Throws NotAtRest, and Interrupted after a signal.
 std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& options, Simulation& simulation,
-                             const std::function<void()>& afterFrame, const std::function<void()>& finish = {},
-                             const std::function<void()>& advance = {});
+                             const RunHooks& hooks);
 
 // Every file that a run of the scene reads; some may be missing.
 std::vector<std::string> inputFiles(const Scene& scene);
