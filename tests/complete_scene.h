@@ -13,7 +13,7 @@ inline constexpr const char* completeScene = R"(<?xml version="1.0"?>
 <?xml-model href="scene.xsd"?>
 <scene name="complete">
   <clock servo="1000" dynamics="40" duration="12" settle="2"/>
-  <dynamics integrator="explicit" order="1" gravity="0 0 -9.5" ambient_drag="0.3" substeps="16" contact="swept" sleep_after="0.5"/>
+  <dynamics integrator="implicit" order="2" gravity="0 0 -9.5" ambient_drag="0.3" substeps="16" contact="swept" sleep_after="0.5"/>
   <!-- tissues -->
   <tissue name="bile_sac" young="6e3" poisson="0.4" density="1030" damping="0.2" friction="0.3"/>
   <tissue name="liver"/>
