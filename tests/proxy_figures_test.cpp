@@ -416,18 +416,22 @@ TEST(ProxyFigures, PressingSomethingRigid) {
     return Vector3d(0.0013, 0.013 - speed * std::min(t, 0.13) + speed * std::max(0.0, t - 0.4), 0.0007);
   };
   r.duration = 0.6;
-  Vector3d last = Vector3d::Zero();
-  double largest = 0, energy = 0;
+  Vector3d last = Vector3d::Zero(), lastDevice = r.device(0);
+  double largest = 0, energy = 0, work = 0;
   r.run([&](double, const ToolState& tool, const BlendedSurface&, double) {
     largest = std::max(largest, (tool.force - last).norm());
+    work += last.dot(tool.device - lastDevice);
     last = tool.force;
+    lastDevice = tool.device;
     energy = tool.energy;
   });
+  EXPECT_NEAR(energy, work, 1e-12);
   const double perTick = r.tool.stiffness * speed * tickDuration;
   expectReached("rigid, 8 mm at 0.1 m/s, force step (N)", largest, 1.2 * perTick);
   // Sampled springs give out k v T D (Colgate and Schenkel 1997); the depth D is 8 mm and what the proxy stops short
   // by.
   expectReached("rigid, 8 mm at 0.1 m/s, energy handed to the user (J)", energy, perTick * (0.008 + 1e-7));
+  EXPECT_GT(energy, 0.5 * perTick * 0.008);
 }
 
 // 1984 triangles, 50 dynamics frames to 1000 ticks.
