@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <limits>
 
@@ -40,6 +41,94 @@ TEST(World, TheSameRunTwiceHasTheSameHash) {
     EXPECT_EQ(other.stateHash(), other.stateHash());
   }
   EXPECT_EQ(other.stateHash(), hash[0]) << "reading changed the state";
+}
+
+// A tube that is held by a tool, and two balls that lie on a plane and on each other.
+static World heldTubeAndBalls(Integrator integrator) {
+  WorldSettings settings;
+  settings.contact = ContactMode::balls;
+  settings.integrator = integrator;
+  settings.sleepAfter = 10;
+  BodyDescription held = tube(6e3, 0.1);
+  held.surface = SurfaceMode::contact;
+  held.worldFromModel.translation() = Vector3d(0, 0.3, 0);
+  StaticShape floor;
+  floor.friction = 0.3;
+  World world(
+      settings,
+      {held, synthetic::ball("a", 0.01, {0.3, 0.01, 0}, 0.3), synthetic::ball("b", 0.01, {0.303, 0.0295, 0}, 0.3)},
+      {floor});
+  Loads loads;
+  loads.heldNodes.resize(1);
+  loads.heldNodes[0].node = 40;
+  loads.heldNodes[0].anchor = held.worldFromModel * held.model->restNodes[40] + Vector3d(0, 0.002, 0.001);
+  loads.heldNodes[0].stiffness = 50;
+  for (int k = 0; k < 5; ++k) world.advance(loads);
+  return world;
+}
+
+TEST(World, EveryNumberOfItsStateIsInTheHash) {
+  World world = heldTubeAndBalls(Integrator::explicitEuler);
+  WorldData& d = world.data();
+  const std::uint64_t before = world.stateHash();
+  const auto expectKnown = [&](const char* what, double& value) {
+    const double kept = value;
+    value = std::nextafter(value, 1e9);
+    EXPECT_NE(world.stateHash(), before) << what;
+    value = kept;
+  };
+  const auto expectAllKnown = [&](const char* what, Quad& q, int count) {
+    for (int k = 0; k < count; ++k) expectKnown(what, q.v[k]);
+  };
+  for (const int sphere : {0, 2, 4, d.ranges[1].firstSphere, d.ranges[2].firstSphere}) {
+    expectAllKnown("position", d.spheres.position[sphere], 3);
+    expectAllKnown("velocity", d.spheres.velocity[sphere], 3);
+    expectAllKnown("orientation", d.spheres.orientation[sphere], 4);
+    expectAllKnown("angular momentum", d.spheres.angularMomentum[sphere], 3);
+    expectAllKnown("where it keeps still", d.stillPlace[sphere].position, 3);
+    expectAllKnown("as it keeps still", d.stillPlace[sphere].orientation, 4);
+  }
+  for (int k = 0; k < 4; ++k) {
+    const int link = d.ranges[0].firstLink + k;
+    expectKnown("turns", d.links.unwoundTwist[link / 4].v[link % 4]);
+  }
+  for (const int node : {d.ranges[0].node.front(), d.ranges[0].node[40], d.ranges[0].node.back()}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (auto* vectors : {&d.nodes.position, &d.nodes.velocity}) {
+        const Vector3d kept = vectorAt(*vectors, node);
+        Vector3d changed = kept;
+        changed[axis] = std::nextafter(kept[axis], 1e9);
+        setVector(*vectors, node, changed);
+        EXPECT_NE(world.stateHash(), before) << node << ' ' << axis;
+        setVector(*vectors, node, kept);
+      }
+    }
+  }
+  ASSERT_FALSE(d.loadForces.empty());
+  for (int axis = 0; axis < 3; ++axis) expectKnown("force of a tool", d.loadForces[0][axis]);
+  ASSERT_FALSE(d.contact.carried.empty());
+  for (CarriedImpulse& c : d.contact.carried) expectAllKnown("impulse of a contact", c.impulse, 3);
+  ++d.contact.carried[0].key;
+  EXPECT_NE(world.stateHash(), before) << "whose impulse";
+  --d.contact.carried[0].key;
+  ++d.rest[1].stillFrames;
+  EXPECT_NE(world.stateHash(), before) << "for how long it has kept still";
+  --d.rest[1].stillFrames;
+  EXPECT_EQ(world.stateHash(), before);
+}
+
+TEST(World, WhatImplicitStepsRememberIsInTheHash) {
+  World world = heldTubeAndBalls(Integrator::implicit);
+  const std::uint64_t before = world.stateHash();
+  for (EnergyLedger& ledger : world.data().ledger) {
+    for (double* value : {&ledger.most, &ledger.due, &ledger.mostDue}) {
+      const double kept = *value;
+      *value = std::nextafter(kept, 1e9);
+      EXPECT_NE(world.stateHash(), before);
+      *value = kept;
+    }
+  }
+  EXPECT_EQ(world.stateHash(), before);
 }
 
 // Where nothing gives, no stiffness asks for short substeps, but what turns does: about its middle axis it tumbles, and
