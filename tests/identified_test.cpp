@@ -69,6 +69,31 @@ TEST(IdentifiedLink, ForcesAreMinusTheGradientTurnedByAnyAngle) {
   }
 }
 
+// Along and across a link, then turned about its line and across it: as often as stiff as the factors say, and what
+// couples two of these by the geometric mean.
+TEST(IdentifiedLink, EachWayItDeformsIsSteeredByItsOwnFactor) {
+  BodyDescription body = chain(SurfaceMode::skin, true);
+  const std::vector<IdentifiedLink>& links = body.model->identified->links;
+  const std::vector<Matrix6d> plain = identifiedStiffness(body);
+  body.steered = {{{2, 3, 5}}};
+  const std::vector<Matrix6d> steered = identifiedStiffness(body);
+  ASSERT_GE(plain.size(), 5u);
+  const std::array<double, 6> factor{2, 3, 3, 5, 3, 3};
+  for (std::size_t k = 0; k < plain.size(); ++k) {
+    Matrix6d axes = Matrix6d::Zero();
+    axes.topLeftCorner<3, 3>() = axes.bottomRightCorner<3, 3>() = links[k].axes;
+    const Matrix6d before = axes * plain[k] * axes.transpose(), now = axes * steered[k] * axes.transpose();
+    EXPECT_NEAR(links[k].axes.row(0).normalized().dot((links[k].restPoint1 - links[k].restPoint0).normalized()), 1,
+                0.01);
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) {
+        const double scale = std::sqrt(before(i, i) * before(j, j));
+        EXPECT_NEAR(now(i, j), std::sqrt(factor[i] * factor[j]) * before(i, j), 1e-9 * scale) << i << ' ' << j;
+      }
+    }
+  }
+}
+
 // Cells' means of a bar bent to an arc, turned by `angle` from cell to cell, its middle line longer as the section's
 // flattening makes it: what the link between cells 1 and 2 measures along it, and what it would without its terms of
 // second order, m.

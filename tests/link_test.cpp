@@ -2,6 +2,7 @@
 
 #include <numbers>
 
+#include "physics/dynamics/body_mechanics.h"
 #include "tests/dynamics_states.h"
 #include "tests/synthetic_model.h"
 
@@ -38,6 +39,27 @@ TEST(Link, ForcesAreMinusTheEnergyGradient) {
     const double angle = seed <= 4 ? 0.2 : 1.0;  // rad about each axis: up to 100 degrees between ends
     shake(world.data(), seed, angle, 0.004, 0);
     expectForcesAreMinusGradient(world.data(), 1e-6);
+  }
+}
+
+TEST(Link, EachWayItDeformsIsSteeredByItsOwnFactor) {
+  for (const LinkModel links : {LinkModel::beam, LinkModel::springs}) {
+    BodyDescription body = synthetic::body(synthetic::shortTube(), 5e3);
+    body.links = links;
+    const std::vector<LinkStiffness> plain = bodyMechanics(body).links;
+    body.steered = {{{2, 3, 5}}};
+    const std::vector<LinkStiffness> steered = bodyMechanics(body).links;
+    ASSERT_EQ(plain.size(), 4u);
+    for (std::size_t k = 0; k < plain.size(); ++k) {
+      EXPECT_NEAR(steered[k].elongation / plain[k].elongation, 2, 1e-12);
+      EXPECT_NEAR(steered[k].torsion / plain[k].torsion, 5, 1e-12);
+      for (const auto flexion : {&LinkStiffness::flexionU, &LinkStiffness::flexionV}) {
+        const FlexionStiffness &now = steered[k].*flexion, &before = plain[k].*flexion;
+        EXPECT_NEAR(now.end0 / before.end0, 3, 1e-12);
+        EXPECT_NEAR(now.end1 / before.end1, 3, 1e-12);
+        EXPECT_NEAR(now.couple, 3 * before.couple, 1e-12 * before.end0);
+      }
+    }
   }
 }
 
