@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "tests/contact_bodies.h"
 
@@ -95,6 +96,36 @@ TEST(ContactBlow, ASleeperThatIsStruckStandsOnWhatBearsIt) {
 TEST(ContactBlow, ABodyWithoutNodesKeepsItsVolume) {
   const World world(settings(), {ball("bare", kRadius, {0, 0, 0})});
   EXPECT_EQ(world.volumeRatio(0), 1);
+}
+
+// While two balls slide past each other all through a blow, what it gives across is the friction of the pair times what
+// it gives along: of 0.9 and 0.1 the geometric mean, not the arithmetic one, 0.5, nor that of either.
+TEST(ContactBlow, FrictionOfAPairIsTheGeometricMeanOfItsSides) {
+  for (const auto& [first, second] : {std::pair{0.9, 0.1}, std::pair{0.1, 0.9}, std::pair{0.3, 0.3}}) {
+    WorldSettings fine = settings();
+    fine.frameDuration = 1e-4;
+    fine.substeps = 1;
+    World world(fine, {ball("a", kRadius, {-0.020001, 0, 0}, first), ball("b", kRadius, {0, 0, 0}, second)});
+    const Vector3d before(0.05, 0.1, 0);
+    synthetic::throwBody(world, 0, before);
+    for (int k = 0; k < 100; ++k) world.advance({});
+    const Vector3d given = before - vectorOf(world.data().spheres.velocity[0]);
+    EXPECT_GT(given.x(), 0.02);
+    EXPECT_NEAR(given.y() / given.x(), 0.3, 0.3 * 0.01) << first << ' ' << second;
+    EXPECT_NEAR((vectorOf(world.data().spheres.velocity[1]) - given).norm(), 0, 1e-12);
+    // Both are spun alike by a force at their surfaces.
+    const double spin = given.y() / (0.4 * kRadius);
+    for (int i = 0; i < 2; ++i)
+      EXPECT_NEAR(std::abs(vectorOf(world.data().spheres.angularVelocity[i]).z()), spin, 0.01 * spin);
+  }
+}
+
+TEST(ContactBlow, PenetrationIsInPercentOfTheSmallerRadius) {
+  for (const auto& [first, second] : {std::pair{kRadius, 0.5 * kRadius}, std::pair{0.5 * kRadius, kRadius}}) {
+    World world(settings(), {ball("a", first, {0, 0, 0}), ball("b", second, {1.2 * kRadius, 0, 0})});
+    for (int k = 0; k < 10; ++k) world.advance({});
+    EXPECT_NEAR(world.penetration().bodies, 60, 1e-9);  // at the start: 0.3 of 0.5 radii
+  }
 }
 
 }  // namespace medulla

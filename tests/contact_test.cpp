@@ -112,7 +112,7 @@ TEST(Contact, ABallRollsOrSlidesDownAnIncline) {
   const double rollingFriction = 2.0 / 7 * std::tan(angle);  // the least that rolls without sliding
   for (const double friction : {0.5 * rollingFriction, 1.5 * rollingFriction}) {
     World world(settings(ContactMode::balls, step, {0, -kGravity, 0}),
-                {ball("a", kBallRadius, kBallRadius * normal, friction)}, {plane(normal, friction)});
+                {ball("a", kBallRadius, kBallRadius * normal, 4 * friction)}, {plane(normal, 0.25 * friction)});
     advance(world, static_cast<int>(duration / step));
     const bool rolls = friction > rollingFriction;
     const double acceleration =
