@@ -1,5 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <sstream>
+
+#include "app/simulation.h"
+#include "physics/dynamics/rest_modes.h"
+#include "physics/model/mass_properties.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 
@@ -64,6 +69,37 @@ TEST(Info, TellsOfTrajectoriesAndRecordings) {
   folder.write("bad.csv", "t,x\n");
   expectRefusal(runProgram({"info", folder / "bad.csv"}), 1, {"bad.csv:1", "t[s]"});
   expectRefusal(runProgram({"info", kSource + "docs/force.png"}), 1, {"force.png: is of no kind", "a mesh, a model"});
+}
+
+TEST(Info, TheSpeedOfAMotionIsItsWayOverItsTime) {
+  const TemporaryFolder folder;
+  folder.write("a.csv",
+               "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,0.1,0.2,0.3,1,0,0,0,0\n0.25,0.13,0.24,0.3,1,0,0,0,0\n");
+  const ProgramResult r = runProgram({"info", folder / "a.csv"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_NEAR(std::stod(valueOf(r.out, "speed_max")), 0.2, 1e-6);
+  EXPECT_TRUE(valueOf(r.out, "speed_max").ends_with(" m/s"));
+  EXPECT_EQ(valueOf(r.out, "gap_max"), "0.25 s");
+}
+
+TEST(Info, MassAndFrequenciesOfABodyAreThoseOfItsTissue) {
+  const std::string scene = kSource + "scenes/gallbladder.xml";
+  const ProgramResult r = runProgram({"info", scene});
+  const LoadedScene loaded = loadScene(readScene(scene));
+  const SceneBody& body = loaded.scene.bodies[0];
+  const double volume = massProperties({body.model->restNodes, body.model->triangles}).volume;
+  EXPECT_NEAR(std::stod(valueOf(r.out, "body.gallbladder.mass")), volume * body.tissue.density, 1e-4 * volume * 1e3);
+  std::istringstream list(valueOf(r.out, "body.gallbladder.natural_frequencies"));
+  const std::vector<double> expected = naturalFrequencies(body, bodyMechanics(body), 5);
+  ASSERT_EQ(expected.size(), 5u);
+  for (const double frequency : expected) {
+    double told = 0;
+    ASSERT_TRUE(list >> told) << list.str();
+    EXPECT_NEAR(told, frequency, 1e-3 * frequency);
+  }
+  std::string unit;
+  list >> unit;
+  EXPECT_EQ(unit, "Hz");
 }
 
 TEST(Info, TellsOfWhatRunsLeave) {
