@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <numbers>
 #include <set>
+#include <string>
 
 #include "app/files/mesh_file.h"
 
@@ -25,7 +27,7 @@ const char* const kStatic[] = {
     "gallbladder_torsion", "gallbladder_twist", "gallbladder_poke_small", "gallbladder_poke_large", "liver_tip", "liver_tip_in_plane", "liver_mid",
     "liver_axial", "liver_stretched_tip", "liver_stretched_axial", "gallbladder_halved_tip_large", "gallbladder_halved_pull",
     "gallbladder_doubled_tip_large", "gallbladder_doubled_pull", "liver_torsion", "liver_poke_small", "liver_poke_large",
-    "stomach_press", "kidney_tip"};
+    "stomach_press", "kidney_tip", "stomach_pull", "cube_pull", "cube_pull_far", "cube_shear"};
 // clang-format on
 const char* const kBodies[] = {"cylinder", "gallbladder", "liver"};
 const char* const kStepped[] = {"cylinder", "gallbladder"};
@@ -69,7 +71,9 @@ TEST_P(StaticReference, IsWhole) {
   EXPECT_NEAR(volume(mesh, still), result.number("volume"), 1e-6 * volume(mesh, still));
   EXPECT_NEAR(volume(mesh, u) / volume(mesh, still), result.number("volume_ratio"), 1e-4);
   // Nearly incompressible; only a stretch changes the volume by more than half a percent.
-  EXPECT_NEAR(result.number("volume_ratio"), result.number("volume_ratio_fine"), 0.004);
+  // Triangles span the hollow rim of what a strong pull draws out of a flat side.
+  const bool drawnOut = std::string(GetParam()) == "cube_pull_far";
+  EXPECT_NEAR(result.number("volume_ratio"), result.number("volume_ratio_fine"), drawnOut ? 0.006 : 0.004);
 }
 
 TEST_P(StaticReference, IsHeldWhereItSaysAndLoadedElsewhere) {
@@ -125,7 +129,9 @@ TEST_P(StaticReference, SaysHowFarItsMeshIsOff) {
   const bool poke = std::string(GetParam()).find("poke") != std::string::npos;
   EXPECT_GT(result.number("mesh_error_max"), 0);
   EXPECT_LE(result.number("mesh_error_rms"), result.number("mesh_error_max"));
-  EXPECT_LT(result.number("mesh_error_max"), poke ? 5 : 2.5);
+  // Where a patch of a flat side is loaded by half of Young's modulus, the patch's rim is as a poke's.
+  const bool cube = std::string(GetParam()).find("cube_pull") != std::string::npos;
+  EXPECT_LT(result.number("mesh_error_max"), poke ? 5 : cube ? 3.5 : 2.5);
   EXPECT_NEAR(result.number("displacement_max_extrapolated"), result.number("displacement_max"),
               0.03 * result.number("displacement_max"));
 }
@@ -318,6 +324,16 @@ TEST_P(StepReference, EndsWhereTheStaticCaseDoes) {
   const Vector3d direction = tip.vector("force").normalized();
   const double expected = share * tip.number("displacement_load");
   EXPECT_NEAR(step.vector("static").dot(direction), expected, 0.06 * expected);
+}
+
+// A reference that stands in no list is one that nothing keeps whole.
+TEST(AccuracyReferences, EachIsInOneOfTheLists) {
+  std::multiset<std::string> listed(std::begin(kStatic), std::end(kStatic)), found;
+  for (const std::string body : kBodies) listed.insert(body + "_modes");
+  for (const std::string body : kStepped) listed.insert(body + "_step");
+  for (const auto& entry : std::filesystem::directory_iterator(folder()))
+    if (entry.path().extension() == ".txt") found.insert(entry.path().stem().string());
+  EXPECT_EQ(found, listed);
 }
 
 TEST(AccuracyReferences, AreSmall) {
