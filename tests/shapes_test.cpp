@@ -18,6 +18,7 @@
 #include "physics/model/self_intersection.h"
 #include "physics/model/surface_queries.h"
 #include "physics/model/triangle_mesh.h"
+#include "tests/temporary_folder.h"
 
 namespace medulla {
 
@@ -240,9 +241,9 @@ TEST(Shapes, AbdominalWallEnclosesEveryOrgan) {
 }
 
 TEST(Shapes, ProgramRepeatsTheCommittedMeshesToTheByte) {
-  const std::filesystem::path directory = std::filesystem::path(testing::TempDir()) / "medulla_shapes_test";
+  const TemporaryFolder folder;
   std::string command = "\"" MEDULLA_SHAPES "\" -o \"";
-  command += directory.string();
+  command += folder.path();
   command += "\" gallbladder dolphin > /dev/null";
   ASSERT_EQ(std::system(command.c_str()), 0);
   const auto bytes = [](const std::filesystem::path& path) {
@@ -250,8 +251,7 @@ TEST(Shapes, ProgramRepeatsTheCommittedMeshesToTheByte) {
     return std::string(std::istreambuf_iterator<char>(file), {});
   };
   for (const std::string name : {"gallbladder/gallbladder.obj", "dolphin/dolphin.obj"})
-    EXPECT_EQ(bytes(directory / name), bytes(asset(name))) << name;
-  std::filesystem::remove_all(directory);
+    EXPECT_EQ(bytes(folder / name), bytes(asset(name))) << name;
 }
 
 }  // namespace medulla

@@ -1,5 +1,8 @@
+#include <unistd.h>
+
 #include <filesystem>
 #include <stdexcept>
+#include <string>
 
 #include "app/files/model_file.h"
 #include "app/files/text_file.h"
@@ -16,7 +19,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (std::string(error.what()).find('\n') != std::string::npos) std::abort();
     return 0;
   }
-  const std::string path = (std::filesystem::temp_directory_path() / "medulla_model_fuzz.xml").string();
+  const std::string path =
+      std::filesystem::temp_directory_path() / ("medulla_model_fuzz_" + std::to_string(::getpid()) + ".xml");
   writeModel(path, model);
   const std::string once = readTextFile(path);
   writeModel(path, readModel(path));

@@ -11,7 +11,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (text.starts_with('#')) {
     start = std::min(text.find('\n'), size);
     const std::size_t equals = std::min(text.find('='), start);
-    overrides.push_back({text.substr(1, equals - 1), text.substr(equals, start - equals)});
+    const std::size_t value = std::min(equals + 1, start);
+    overrides.push_back({text.substr(1, equals - 1), text.substr(value, start - value)});
   }
   const medulla::MemoryFile file(data + start, size - start);
   try {
