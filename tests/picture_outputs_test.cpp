@@ -74,7 +74,7 @@ TEST_F(Outputs, AKilledRunIsResumedToTheSameBytes) {
   expectRefused(render({"--size", "64x48", "-o", "frames", "--resume", "--view", "model"}), "pictures of another run");
   const ProgramResult rest = render(small);
   ASSERT_EQ(rest.exitCode, 0) << rest.err;
-  EXPECT_EQ(rest.out.find("pictures 50\n"), std::string::npos) << rest.out;
+  EXPECT_LE(std::stoi(valueOf(rest.out, "pictures")), 30) << rest.out;
   ASSERT_EQ(render({"--size", "64x48", "-o", "whole"}).exitCode, 0);
   EXPECT_EQ(pictures("frames", 50), pictures("whole", 50));
   EXPECT_EQ(contents().size(), 2u);
@@ -358,7 +358,11 @@ TEST_F(Outputs, AFolderThatCannotTakeEveryPictureIsRefusedBeforeTheFilm) {
   EXPECT_EQ(read("other/0-12.part"), "somebody's");
   expectRefused(render({"-o", ".mp4"}), ".mp4: expected a name before the dot");
   EXPECT_EQ(contents().size(), 2u);
-  if (::geteuid() == 0) return;  // nothing is forbidden to root
+}
+
+TEST_F(Outputs, AFolderThatIsForbiddenIsRefusedBeforeTheFilm) {
+  if (::geteuid() == 0) GTEST_SKIP() << "nothing is forbidden to root";
+  fs::create_directories(folder / "frames");
   fs::permissions(folder / "frames", fs::perms::owner_read | fs::perms::owner_exec);
   expectRefused(render({"-o", "frames", "--frames", "4:5"}), "frames: cannot be written: Permission denied");
   fs::permissions(folder / "frames", fs::perms::owner_all);
