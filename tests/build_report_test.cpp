@@ -1,7 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "physics/model/build.h"
 #include "physics/model/build_report.h"
+#include "physics/model/mass_properties.h"
 #include "physics/model/plane_section.h"
 #include "physics/model/render_surface.h"
 #include "tests/test_shapes.h"
@@ -72,6 +77,83 @@ TEST(BuildReport, TellsHowFarTheDrawnSurfaceLiesInside) {
   EXPECT_GT(coarse, 5);
   EXPECT_LT(fine, 1);
   EXPECT_GT(fine, 0.1);
+}
+
+// A ball in the middle of a sphere, four fifths as wide: everywhere as far from the surface, but for the mesh's chords.
+TEST(BuildReport, GapsAndCoverOfABallInASphere) {
+  const double radius = 0.05, diagonal = 2 * std::sqrt(3.) * radius;
+  const TriangleMesh mesh = ellipsoidMesh(3, {radius, radius, radius});
+  BuildReport report;
+  SoftBodyModel model = buildModel(asRepaired(mesh), nullptr, {}, report);
+  for (FillingSphere& s : model.spheres) {
+    s.restBallCentre.setZero();
+    s.radius = 0.8 * radius;
+  }
+  report = measureModel(model);
+  EXPECT_NEAR(report.gapMax, 100 * 0.2 * radius / diagonal, 1e-6);
+  EXPECT_LT(report.gapMean, 100 * 0.2 * radius / diagonal);
+  EXPECT_GT(report.gapMean, 0.98 * 100 * 0.2 * radius / diagonal);
+  EXPECT_NEAR(report.gapConesMax, report.gapMax, 1e-9);
+  const double share = std::pow(0.8, 3) * 4. / 3 * std::numbers::pi * std::pow(radius, 3) / massProperties(mesh).volume;
+  EXPECT_NEAR(report.cover, 100 * share, 1.5);
+  EXPECT_EQ(report.coverCones, report.cover);
+}
+
+// Equal balls along a round bar's axis: the cones of their links make a rod with round ends.
+TEST(BuildReport, CoverOfBallsAndConesAlongABar) {
+  const double length = 0.2, radius = 0.02, ball = 0.015, inBalls = 4. / 3 * std::numbers::pi * std::pow(ball, 3);
+  const TriangleMesh mesh = cylinderMesh(length, radius, 48, 40);
+  BuildReport report;
+  SoftBodyModel model = buildModel(asRepaired(mesh), nullptr, {}, report);
+  const int count = static_cast<int>(model.spheres.size());
+  ASSERT_GE(count, 3);
+  ASSERT_LE(count, 8);  // no two balls overlap that are not neighbours
+  ASSERT_GE(model.links.size(), static_cast<std::size_t>(count - 1));
+  const double spacing = (length - 2 * radius) / (count - 1);
+  for (int k = 0; k < count; ++k) {
+    model.spheres[k].restBallCentre = Vector3d(radius + k * spacing, 0, 0);
+    model.spheres[k].radius = ball;
+    if (k > 0) {
+      model.links[k - 1].sphere0 = k - 1;
+      model.links[k - 1].sphere1 = k;
+    }
+  }
+  model.links.resize(count - 1);
+  for (Attachment& a : model.attachments) a.host = a.onLink ? std::min(a.host, count - 2) : a.host;
+  report = measureModel(model);
+  const double overlap =
+      spacing < 2 * ball ? std::numbers::pi / 12 * (4 * ball + spacing) * std::pow(2 * ball - spacing, 2) : 0;
+  const double whole = massProperties(mesh).volume;
+  const double rod = std::numbers::pi * ball * ball * (length - 2 * radius) + inBalls;
+  EXPECT_NEAR(report.cover, 100 * (count * inBalls - (count - 1) * overlap) / whole, 1.5);
+  EXPECT_NEAR(report.coverCones, 100 * rod / whole, 1.5);
+  EXPECT_GT(report.coverCones, report.cover + 3);
+  EXPECT_EQ(report.components, 1);
+  EXPECT_EQ(report.degreeMax, 2);
+  // Along the flank the rod is 5 mm off; in a rim's corner farther.
+  EXPECT_NEAR(report.gapConesMax, 100 * (std::hypot(radius, radius) - ball) / report.diagonal, 1e-6);
+}
+
+TEST(BuildReport, MassesAndAttachmentsAreMeasuredAgainstTheMesh) {
+  const TriangleMesh mesh = boxMesh({0.03, 0.04, 0.12});
+  const MassProperties exact = massProperties(mesh);
+  BuildReport report;
+  SoftBodyModel model = buildModel(asRepaired(mesh), nullptr, {}, report);
+  for (Attachment& a : model.attachments) a.volume = 0;
+  for (FillingSphere& s : model.spheres) {
+    s.volume = 0;
+    s.secondMoment.setZero();
+  }
+  model.spheres[0].volume = 1.1 * exact.volume;
+  model.spheres[0].restFrame = exact.centroid + Vector3d(0, 0.0026, 0);
+  for (Attachment& a : model.attachments) a.restOffset = {0, 0, 0.001};
+  model.attachments[3].restOffset = {0, 0.0039, 0};
+  report = measureModel(model);
+  EXPECT_NEAR(report.diagonal, 0.13, 1e-12);
+  EXPECT_NEAR(report.centreError, 2, 1e-9);
+  EXPECT_NEAR(report.massError, 10, 1e-9);
+  EXPECT_NEAR(report.inertiaError, 100, 1e-6);  // of a point against that of the box
+  EXPECT_NEAR(report.attachmentMax, 3, 1e-9);
 }
 
 TEST(RenderSurface, FineMeshesAreNotDividedByThemselves) {

@@ -311,6 +311,22 @@ TEST(CheckLoads, LoadsThatMoveNothingDoNotCount) {
   EXPECT_DOUBLE_EQ(errorOf(found, expected).rms, 50);
 }
 
+// One node of three off by a fifth of what its load moves, under one load of two.
+TEST(CheckLoads, ErrorsAreRelativeToTheirOwnLoadsLargestDisplacement) {
+  MatrixXd expected = MatrixXd::Zero(9, 2);
+  expected.col(0) << 0, 0, 0, 3, 0, 4, 1, 0, 0;
+  expected.col(1) << 0, 10, 0, 0, 0, 0, 2, 0, 0;
+  MatrixXd found = expected;
+  EXPECT_EQ(errorOf(found, expected).maximum, 0);
+  EXPECT_EQ(errorOf(found, expected).rms, 0);
+  found(8, 0) += 1;
+  EXPECT_NEAR(errorOf(found, expected).maximum, 20, 1e-12);
+  EXPECT_NEAR(errorOf(found, expected).rms, 100 * std::sqrt(0.04 / 3 / 2), 1e-12);
+  found(8, 1) -= 3;
+  EXPECT_NEAR(errorOf(found, expected).maximum, 30, 1e-12);
+  EXPECT_NEAR(errorOf(found, expected).rms, 100 * std::sqrt((0.04 + 0.09) / 3 / 2), 1e-12);
+}
+
 TEST(CheckLoads, EveryLoadHasThreeFreeNodesHoweverFewAreFree) {
   const TriangleMesh mesh = cylinder();
   NodeSurface surface = measureNodes(mesh, {});
