@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
+#include <memory>
 #include <sstream>
 
+#include "app/commands/chart_errors.h"
 #include "app/files/chart_labels.h"
 #include "app/files/chart_picture.h"
 #include "app/files/mesh_file.h"
@@ -69,6 +72,39 @@ TEST(Chart, ThePictureTellsFailedRunsApartByRow) {
   EXPECT_GT(second, 1.01 * first);
   EXPECT_NE(script.find("lc '#000000' title 'FEM'"), std::string::npos);
   EXPECT_NE(script.find("set label '1234'"), std::string::npos);
+}
+
+// Two moments of a body of four nodes, of which the last is not known and the second one is loaded: deviations of 20 mm
+// before the end, and of 10 and 4 mm at the end, of a largest displacement of 100.
+TEST(Chart, ErrorsAreOfAllMomentsAndOfTheEndOfLoadedNodesAndTheRest) {
+  auto model = std::make_shared<SoftBodyModel>();
+  model->restNodes = {{0, 0, 0}, {0.5, 0, 0}, {0, 0.5, 0}, {0, 0, 0.5}};
+  LoadedScene loaded;
+  loaded.scene.bodies.resize(1);
+  loaded.scene.bodies[0].model = model;
+  loaded.scene.bodies[0].deadLoads = {{1, {0, 0, 1}, 0, 1}};
+  std::vector<RecordedFrame> exact(2);
+  for (RecordedFrame& moment : exact) moment.frame.bodies.resize(1);
+  exact[0].frame.bodies[0].nodes = {{0, 0, 0.06}, {0.5, 0, 0}, {0, 0.5, 0}, {0, 0, 0.5}};
+  exact[1].frame.bodies[0].nodes = {{0.06, 0, 0.08}, {0.5, 0.01, 0}, {0, 0.52, 0}, {0, 0, 0.5}};
+  ChartTruth truth = truthOfRun(loaded, exact);
+  EXPECT_NEAR(truth.displacement, 0.1, 1e-15);
+  truth.known[0][3] = 0;
+  std::vector<RecordedFrame> run = exact;
+  run[0].frame.bodies[0].nodes[0].y() -= 0.02;
+  run[1].frame.bodies[0].nodes[1].z() += 0.01;
+  run[1].frame.bodies[0].nodes[2].x() += 0.004;
+  run[1].frame.bodies[0].nodes[3].x() += 1;
+  ChartPoint point;
+  measureErrors(loaded, truth, run, point);
+  EXPECT_NEAR(point.errorMax, 20, 1e-9);
+  EXPECT_NEAR(point.errorRms, std::sqrt((400 + 100 + 16) / 6.), 1e-9);
+  EXPECT_NEAR(point.endErrorMax, 10, 1e-9);
+  EXPECT_NEAR(point.endErrorRms, std::sqrt((100 + 16) / 3.), 1e-9);
+  EXPECT_NEAR(point.loadedErrorMax.value(), 10, 1e-9);
+  EXPECT_NEAR(point.loadedErrorRms.value(), 10, 1e-9);
+  EXPECT_NEAR(point.restErrorMax.value(), 4, 1e-9);
+  EXPECT_NEAR(point.restErrorRms.value(), 4 / std::sqrt(2.), 1e-9);
 }
 
 class ChartCommand : public testing::Test {
@@ -156,6 +192,18 @@ TEST_F(ChartCommand, SmallerStepsComeNearerAndTooLargeOnesFail) {
   EXPECT_GT(std::stod(rows[6][4]), coarse);  // another model of the same body
   const std::string script = readFile(folder / "out/chart.gnuplot");
   EXPECT_NE(script.find("title 'skin'"), std::string::npos);
+  // Time at equal accuracy: of each curve the cheapest run that is good enough.
+  for (const int percent : {1, 2, 5, 10}) {
+    double cheapest = std::numeric_limits<double>::infinity();
+    for (const std::size_t row : {2, 3})
+      if (std::stod(rows[row][4]) <= percent) cheapest = std::min(cheapest, std::stod(rows[row][3]));
+    const std::string told = valueOf(r.out, fmt::format("full.cpu_at_{}%", percent));
+    ASSERT_EQ(told.empty(), std::isinf(cheapest)) << percent;
+    if (!told.empty()) {
+      EXPECT_NEAR(std::stod(told), cheapest, 1e-3 * cheapest) << percent;
+    }
+  }
+  EXPECT_NE(valueOf(r.out, "full.cpu_at_10%"), "");
 }
 
 TEST_F(ChartCommand, StepsOfTheirOwnAreThoseOfReplays) {
