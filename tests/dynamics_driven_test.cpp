@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "tests/complaint.h"
+#include "tests/contact_bodies.h"
 #include "tests/dynamics_states.h"
 #include "tests/synthetic_model.h"
 
@@ -231,6 +232,22 @@ TEST(AmbientDrag, SlowsEveryPartAlike) {
     for (int i = 0; i < d.spheres.count; ++i)
       EXPECT_LT((vectorOf(d.spheres.velocity[i]) - expected).norm(), 1e-12) << i;
     EXPECT_LT(world.energies().elastic, 1e-20);
+  }
+}
+
+TEST(AmbientDrag, SlowsSpinAsItSlowsSpeed) {
+  for (const Integrator integrator : {Integrator::explicitEuler, Integrator::implicit}) {
+    WorldSettings settings = weightless();
+    settings.integrator = integrator;
+    settings.ambientDrag = 0.8;
+    settings.substeps = 50;
+    World world(settings, {synthetic::ball("ball", 0.03, {0, 0, 0})});
+    WorldData& d = world.data();
+    setAngularVelocity(d, 0, {1, -2, 3});
+    const Vector3d start = vectorOf(d.spheres.angularMomentum[0]);
+    for (int frame = 0; frame < 10; ++frame) world.advance({});
+    const Vector3d expected = start / std::pow(1 + d.substep * 0.8, 500);
+    EXPECT_LT((vectorOf(d.spheres.angularMomentum[0]) - expected).norm(), 1e-7 * start.norm());
   }
 }
 

@@ -147,7 +147,6 @@ TEST_F(Recording, ASpanIsCutOutAndPlayedWithADelay) {
             std::string::npos);
 }
 
-// A window wider than the tremor's period takes it out, keeps a steady motion and both ends, and delays nothing.
 // Doubles tell times since 1970 apart by a quarter of a microsecond: 0.1 s later is 0.0999999 s later to them, 0.3 s
 // later 0.3000002.
 TEST_F(Recording, ASpanHoldsTheRowsAtItsEndsWhereverTimeBegins) {
@@ -161,6 +160,7 @@ TEST_F(Recording, ASpanHoldsTheRowsAtItsEndsWhereverTimeBegins) {
   EXPECT_EQ(played("to=\"0.3\"", "1700000000.1,0,0,0\n1700000000.4,1,0,0\n1700000000.5,2,0,0\n").size(), 2u);
 }
 
+// A window wider than the tremor's period takes it out, keeps a steady motion and both ends, and delays nothing.
 TEST_F(Recording, SmoothingTakesOutTremorAndNothingElse) {
   std::string text;
   const double tremor = 0.0005;

@@ -96,11 +96,16 @@ TEST_F(VideoWriterTest, EveryKindOfVideoHasEveryPicture) {
       EXPECT_NEAR(std::uint8_t(raw[middle + 1]), 60, 8) << name << " picture " << k;
     }
   }
+  for (const char* name : {"a.webm", "a.gif"})
+    EXPECT_EQ(outputOf("ffprobe -v error -show_entries stream=r_frame_rate -of csv=p=0 " + path(name)), "25/1\n");
   // ffmpeg reads no animated WebP: its chunks are counted (RIFF container of Google's WebP specification).
   const std::string webp = readFile(path("a.webp"));
   EXPECT_EQ(webp.substr(0, 4) + webp.substr(8, 4), "RIFFWEBP");
   int pictures = 0;
-  for (std::size_t at = webp.find("ANMF"); at != std::string::npos; at = webp.find("ANMF", at + 1)) ++pictures;
+  for (std::size_t at = webp.find("ANMF"); at != std::string::npos; at = webp.find("ANMF", at + 1)) {
+    EXPECT_EQ(std::uint8_t(webp.at(at + 20)), 40) << "ms, behind the size of the chunk, its place and its own size";
+    ++pictures;
+  }
   EXPECT_EQ(pictures, 10);
 }
 
