@@ -54,11 +54,11 @@ case ${1-} in
     lint
     ;;
   --sanitize)
-    installPackages build
+    installPackages build chart
     runTests sanitize
     ;;
   *)
-    installPackages build
+    installPackages build chart
     runTests default
     ;;
 esac
