@@ -63,7 +63,7 @@ TEST(Info, TellsOfTrajectoriesAndRecordings) {
   EXPECT_EQ(valueOf(recording.out, "kind"), "trajectory") << recording.err;
   EXPECT_EQ(valueOf(recording.out, "samples"), "292");
   EXPECT_EQ(valueOf(recording.out, "gap_max"), "0.034 s");
-  for (const ProgramResult* r : {&recording, &trajectory}) EXPECT_EQ(valueOf(r->out, "grip_closings"), "1") << r->err;
+  for (const ProgramResult* r : {&recording, &trajectory}) EXPECT_EQ(valueOf(r->out, "grip_closings"), "2") << r->err;
   EXPECT_EQ(valueOf(trajectory.out, "to"), "12 s");
   const TemporaryFolder folder;
   folder.write("bad.csv", "t,x\n");
