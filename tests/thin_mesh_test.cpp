@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -9,7 +10,9 @@
 #include "physics/model/build.h"
 #include "physics/model/identify/slits.h"
 #include "physics/model/identify/thin_parts.h"
+#include "physics/model/identify/voxel_solid.h"
 #include "physics/model/mesh_repair.h"
+#include "tests/complaint.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 #include "tests/test_shapes.h"
@@ -186,6 +189,18 @@ TEST(ThinMesh, AFinKeepsItsSpheresWhereverItStands) {
     EXPECT_EQ(model.spheres.size(), 20u);
     EXPECT_LT(report.gapMax, 10);
   }
+}
+
+TEST(ThinMesh, ARodThatLiesAslantIsRefusedBeforeItsBoxFillsTheMemory) {
+  TriangleMesh rod = cylinderMesh(0.4, 0.01, 16, 40);
+  SolidSettings settings;
+  settings.memoryMax = 3e7;
+  EXPECT_EQ(complaintOf([&] { makeVoxelSolid(rod, 0.01, settings); }), "");
+  const Eigen::Matrix3d aslant =
+      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitX(), Vector3d(1, 1, 1)).toRotationMatrix();
+  for (Vector3d& x : rod.vertices) x = aslant * x;
+  const std::string complaint = complaintOf([&] { makeVoxelSolid(rod, 0.01, settings); });
+  EXPECT_NE(complaint.find("lies aslant"), std::string::npos) << complaint;
 }
 
 TEST(ThinMesh, SlitsThinnerThanACellAreFoundAndCreasesAreNone) {

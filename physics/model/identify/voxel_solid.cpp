@@ -224,6 +224,17 @@ int voxelsFor(double volume, double cellSize) {
   return static_cast<int>(volume / (voxel * voxel * voxel));
 }
 
+// A slender body that lies aslant fills next to nothing of its box, in which every voxel has a place.
+void requireRoom(const TriangleMesh& mesh, double cellSize, double memoryMax) {
+  constexpr double kPerVoxel = 8;  // bytes, with the columns' tables
+  const double bytes = kPerVoxel * (boundsOf(mesh.vertices).sizes() / (cellSize / HexGrid::kVoxels)).prod();
+  if (bytes > memoryMax)
+    throw OverBudget(
+        fmt::format("finite elements of {:.3g} mm would take {:.2g} GB for the box around a body that lies aslant, "
+                    "expected at most {:.2g} GB: turned along an axis it is smaller",
+                    1e3 * cellSize, 1e-9 * bytes, 1e-9 * memoryMax));
+}
+
 }  // namespace
 
 double metCellSize(const TriangleMesh& mesh, double cellSize) {
@@ -235,7 +246,9 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
                           const std::function<void(double)>& progress) {
   VoxelSolid solid;
   const double volume = massProperties(mesh).volume;
-  solid.voxels = voxeliseEvenly(mesh, volume, voxelsFor(volume, cellSize));
+  const int voxels = voxelsFor(volume, cellSize);
+  requireRoom(mesh, cellSize, settings.memoryMax);
+  solid.voxels = voxeliseEvenly(mesh, volume, voxels);
   const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
   for (const VoxelPiece& piece : solid.voxels.pieces) solid.isBehind.push_back(behind(piece.centre));
   solid.grid = makeHexGrid(solid.voxels, solid.isBehind);

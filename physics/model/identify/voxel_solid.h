@@ -37,10 +37,10 @@ struct SolidSettings {
   double poisson = 0.45;  // 0 <= poisson < 0.5
   std::vector<int> heldTriangles;
   std::vector<HeldSpace> heldSpaces;
-  double memoryMax = 3e9;  // bytes for the factors
+  double memoryMax = 3e9;  // bytes for the factors, or for the voxels of the box around the body
 };
 
-// Cells that would be too many, or whose factors would take more memory than they may.
+// Cells that would be too many, or whose factors or voxels would take more memory than they may.
 struct OverBudget : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
