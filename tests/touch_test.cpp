@@ -115,6 +115,7 @@ TEST(Touch, PressedTissueGivesWayAndHeldTissueComesBetweenTheJaws) {
   // Half held it is halfway there.
   tool.tip = {0, 0, 0.004f};
   tool.press = {};
+  tool.grasp = 1;
   tool.hold = 0.5f;
   SceneMesh between = rest;
   applyTouch(tool, between);
@@ -126,6 +127,12 @@ TEST(Touch, PressedTissueGivesWayAndHeldTissueComesBetweenTheJaws) {
   EXPECT_GT(half, 0.2f * risen);
   EXPECT_LT(half, 0.8f * risen);
   EXPECT_NEAR(held.blanch[middleOf(rest)], 1, 1e-5);
+  // Jaws that open let it down before the tool lets go; until then it stays pale.
+  tool.hold = 0;
+  SceneMesh opening = rest;
+  applyTouch(tool, opening);
+  EXPECT_EQ(opening.position[middleOf(rest)], rest.position[middleOf(rest)]);
+  EXPECT_NEAR(opening.blanch[middleOf(rest)], 1, 1e-5);
   // As a fold: thin where the jaws close on it, along y, and long across them.
   const auto heightAt = [&](vec3 place) {
     const auto nearer = [&](vec3 a, vec3 b) { return glm::distance(a, place) < glm::distance(b, place); };

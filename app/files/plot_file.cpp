@@ -146,10 +146,6 @@ std::vector<Panel> panelsOf(const LogTable& log, const Series& time) {
   energy.logarithmic = true;
   energy.curves.push_back(line("elastic", 0, 1.8, scaled(column(log, "energy.elastic"), 1e3)));
   energy.curves.push_back(line("kinetic", 1, 1.8, scaled(column(log, "energy.kinetic"), 1e3)));
-  const auto isZero = [](const Curve& c) {
-    return std::all_of(c.values.begin(), c.values.end(), [](double v) { return v == 0; });
-  };
-  if (std::all_of(nodes.curves.begin(), nodes.curves.end(), isZero)) nodes.curves.clear();  // skins alone
   for (Panel* panel : {&volume, &energy, &nodes}) {
     if (panel->curves.empty()) continue;
     shadeLikeAll(log, time, tools, *panel);
