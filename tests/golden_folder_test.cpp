@@ -116,6 +116,28 @@ TEST_F(GoldenFolder, NothingIsStoredWhereOneImageCannotBe) {
   EXPECT_TRUE(read("pictures/organ_8.png") == before);
 }
 
+TEST_F(GoldenFolder, AnUpdateThatFindsNoRoomLeavesAllImagesAsTheyWere) {
+  namespace fs = std::filesystem;
+  const std::vector<std::string> before = images();
+  std::uintmax_t largest = 0;
+  std::vector<fs::file_time_type> written;
+  for (const std::string& name : before) {
+    largest = std::max(largest, fs::file_size(folder / ("pictures/" + name)));
+    written.push_back(fs::last_write_time(folder / ("pictures/" + name)));
+  }
+  ProgramOptions full;
+  full.fileSizeLimit = static_cast<long>(largest) - 1;
+  expectRefused(run({"golden", "--dir", "pictures", "--update", "organ", "--update", "other"}, full),
+                "cannot be written: File too large");
+  EXPECT_EQ(images(), before);
+  for (std::size_t k = 0; k < before.size(); ++k)
+    EXPECT_EQ(fs::last_write_time(folder / ("pictures/" + before[k])), written[k]) << before[k];
+}
+
+TEST_F(GoldenFolder, AFolderThatIsNotThereIsSaidToBeSo) {
+  expectRefused(run({"golden", "--dir", "nowhere"}), "nowhere: No such file or directory");
+}
+
 TEST_F(GoldenFolder, AnUpdateOfASceneThatNamesNoMomentAnyMoreRemovesItsImages) {
   folder.write("own/organ.xml", replaced(read("own/organ.xml"), " golden=\"0.32 0.4\"", ""));
   const ProgramResult r = golden({"own/organ.xml", "--update", "organ"});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -202,16 +203,22 @@ Update updateOf(const std::string& path, const GoldenOptions& options, const std
   return update;
 }
 
-void apply(const Update& update) {
-  const OutputFolder made(update.folder);
-  for (const auto& [path, bytes] : update.written) {
-    writeFile(path, bytes);
-    fmt::print("{} written\n", path);
-  }
-  for (const std::string& path : update.removed) {
-    std::error_code error;
-    if (!fs::remove(path, error) && error) throw std::runtime_error(path + ": cannot be removed: " + error.message());
-    fmt::print("{} removed: no moment of its scene\n", path);
+// All images are whole before the first takes its name: of a full disk nothing is seen.
+void apply(const std::vector<Update>& updates) {
+  std::deque<OutputFile> files;
+  for (const Update& update : updates)
+    for (const auto& [path, bytes] : update.written) {
+      files.emplace_back(path).write(bytes);
+      files.back().finish();
+    }
+  for (OutputFile& file : files) file.commit();
+  for (const Update& update : updates) {
+    for (const auto& [path, bytes] : update.written) fmt::print("{} written\n", path);
+    for (const std::string& path : update.removed) {
+      std::error_code error;
+      if (!fs::remove(path, error) && error) throw std::runtime_error(path + ": cannot be removed: " + error.message());
+      fmt::print("{} removed: no moment of its scene\n", path);
+    }
   }
 }
 
@@ -239,7 +246,7 @@ int updateImages(const std::vector<std::string>& scenes, const GoldenOptions& op
   std::vector<Update> updates;
   updates.reserve(chosen.size());
   for (const std::string& path : chosen) updates.push_back(updateOf(path, options, renderedWith));
-  for (const Update& update : updates) apply(update);
+  apply(updates);
   return 0;
 }
 
