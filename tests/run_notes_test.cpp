@@ -50,6 +50,18 @@ TEST_F(RunNotes, NumbersThatAreRightInOtherUnits) {
   EXPECT_EQ(notesWith("dynamics.gravity=0 -9810 0"), Notes{"note: gravity is 9810 m/s2; is it in that unit?"});
 }
 
+TEST_F(RunNotes, SubstepsThatAreTooLongAreSaidBeforeTheRun) {
+  const Notes notes = complaints(run({"check", "own/organ.xml", "--set", "dynamics.substeps=3"}));
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_TRUE(notes[0].starts_with("warning: substeps of ")) << notes[0];
+  EXPECT_NE(notes[0].find(" are above the stable "), std::string::npos) << notes[0];
+}
+
+TEST_F(RunNotes, GoldenMomentsThatAreOnePictureAreNotValid) {
+  expectRefused(run({"check", "own/organ.xml", "--set", "output.golden=0.2 0.21"}),
+                "two golden moments are picture 5 at 25 Hz");
+}
+
 TEST_F(RunNotes, TissueTooStiffForExplicitSteps) {
   const auto notesOf = [&](const std::string& young, const std::string& integrator) {
     const Notes notes = complaints(run(
