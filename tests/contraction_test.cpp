@@ -37,7 +37,7 @@ TEST(Contraction, NoInstructionFusesWhatTheSourceDoesNot) {
     std::string address, instruction;
     words >> address >> instruction;
     known += instruction.starts_with("vfmadd");
-    if (fusesUnasked(instruction, function)) fused += instruction + " in " + function;
+    if (fusesUnasked(instruction, function)) fused.append(instruction).append(" in ").append(function);
     line.clear();
   }
   EXPECT_GT(known, 100) << "objdump did not list the program's instructions";

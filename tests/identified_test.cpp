@@ -134,7 +134,8 @@ IdentifiedNetwork chainBehindClique(int slender) {
     IdentifiedFrame& cell = n.frames[i];
     cell.volume = 1e-6;
     cell.secondMoment = 1e-4 / 12 * cell.volume * Eigen::Matrix3d::Identity();
-    cell.restPosition = 0.01 * (i < 5 ? Vector3d(0, int(i) % 2, int(i) / 2) : Vector3d(double(i) - 4, 0, 0));
+    const int row = int(i) / 2;
+    cell.restPosition = 0.01 * (i < 5 ? Vector3d(0, int(i) % 2, row) : Vector3d(double(i) - 4, 0, 0));
   }
   const auto link = [&n](int a, int b) {
     IdentifiedLink l;
