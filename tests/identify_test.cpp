@@ -428,7 +428,7 @@ TEST(IdentifiedNetwork, WhatCannotBeIsRefused) {
   model.spheres.resize(301);
   EXPECT_THROW(identifyNetwork(model, {endOfCylinder(cylinder())}, {}), std::runtime_error);
   settings = {};
-  settings.memoryMax = 1e6;
+  settings.memoryMax = 2e7;
   EXPECT_NE(refusal({endOfCylinder(cylinder())}, settings).find("GB, expected at most 0.0 GB"), std::string::npos);
 }
 
