@@ -20,8 +20,8 @@ class CaptionTimes : public OwnScene {
     const ProgramResult r = run({"render", "own/organ.xml", "--frames", "0:10", "--size", "320x240", "--quality",
                                  "draft", "--show", "caption", "-o", "frames"});
     EXPECT_EQ(r.exitCode, 0) << r.err;
-    std::vector<std::string> out;
-    for (int k = 0; k < 10; ++k) out.push_back(read(fmt::format("frames/{:05}.png", k)));
+    std::vector<std::string> out(10);
+    for (int k = 0; k < 10; ++k) out[k] = read(fmt::format("frames/{:05}.png", k));
     return out;
   }
 };

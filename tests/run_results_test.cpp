@@ -83,7 +83,7 @@ class RunResults : public testing::Test {
   }
   ProgramResult replay(std::vector<std::string> options) const {
     options.insert(options.begin(), {"replay", folder / "scene.xml"});
-    const ProgramResult r = runProgram(options);
+    ProgramResult r = runProgram(options);
     EXPECT_EQ(r.exitCode, 0) << r.err;
     return r;
   }
