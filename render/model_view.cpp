@@ -226,7 +226,7 @@ void ModelView::sortBalls(const Viewpoint& view, const std::vector<DrawnBall>& b
 
 void ModelView::placeRods(const Viewpoint& view, const Drawing& drawing, const DepthFade& fade, bool allOpaque) {
   // Light on dark or dark on light, thin lines look fainter than they are; the thinnest are to be seen.
-  constexpr float kStrength = 1.6f, kFaintest = 0.12f;
+  constexpr float kStrength = 1.6f, kFaintest = 0.25f;
   rods_.clear();
   shafts_.clear();
   heads_.clear();

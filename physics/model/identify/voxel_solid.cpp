@@ -230,8 +230,8 @@ void requireRoom(const TriangleMesh& mesh, double cellSize, double memoryMax) {
   const double bytes = kPerVoxel * (boundsOf(mesh.vertices).sizes() / (cellSize / HexGrid::kVoxels)).prod();
   if (bytes > memoryMax)
     throw OverBudget(
-        fmt::format("finite elements of {:.3g} mm would take {:.2g} GB for the box around a body that lies aslant, "
-                    "expected at most {:.2g} GB: turned along an axis it is smaller",
+        fmt::format("finite elements of {:.3g} mm would take {:.2g} GB for the voxels of the body's box, expected "
+                    "at most {:.2g} GB: of a slender body that lies aslant it is smaller when turned along an axis",
                     1e3 * cellSize, 1e-9 * bytes, 1e-9 * memoryMax));
 }
 
