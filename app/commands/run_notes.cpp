@@ -177,12 +177,7 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
   for (const SceneBody& body : scene.bodies) printRigid(body);
   printUnusedNetworks(scene);
   printIdleLoads(scene, options.isExcerpt);
-  if (scene.dynamics.integrator != Integrator::implicit) {
-    if (world.substep() > world.stableSubstep())
-      tell("warning: substeps of {:.3g} s are above the stable {:.3g} s, and the run may diverge: use more of them\n",
-           world.substep(), world.stableSubstep());
-    return printManySubsteps(world, scene.dynamicsRate);
-  }
+  if (scene.dynamics.integrator != Integrator::implicit) return printManySubsteps(world, scene.dynamicsRate);
   if (scene.dynamics.sleepAfter > 0)
     tell("warning: sleep_after has no effect: bodies sleep under the explicit integrator only\n");
   if (std::any_of(scene.bodies.begin(), scene.bodies.end(),
