@@ -58,7 +58,7 @@ std::string keyLabels() {
                        g.meaning, x, g.points, g.colour);
     x += 0.22;
   }
-  return out + "set label 'dashed: explicit limit' at screen 0.72, 0.012 left offset 1,-0.35\n";
+  return out + "set label 'dashed: explicit limit' at screen 0.72, 0.012 left\n";
 }
 
 }  // namespace
