@@ -188,7 +188,7 @@ void addBite(Builder& b, float side, float angle, float teeth, int perTooth) {
   const auto profile = [valleys, teeth](int halfTooth) {
     const float t = float(halfTooth) / (2 * kTeeth);
     const float y = halfTooth % 2 == 0 && t > 0.2f && t < 0.97f ? valleys : kRidge;
-    const float deep = std::min(0.05f + 6 * t * t, 0.4f + 0.6f * t);  // within the clevis a flat face would mirror the lamp
+    const float deep = std::min(0.05f + 6 * t * t, 0.4f + 0.6f * t);  // in the clevis a flat face mirrors the lamp
     return glm::vec2(y, (y < valleys ? 0.9f : glm::mix(0.9f, 0.3f, teeth)) * deep);
   };
   // Height above the bite's plane and openness, straight from ridge to valley.

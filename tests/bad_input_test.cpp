@@ -284,9 +284,9 @@ TEST_F(BadInput, NumbersOfABuildThatAreNoneAreWrongUsage) {
 }
 
 TEST_F(BadInput, WholeNumbersAreDecimalWhateverStandsBeforeThem) {
+  const std::string mesh = MEDULLA_SOURCE_DIR "/assets/gallbladder/gallbladder.obj";
   for (const char* ten : {"010", "+10", "10"}) {
-    const ProgramResult r =
-        run({"build", MEDULLA_SOURCE_DIR "/assets/gallbladder/gallbladder.obj", "-o", "m.xml", "--spheres", ten});
+    const ProgramResult r = run({"build", mesh, "-o", "m.xml", "--spheres", ten});
     EXPECT_EQ(valueOf(r.out, "spheres"), "10") << ten << ": " << r.err;
   }
 }
