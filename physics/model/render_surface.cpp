@@ -74,12 +74,12 @@ double meanEdge(const TriangleMesh& mesh) {
 
 std::optional<Vector3d> offsetToFine(const SurfaceTree& fine, const LimitPoint& point, double bound) {
   constexpr double kOnIt = 1e-9;  // of the bound: from the surface itself a ray would go on to the opposite wall
-  if (closestPoint(fine, point.position, bound).distance < kOnIt * bound) return Vector3d::Zero();
+  const SurfacePoint nearest = closestPoint(fine, point.position, bound);
+  if (nearest.distance < kOnIt * bound) return Vector3d::Zero();
   const Vector3d normal = point.frame.col(2);
   const double outward = firstHit(fine, point.position, normal, bound);
   const double inward = firstHit(fine, point.position, -normal, bound);
   if (std::isfinite(std::min(outward, inward))) return (outward <= inward ? outward : -inward) * normal;
-  const SurfacePoint nearest = closestPoint(fine, point.position, bound);
   if (!std::isfinite(nearest.distance)) return std::nullopt;
   return nearest.point - point.position;
 }
