@@ -136,6 +136,7 @@ struct ImplicitData {
   // J, per body: twice the energy of the motion that its residual would give its free masses, and what is little
   // enough.
   std::vector<double> left, enough;
+  std::vector<double> reach;    // J, per body: what a stage's speeds can come from, its weight and its loads apart
   std::vector<double> turning;  // J^1/2, per free body: root of twice its energy of turning, times the angle; 0: slow
   std::vector<double> workOfPaths, workOfLoads;  // J, per body, in this stage
   std::vector<EnergyBalance> bodies, islands;    // per body

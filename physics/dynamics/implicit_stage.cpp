@@ -261,10 +261,67 @@ double restEnergy(const ImplicitData& s, double mass) {
 
 namespace {
 
-// From the bodies' residuals where the stage begins: `share` of them. What turns freely may begin far from its own
-// stiff shape, though nothing much acts on it: of such a body, `share` of what does, of its turning and of its strain.
+// Contacts stand first.
+std::size_t contactsAmong(const std::vector<PointLoad>& loads) {
+  const auto isContact = [](const PointLoad& load) { return load.isContact; };
+  return std::partition_point(loads.begin(), loads.end(), isContact) - loads.begin();
+}
+
+// J: of what overlaps, as the contact's spring stores it.
+double energyOf(const WorldData& d, const Contact& c, double duration) {
+  const ContactLaw law = contactLaw(d, c, duration);
+  return c.gap < 0 && law.softness > 0 ? 0.5 * law.bias / law.softness * c.gap / duration : 0;
+}
+
+// J, per body into s.reach: what it has and is led to, its share of what a body has that pushes it, and what contacts
+// store.
+void setReach(const WorldData& d, ImplicitData& s) {
+  s.sums.resize(s.bodies.size());
+  for (std::size_t b = 0; b < s.bodies.size(); ++b) s.sums[b] = s.bodies[b].kineticBefore + s.bodies[b].elasticBefore;
+  for (const SphereDrive& drive : d.drives) {
+    const int body = s.bodyOf[2 * drive.sphere];
+    s.sums[body] = std::max(s.sums[body], 0.5 * s.bodyMass[body] * vectorOf(s.motion[2 * drive.sphere]).squaredNorm());
+  }
+  s.reach = s.sums;
+  const auto strike = [&](int by, int body) {
+    s.reach[body] = std::max(s.reach[body], s.sums[by] * std::min(1.0, s.bodyMass[body] / s.bodyMass[by]));
+  };
+  const std::size_t contacts = contactsAmong(s.loads);
+  const auto visitContacts = [&](const auto& visit) {
+    for (std::size_t k = 0; k < contacts; ++k) {
+      const Contact& c = d.contact.contacts[s.loads[k].index];
+      visit(c, bodiesOf(d, c.key));
+    }
+  };
+  visitContacts([&](const Contact&, const std::array<int, 2>& body) {
+    if (body[1] >= 0) strike(body[1], body[0]), strike(body[0], body[1]);
+  });
+  visitContacts([&](const Contact& c, const std::array<int, 2>& body) {
+    const double stored = energyOf(d, c, s.duration);
+    for (const int b : body)
+      if (b >= 0) s.reach[b] += stored;
+  });
+}
+
+// N s: what tools and dead loads give, without contacts.
+void sumGiven(const ImplicitData& s, Motion& out) {
+  out.assign(s.residual.size(), Quad{});
+  for (std::size_t k = 3 * contactsAmong(s.loads); k < s.rows.size(); ++k)
+    for (int e = s.rows[k].first; e < s.rows[k].end; ++e) {
+      Quad& to = out[s.rowQuad[e]];
+      store(to, fma(splat(s.rows[k].impulse), load(s.rowCoefficient[e]), load(to)));
+    }
+}
+
+// From the bodies' residuals where the stage begins: `share` of them, or less. The first guess may be far from anything
+// that a body can come to: a contact's is its approach over its softness, and what turns about a pin is stretched by
+// its arc. Of stiff bodies a thousandth of these is more than all their momentum, and left in a step it lets friction
+// push past Coulomb's limit and holds up what falls. So it is `share` of the speeds that weight, loads and energy can
+// bring about at most; of what turns freely and begins along its arc, of what acts, of its turning and of its strain.
 void setEnough(const WorldData& d, ImplicitData& s, double share) {
   s.enough.resize(s.left.size());
+  setReach(d, s);
+  sumGiven(s, s.change);
   for (std::size_t b = 0; b < s.left.size(); ++b) {
     const double weight = s.duration * vectorOf(d.gravity).norm() * std::sqrt(s.bodyMass[b]);
     // Of what is free to move: to hold a body at rest takes what rounding leaves of its links' torques, and a
@@ -273,7 +330,9 @@ void setEnough(const WorldData& d, ImplicitData& s, double share) {
                             const Vector3d free = vectorOf(s.freedom[quad]).cwiseProduct(vectorOf(s.balance[quad]));
                             return Vector3d(vectorOf(s.residual[quad]) - free);
                           }));
-    double size = std::sqrt(s.left[b]), least = leastResidual(s) * std::sqrt(s.bodyMass[b]);
+    const double given = impulseEnergy(d, d.ranges[b], [&](int quad) { return vectorOf(s.change[quad]); });
+    const double most = weight + std::sqrt(given) + std::sqrt(2 * s.reach[b]);
+    double size = std::min(std::sqrt(s.left[b]), most), least = leastResidual(s) * std::sqrt(s.bodyMass[b]);
     if (acting > 0) least = std::min(least, kShareOfActing * acting);
     if (s.turning[b] > 0) size = std::min(size, acting + s.turning[b] + std::sqrt(2 * s.bodies[b].elasticBefore));
     const double enough = share * size + least;

@@ -85,7 +85,8 @@ enum class Ending { done, failed, touched };
 // Adds up what a stage takes of free bodies' momenta. The sum of a body's residuals is what Newton's iteration left
 // open, `share` of it lasts. Its spin shrinks besides, because the stage follows tangents: forces balance about the
 // places at its end, and the momenta p0 that they change were about those at its start; for `tangents` s, the sum of u
-// x p0 of motion against the body's own mean motion. For a rigid body turning at w, a rate of T w^2.
+// x p0 of motion against the body's own mean motion, without what is left open of that. For a rigid body turning at w,
+// a rate of T w^2.
 void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents) {
   for (std::size_t b = 0; b < s.lost.size(); ++b) {
     const BodyRange& r = d.ranges[b];
@@ -105,7 +106,7 @@ void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents
     });
     for (const int i : spheresOf(r)) angular += vectorOf(s.residual[2 * i + 1]);
     s.lost[b].linear += share * linear;
-    s.lost[b].angular += share * angular + tangents * (turning - end.cross(start) / whole);
+    s.lost[b].angular += share * angular + tangents * (turning - (end - linear).cross(start) / whole);
   }
 }
 
