@@ -84,11 +84,11 @@ void refuseOtherKinds(const std::string& option, const std::string& path, const 
                                         ".mp4", ".gif", ".webm", ".png",   ".webp", ".html", ".svg", ".md",
                                         ".c",   ".h",   ".cpp",  ".py",    ".sh",   ".json", ".yml"};
   const std::string own = lowered(std::filesystem::path(path).extension().string());
-  if (own.empty() || own == ending) return;
+  if (own == ending) return;
   if (std::find(std::begin(kinds), std::end(kinds), own) != std::end(kinds))
     usageError(option, path, "a file that ends in " + ending);
   std::error_code unknown;
-  if (std::filesystem::exists(path, unknown))
+  if (std::filesystem::is_regular_file(path, unknown))
     usageError(option, path, "a file that ends in " + ending + ", or one that does not exist yet");
 }
 
@@ -183,10 +183,14 @@ void requireCommand(const CLI::App& app, const std::string& word) {
                         CLI::ExitCodes::ExtrasError);
 }
 
-// An empty word, or an option with nothing behind its =, would be taken for one that was not given.
+// An empty word, or an option with nothing behind its =, would be taken for one that was not given; what stands behind
+// -o= for a name with a = before it.
 void requireWords(const std::vector<std::string>& words) {
   for (std::size_t k = 0; k < words.size(); ++k) {
     const std::string& word = words[k];
+    if (word.starts_with("-o="))
+      throw CLI::ParseError(word + ": expected -o " + word.substr(3) + " or --output=" + word.substr(3),
+                            CLI::ExitCodes::ConversionError);
     if (!word.empty() && !(word.starts_with("--") && word.find('=') == word.size() - 1)) continue;
     const std::string name = !word.empty() ? word : k > 0 ? words[k - 1] + " ''" : "''";
     throw CLI::ParseError(name + ": is empty, expected a value", CLI::ExitCodes::ConversionError);

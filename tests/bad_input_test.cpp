@@ -145,6 +145,15 @@ TEST_F(BadInput, APipeIsReadToItsEnd) {
   EXPECT_EQ(readTextFile(path), text);
 }
 
+// A run of less than one picture has one; a camera that sees next to nothing is none.
+TEST_F(BadInput, TinyTimesAndAnglesOfViewDoNotEndTheProgram) {
+  const ProgramResult brief = run({"render", "own/organ.xml", "-o", "brief", "--set", "clock.duration=1e-12", "--set",
+                                   "output.golden=0", "--size", "64x64"});
+  EXPECT_EQ(brief.exitCode, 0) << brief.err;
+  EXPECT_NE(brief.out.find("pictures 1\n"), std::string::npos) << brief.out;
+  expectRefused(run({"check", "own/organ.xml", "--set", "camera.fov=1e-36"}), "expected 1 number >= 0.01 and < 180");
+}
+
 TEST_F(BadInput, OutputsThatAreCalledAsAnotherKindOfFileAreWrongUsage) {
   const std::string mesh = MEDULLA_SOURCE_DIR "/tests/accuracy/cylinder.obj";
   const std::string victim = read("own/organ.xml");
@@ -156,11 +165,14 @@ TEST_F(BadInput, OutputsThatAreCalledAsAnotherKindOfFileAreWrongUsage) {
   expectRefused(run({"render", "own/organ.xml", "--log", "{scene}.obj", "-o", "a.mp4"}), "--log organ.obj: expected",
                 2);
   expectRefused(run({"render", "own/organ.xml", "--log", "own/{scene}.xml", "-o", "a.mp4"}), "ends in .csv", 2);
-  folder.write("organ.txt", "mine");
-  for (const char* option : {"--log", "--frame-times", "--record"})
-    expectRefused(run({"render", "own/organ.xml", option, "{scene}.txt", "-o", "a.mp4"}), "does not exist yet", 2);
-  EXPECT_EQ(read("organ.txt"), "mine");
-  std::filesystem::remove(folder / "organ.txt");
+  for (const std::string ending : {".txt", ""}) {
+    folder.write("organ" + ending, "mine");
+    for (const char* option : {"--log", "--frame-times", "--record"})
+      expectRefused(run({"render", "own/organ.xml", option, "{scene}" + ending, "-o", "a.mp4"}), "does not exist yet",
+                    2);
+    EXPECT_EQ(read("organ" + ending), "mine");
+    std::filesystem::remove(folder / ("organ" + ending));
+  }
   expectRefused(run({"replay", "own/organ.xml", "--surface-at", "end", "own/organ.xml"}), "ends in .obj", 2);
   expectRefused(run({"build", mesh, "-o", "own/organ.ply"}), "-o own/organ.ply: expected a file that ends in .xml", 2);
   expectRefused(run({"build", mesh, "-o", "m.xml", "--report", "own/organ.xml"}), "--report own/organ.xml: exp", 2);

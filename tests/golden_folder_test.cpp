@@ -107,6 +107,31 @@ TEST_F(GoldenFolder, AnImageThatNoMomentNamesFailsUntilAnUpdateRemovesIt) {
   EXPECT_EQ(golden({}).exitCode, 0);
 }
 
+TEST_F(GoldenFolder, PicturesOfAFailureGoWithTheirMoment) {
+  write({.cameraTarget = -0.03});
+  EXPECT_EQ(golden({"own/organ.xml"}).exitCode, 3);
+  EXPECT_TRUE(std::filesystem::exists(folder / "out/golden/organ_8_difference.png"));
+  write({.golden = "0.4"});
+  EXPECT_EQ(golden({"own/organ.xml", "--update", "organ"}).exitCode, 0);
+  EXPECT_EQ(golden({"own/organ.xml"}).exitCode, 0);
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "out/golden"))
+    EXPECT_EQ(entry.path().filename(), "report.html");
+}
+
+TEST_F(GoldenFolder, TheReportShowsWhatHasNoGoldenImageOrAnotherSize) {
+  const auto picturesIn = [&] {
+    EXPECT_EQ(golden({"own/organ.xml"}).exitCode, 3);
+    const std::string report = read("out/golden/report.html"), image = "src=\"data:image/png";
+    int count = 0;
+    for (std::size_t at = report.find(image); at != std::string::npos; at = report.find(image, at + 1)) ++count;
+    return count;
+  };
+  std::filesystem::rename(folder / "pictures/organ_8.png", folder / "aside.png");
+  EXPECT_EQ(picturesIn(), 1);
+  std::filesystem::copy_file(MEDULLA_SOURCE_DIR "/golden_images/gallbladder_84.png", folder / "pictures/organ_8.png");
+  EXPECT_EQ(picturesIn(), 2);
+}
+
 TEST_F(GoldenFolder, NothingIsStoredWhereOneImageCannotBe) {
   write({.cameraTarget = -0.03});
   const std::string before = read("pictures/organ_8.png");

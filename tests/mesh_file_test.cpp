@@ -233,7 +233,7 @@ static std::string asciiStl() {
   return text + "endsolid a\n";
 }
 
-TEST(MeshFile, StlComesThroughAssimpWithItsCornersJoined) {
+TEST(MeshFile, StlHasItsCornersJoined) {
   const TemporaryFolder folder;
   const TriangleMesh stl = readMesh(written(folder, "a.stl", asciiStl()), 0.01);
   EXPECT_EQ(stl.vertices.size(), 4u);
@@ -241,7 +241,7 @@ TEST(MeshFile, StlComesThroughAssimpWithItsCornersJoined) {
   EXPECT_NEAR(stl.vertices[1].norm(), 0.01, 1e-9);
 }
 
-TEST(MeshFile, BadAssimpFilesAreRefusedInOneLine) {
+TEST(MeshFile, BadFilesOfOtherFormatsAreRefusedInOneLine) {
   const TemporaryFolder folder;
   for (const std::string name : {"a.stl", "a.ply", "a.gltf", "a.3ds", "a.dae", "a.x"}) {
     const std::string path = written(folder, name, "this is no mesh\nat all\n");
@@ -250,7 +250,17 @@ TEST(MeshFile, BadAssimpFilesAreRefusedInOneLine) {
   std::string text = asciiStl();
   text.replace(text.find("vertex 1 0 0"), 12, "vertex nan 0 0");
   const std::string path = written(folder, "nan.stl", text);
-  EXPECT_TRUE(complaintOf([&] { readMesh(path); }).starts_with(path + ": "));
+  EXPECT_TRUE(complaintOf([&] { readMesh(path); }).starts_with(path + ":6: "));
+}
+
+// Of these assimp takes any bytes for a skeleton, or does not end on damaged ones.
+TEST(MeshFile, FormatsThatAreNotForExchangeAreNotRead) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"a.ase", "a.md5mesh", "a.lws", "a.blend"}) {
+    const std::string path = written(folder, name, std::string(64, '\0'));
+    EXPECT_FALSE(isMeshFile(path));
+    EXPECT_TRUE(complaintOf([&] { readMesh(path); }).starts_with(path + ": unknown mesh format '.")) << name;
+  }
 }
 
 TEST(MeshFile, FilesWithoutTrianglesAreRefused) {

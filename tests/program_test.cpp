@@ -310,6 +310,7 @@ TEST(ProgramRefuses, WrongUsageWithCodeTwo) {
   expectRefusal(runProgram({"replay", kScene, "--surface-at", "end", "/tmp/x.stl"}), 2, {".obj"});
   expectRefusal(runProgram({"replay", kScene, "--record", "/tmp/x.csv", "--record", "/tmp/y.csv"}), 2,
                 {"--record", "one file per tool"});
+  expectRefusal(runProgram({"render", kScene, "-o=a.mp4"}), 2, {"-o=a.mp4: expected -o a.mp4"});
   expectRefusal(runProgram({"replay", kScene, "--record", "=r.csv"}), 2, {"a name of the scene before the ="});
   for (const char* embree : {"isa=mmx", "threads=0", "threads=two", "avx2", "isa=sse2,,"})
     expectRefusal(runProgram({"replay", kScene, "--embree", embree}), 2, {"--embree", "avx2"});

@@ -124,6 +124,7 @@ GoldenResult compare(const Moment& moment, const std::string& scene, const std::
   GoldenResult r;
   r.name = moment.name;
   r.scene = scene;
+  r.actual = moment.image;  // until it is equal
   if (!fileExists(goldenPath)) {
     r.verdict = fmt::format("{} does not exist: --update {} stores it", goldenPath, shellWord(scene));
     return r;
@@ -140,6 +141,7 @@ GoldenResult compare(const Moment& moment, const std::string& scene, const std::
   if (golden.width != moment.image.width || golden.height != moment.image.height) {
     r.verdict =
         fmt::format("size {}x{}, golden {}x{}", moment.image.width, moment.image.height, golden.width, golden.height);
+    r.expected = std::move(golden);
     return r;
   }
   const ImageDifference d = compareImages(moment.image, golden);
@@ -150,13 +152,13 @@ GoldenResult compare(const Moment& moment, const std::string& scene, const std::
   r.passed = sameRenderer && change.empty() ? d.equal : withinTolerance(d);
   if (d.equal) {
     r.verdict = "equal";
+    r.actual = {};
     return r;
   }
   r.verdict = fmt::format("{:.4f} % of pixels over 4, {} over 16, PSNR {:.1f} dB, FLIP {:.5f}; {}, renderer {}",
                           d.overFourPercent, d.overSixteen, d.psnr, flipMean(moment.image, golden),
                           change.empty() ? "state as stored" : change, sameRenderer ? "as stored" : "differs");
   r.expected = std::move(golden);
-  r.actual = moment.image;
   return r;
 }
 
@@ -252,6 +254,9 @@ int updateImages(const std::vector<std::string>& scenes, const GoldenOptions& op
 
 // ---- Comparing -------------------------------------------------------------------------------------------
 
+// Behind a moment's name, of pictures in the folder of failures.
+constexpr const char *kActualEnding = "_actual.png", *kDifferenceEnding = "_difference.png";
+
 struct Comparison {
   std::string renderedWith;
   std::vector<GoldenResult> results;
@@ -270,18 +275,29 @@ void addFailure(const std::string& name, const std::string& scene, const std::st
   add(std::move(result), comparison);
 }
 
-// In the folder of failures; those of a former run go.
-void writeFailure(const GoldenResult& r, const Image& drawn, const std::string& folder) {
-  const std::string stem = folder + "/" + r.name, actual = stem + "_actual.png", difference = stem + "_difference.png";
-  std::error_code missing;
-  for (const std::string& earlier : {actual, difference}) fs::remove(earlier, missing);
-  if (r.passed || drawn.pixels.empty()) return;
-  writePng(actual, drawn);
-  if (!r.expected.pixels.empty()) writePng(difference, amplifiedDifference(r.actual, r.expected, kGain));
+// What a former run left of the scene in the folder of failures, also of moments that it no longer has.
+void removeEarlierFailures(const std::string& scene, const std::string& folder) {
+  std::error_code failure;
+  std::vector<fs::path> earlier;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, failure))
+    for (const std::string ending : {kActualEnding, kDifferenceEnding}) {
+      const std::string file = entry.path().filename().string();
+      if (file.ends_with(ending) && namesMomentOf(file.substr(0, file.size() - ending.size()), scene))
+        earlier.push_back(entry.path());
+    }
+  for (const fs::path& path : earlier) fs::remove(path, failure);
+}
+
+void writeFailure(const GoldenResult& r, const std::string& folder) {
+  if (r.passed) return;
+  writePng(folder + "/" + r.name + kActualEnding, r.actual);
+  if (hasDifference(r))
+    writePng(folder + "/" + r.name + kDifferenceEnding, amplifiedDifference(r.actual, r.expected, kGain));
 }
 
 void compareScene(const std::string& path, const GoldenOptions& options, Comparison& comparison) {
   std::vector<Moment> moments;
+  removeEarlierFailures(path, options.failures);
   try {
     moments = renderMoments(path, options.context);
   } catch (const std::runtime_error& error) {
@@ -290,14 +306,12 @@ void compareScene(const std::string& path, const GoldenOptions& options, Compari
   }
   const std::string folder = goldenFolderOf(path, options);
   for (const Moment& m : moments) {
-    GoldenResult r = compare(m, path, fmt::format("{}/{}.png", folder, m.name), comparison.renderedWith);
-    writeFailure(r, m.image, options.failures);
-    add(std::move(r), comparison);
+    add(compare(m, path, fmt::format("{}/{}.png", folder, m.name), comparison.renderedWith), comparison);
+    writeFailure(comparison.results.back(), options.failures);
   }
   for (const StrayImage& image : formerMoments(path, folder, namesOf(moments))) {
     const std::string former = fmt::format("no moment of {}: --update {} removes it", path, stemOf(path));
     addFailure(image.name, path, image.fault.empty() ? former : image.fault, comparison);
-    writeFailure(comparison.results.back(), {}, options.failures);
   }
 }
 

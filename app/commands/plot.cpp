@@ -41,7 +41,7 @@ int runPlot(const PlotOptions& options) {
     throw std::runtime_error(
         fmt::format("{}: gnuplot is not installed, expected it (Debian package gnuplot-nox)", options.output));
   writeFile(options.output, *picture);
-  fmt::print("file {}\n", std::filesystem::absolute(path).lexically_normal().string());
+  fmt::print("file {}\n", normalised(std::filesystem::absolute(path)).string());
   return 0;
 }
 

@@ -84,7 +84,7 @@ void printTimings(const Timings& run, const Artist& artist, int pictures) {
 
 void printFiles(const RenderOptions& options, const Artist& artist, double wall) {
   for (const std::string& path : options.outputs)
-    fmt::print("file {}\n", std::filesystem::absolute(path).lexically_normal().string());
+    fmt::print("file {}\n", normalised(std::filesystem::absolute(path)).string());
   fmt::print("pictures {}\n", artist.drawn());
   fmt::print("pictures_per_second {:.4g}\n", artist.drawn() / wall);
 }

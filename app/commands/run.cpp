@@ -61,7 +61,7 @@ LoadedScene loadRun(const RunOptions& options) {
 }
 
 int pictureCount(const Scene& scene) {
-  return static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9));
+  return std::max(1, static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9)));
 }
 
 std::vector<int> goldenPictures(const Scene& scene) {

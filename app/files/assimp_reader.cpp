@@ -3,12 +3,16 @@
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <exception>
+#include <iterator>
 #include <stdexcept>
+#include <string_view>
 
 #include "app/files/input_error.h"
 
@@ -24,15 +28,17 @@ namespace medulla {
 
 namespace {
 
-// One line, whatever assimp had to say.
+// One line, whatever assimp had to say: it may quote all that is left of a file.
 std::string oneLine(std::string text) {
+  constexpr std::size_t kLongest = 200;
+  if (text.size() > kLongest) text = text.substr(0, kLongest) + "...";
   std::replace_if(
       text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
   return text.empty() ? "no reason given" : text;
 }
 
 const aiScene* import(Assimp::Importer& importer, const std::string& path) {
-  // Everything but positions is dropped before joining: facet normals of an STL would keep its corners apart.
+  // Everything but positions is dropped before joining: facets' own normals would keep their corners apart.
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, ~static_cast<int>(aiComponent_MESHES));
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   constexpr unsigned kSteps = aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_SortByPType |
@@ -47,15 +53,25 @@ const aiScene* import(Assimp::Importer& importer, const std::string& path) {
     reason = e.what();
   }
   if (scene == nullptr) throw inputError(path, 0, "not a readable mesh: " + oneLine(reason));
+  if (scene->mFlags & AI_SCENE_FLAGS_INCOMPLETE) throw inputError(path, 0, "holds no mesh");
   return scene;
 }
 
 }  // namespace
 
+// Of the seventy that assimp takes, those that meshes are exchanged in. Among the others are scenes and motions that
+// name meshes and are none: assimp 5.2 crashes on an empty .lws, does not end on a damaged .md5mesh, and takes any
+// bytes under .ase for a skeleton, for which it puts an octahedron.
+constexpr std::string_view kFormats[] = {".3ds", ".3mf",  ".ac",  ".amf", ".dae", ".dxf", ".fbx",
+                                         ".glb", ".gltf", ".lwo", ".wrl", ".x",   ".x3d"};
+
 bool assimpReads(const std::string& extension) {
-  // LightWave's scenes and motions name meshes and are none: assimp 5.2 crashes on an empty one.
-  if (extension.empty() || extension == ".lws" || extension == ".mot") return false;
-  return Assimp::Importer().IsExtensionSupported(extension);
+  return std::find(std::begin(kFormats), std::end(kFormats), extension) != std::end(kFormats) &&
+         Assimp::Importer().IsExtensionSupported(extension);
+}
+
+std::string assimpFormats() {
+  return fmt::format("{}", fmt::join(kFormats, ", "));
 }
 
 TriangleMesh readWithAssimp(const std::string& path) {

@@ -6,10 +6,11 @@
 
 namespace medulla {
 
-// Whether assimp knows the extension, given with its dot and in lower case.
+// Whether this is a format that assimp reads for us; extensions have their dot and are in lower case.
 bool assimpReads(const std::string& extension);
+std::string assimpFormats();  // all of them, for complaints
 
-// Any format that assimp knows, single precision, all meshes of the file in one, placed as its scene says; identical
+// Any of these formats, single precision, all meshes of the file in one, placed as its scene says; identical
 // vertices are joined. Coordinates as they stand. Throws std::runtime_error "FILE: ..." with assimp's own reason, and
 // on NaN, infinity and files without triangles.
 TriangleMesh readWithAssimp(const std::string& path);

@@ -30,6 +30,7 @@ figcaption { color: #555; font-size: 13px; padding: .2em 0; }
 constexpr const char* kTail = R"(<script>
 for (const box of document.querySelectorAll('.pictures')) {
   const [expected, actual, , flicker] = box.querySelectorAll('img');
+  if (!flicker) continue;
   const caption = box.querySelector('figcaption.flicker'), idle = caption.textContent;
   let timer = 0, second = false;
   const show = () => {
@@ -63,15 +64,34 @@ std::string figure(const Image& image, const std::string& caption) {
       base64(encodePng(image)));
 }
 
+bool hasPictures(const GoldenResult& r) {
+  return !r.expected.pixels.empty() || !r.actual.pixels.empty();
+}
+
 std::string row(const GoldenResult& r) {
   const std::string name =
-      r.expected.pixels.empty() ? escapedXml(r.name) : fmt::format("<a href=\"#{0}\">{0}</a>", escapedXml(r.name));
+      !hasPictures(r) ? escapedXml(r.name) : fmt::format("<a href=\"#{0}\">{0}</a>", escapedXml(r.name));
   return fmt::format("<tr><td>{}</td><td class=\"{}\">{}</td><td>{}</td><td>{}<br>{}</td></tr>\n", name,
                      r.passed ? "passed" : "failed", r.passed ? "ok" : "failed", escapedXml(r.verdict),
                      escapedXml(r.stored.renderer), escapedXml(r.stored.processor));
 }
 
+std::string pictures(const GoldenResult& r) {
+  std::string out;
+  if (!r.expected.pixels.empty()) out += figure(r.expected, "expected");
+  if (!r.actual.pixels.empty()) out += figure(r.actual, "actual");
+  if (!hasDifference(r)) return out;
+  out += figure(amplifiedDifference(r.actual, r.expected, kGain), fmt::format("difference, {} times", kGain));
+  return out +
+         "<figure><img alt=\"flicker\"><figcaption class=\"flicker\">expected; under the mouse it flickers with "
+         "the actual one</figcaption></figure>\n";
+}
+
 }  // namespace
+
+bool hasDifference(const GoldenResult& r) {
+  return !r.expected.pixels.empty() && r.expected.width == r.actual.width && r.expected.height == r.actual.height;
+}
 
 void writeGoldenReport(const std::string& path, const std::vector<GoldenResult>& results, const DrawnWith& now) {
   const auto failed = std::count_if(results.begin(), results.end(), [](const GoldenResult& r) { return !r.passed; });
@@ -85,18 +105,14 @@ void writeGoldenReport(const std::string& path, const std::vector<GoldenResult>&
   for (const GoldenResult& r : results) file.write(row(r));
   file.write("</table>\n");
   for (const GoldenResult& r : results) {
-    if (r.expected.pixels.empty()) continue;
+    if (!hasPictures(r)) continue;
     file.write(
         fmt::format("<h2 id=\"{0}\">{0} <span class=\"{1}\">{2}</span></h2>\n<p>{3}<br>{4}</p>\n"
                     "<div class=\"pictures\">\n",
                     escapedXml(r.name), r.passed ? "passed" : "failed", r.passed ? "ok" : "failed", escapedXml(r.scene),
                     escapedXml(r.verdict)));
-    file.write(figure(r.expected, "expected"));
-    file.write(figure(r.actual, "actual"));
-    file.write(figure(amplifiedDifference(r.actual, r.expected, kGain), fmt::format("difference, {} times", kGain)));
-    file.write(
-        "<figure><img alt=\"flicker\"><figcaption class=\"flicker\">expected; under the mouse it flickers with "
-        "the actual one</figcaption></figure>\n</div>\n");
+    file.write(pictures(r));
+    file.write("</div>\n");
   }
   file.write(kTail);
   file.commit();

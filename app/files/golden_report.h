@@ -20,12 +20,14 @@ struct GoldenResult {
   bool passed = false;
   std::string verdict;     // one line: figures, or why there are none
   DrawnWith stored;        // of the golden image; empty where that says nothing
-  Image expected, actual;  // same size; empty where there is nothing to look at
+  Image expected, actual;  // empty where there is nothing to look at
 };
 
+bool hasDifference(const GoldenResult& result);  // two pictures of one size
+
 // An HTML page that needs no other file: every moment with its verdict; of those with pictures the expected and the
-// actual one, their difference amplified, and one that flickers between the two under the mouse. Written through
-// OutputFile; throws as that does.
+// actual one; of those of one size their difference amplified, and one that flickers between the two under the mouse.
+// Written through OutputFile; throws as that does.
 void writeGoldenReport(const std::string& path, const std::vector<GoldenResult>& results, const DrawnWith& now);
 
 }  // namespace medulla

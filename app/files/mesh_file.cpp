@@ -8,6 +8,7 @@
 #include "app/files/obj_reader.h"
 #include "app/files/off_reader.h"
 #include "app/files/ply_reader.h"
+#include "app/files/stl_reader.h"
 #include "app/files/text.h"
 #include "app/files/text_file.h"
 
@@ -45,7 +46,7 @@ double metresPerUnit(const std::string& unit) {
 
 bool isMeshFile(const std::string& path) {
   const std::string extension = extensionOf(path);
-  return extension == ".obj" || extension == ".off" || extension == ".ply" ||
+  return extension == ".obj" || extension == ".off" || extension == ".ply" || extension == ".stl" ||
          (extension != ".xml" && assimpReads(extension));
 }
 
@@ -59,12 +60,14 @@ TriangleMesh readMesh(const std::string& path, double metresPerFileUnit) {
     mesh = parseOff(readTextFile(path), path);
   } else if (extension == ".ply") {
     mesh = parsePly(readTextFile(path), path);
+  } else if (extension == ".stl") {
+    mesh = parseStl(readBytes(path), path);
   } else if (assimpReads(extension)) {
     mesh = readWithAssimp(path);
   } else {
-    throw inputError(
-        path, 0,
-        "unknown mesh format '" + extension + "', expected .obj, .off, .stl, .ply or another that assimp reads");
+    throw inputError(path, 0,
+                     "unknown mesh format '" + extension +
+                         "', expected .obj, .off, .stl, .ply, or one that assimp reads: " + assimpFormats());
   }
   for (auto& vertex : mesh.vertices) vertex *= metresPerFileUnit;
   return mesh;

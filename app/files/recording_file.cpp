@@ -45,6 +45,8 @@ std::string locate(const ColumnChoice& choice, const std::vector<std::string>& h
   for (const std::string& column : choice) {
     const auto number = parseNumber<int>(column);
     const auto found = std::find(header.begin(), header.end(), column);
+    if (found != header.end() && std::find(found + 1, header.end(), column) != header.end())
+      return fmt::format("column {} stands more than once in the header, expected its number", inQuotes(column));
     if (found != header.end())
       out.push_back(static_cast<std::size_t>(found - header.begin()));
     else if (number && *number >= 1 && static_cast<std::size_t>(*number) <= count)
@@ -55,6 +57,8 @@ std::string locate(const ColumnChoice& choice, const std::vector<std::string>& h
       return fmt::format("column {} is wanted, but the file has no header", inQuotes(column));
     else
       return fmt::format("no column {}; {}", inQuotes(column), hintOfNames(column, header));
+    if (std::find(out.begin(), out.end() - 1, out.back()) != out.end() - 1)
+      return fmt::format("column {} is wanted twice for one thing", inQuotes(column));
   }
   return "";
 }
@@ -242,7 +246,8 @@ Trajectory parseRecording(std::string_view text, const std::string& name, const 
     sample.time += map.delay - map.from;
     addSample(trajectory, sample, name, rows[k].line);
     if (hasForce)
-      trajectory.measuredForces.push_back(map.worldFromRecording.linear() * map.mirror.cwiseProduct(rows[k].force));
+      addMeasuredForce(trajectory, map.worldFromRecording.linear() * map.mirror.cwiseProduct(rows[k].force), name,
+                       rows[k].line);
   }
   if (trajectory.samples.empty())
     throw inputError(map.path, map.line,

@@ -332,7 +332,7 @@ CameraKey readCameraKey(const XmlElement& e, CameraKey key) {
   key.time = readNumber(e, "t", 0, kNotNegative);
   key.position = readVector(e, "position", key.position, kAnyPlace);
   key.target = readVector(e, "target", key.target, kAnyPlace);
-  key.fovDegrees = readNumber(e, "fov", key.fovDegrees, {0, 180, true, true});
+  key.fovDegrees = readNumber(e, "fov", key.fovDegrees, {0.01, 180, false, true});
   if (key.position == key.target) refuse(e, "position", "position and target are the same point");
   return key;
 }
@@ -374,7 +374,7 @@ void readCaptions(const XmlElement& output, Scene& scene) {
                          readText(*e, "text")};
     if (caption.text.empty()) refuse(*e, "text", "expected words");
     if (const std::string_view undrawn = firstUndrawn(caption.text); !undrawn.empty())
-      refuse(*e, "text", fmt::format("expected Latin letters, digits and signs, not \"{}\"", undrawn));
+      refuse(*e, "text", "expected Latin letters, digits and signs, not " + inQuotes(undrawn));
     if (caption.to <= caption.from) refuse(*e, "to", "expected a later time than from");
     if (!scene.captions.empty() && caption.from < scene.captions.back().to)
       refuse(*e, "from", "expected no earlier time than the end of the caption before it");

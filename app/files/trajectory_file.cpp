@@ -77,6 +77,15 @@ void addSample(Trajectory& trajectory, ToolSample sample, const std::string& nam
   trajectory.samples.push_back(sample);
 }
 
+void addMeasuredForce(Trajectory& trajectory, const Eigen::Vector3d& force, const std::string& name, int line) {
+  constexpr double kForceReach = 1e6;  // N
+  for (int k = 0; k < 3; ++k)
+    if (!(std::abs(force[k]) <= kForceReach))
+      throw inputError(name, line,
+                       fmt::format("measured force {} is {} N, expected within {} N", "xyz"[k], force[k], kForceReach));
+  trajectory.measuredForces.push_back(force);
+}
+
 static ToolSample sampleOfRow(const std::vector<double>& row, const CsvRows& rows) {
   ToolSample sample;
   sample.time = row[time];
@@ -107,7 +116,7 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name) {
                       "takes stamps of any clock",
                       row[time]));
     addSample(trajectory, sampleOfRow(row, rows), name, rows.line());
-    if (columns > requiredColumns) trajectory.measuredForces.emplace_back(row[fx], row[fy], row[fz]);
+    if (columns > requiredColumns) addMeasuredForce(trajectory, {row[fx], row[fy], row[fz]}, name, rows.line());
   }
   if (trajectory.samples.empty()) throw inputError(name, 0, "no rows after the header, expected at least one");
   return trajectory;

@@ -21,6 +21,8 @@ Trajectory parseTrajectory(std::string_view text, const std::string& name);
 // "FILE:LINE: ..." for another length, a position beyond kToolReach, a time beyond 1e9 s and one that is not after the
 // one before.
 void addSample(Trajectory& trajectory, ToolSample sample, const std::string& name, int line);
+// N, world frame, of the latest sample. Throws "FILE:LINE: ..." beyond 1 MN: squares of such are summed up.
+void addMeasuredForce(Trajectory& trajectory, const Eigen::Vector3d& force, const std::string& name, int line);
 
 // Writes the format that readTrajectory() reads, with the force columns, every number to the last bit. Errors are those
 // of OutputFile.

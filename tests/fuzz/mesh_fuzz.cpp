@@ -7,6 +7,7 @@
 #include "app/files/obj_reader.h"
 #include "app/files/off_reader.h"
 #include "app/files/ply_reader.h"
+#include "app/files/stl_reader.h"
 #include "physics/model/mesh_repair.h"
 #include "physics/model/mesh_topology.h"
 
@@ -34,10 +35,11 @@ static void requireWhole(const RepairedMesh& out, const TriangleMesh& input) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   try {
-    const medulla::TriangleMesh mesh = text.starts_with("ply") ? medulla::parsePly(text, "fuzz.ply")
-                                       : text.substr(0, 16).find("OFF") != std::string_view::npos
-                                           ? medulla::parseOff(text, "fuzz.off")
-                                           : medulla::parseObj(text, "fuzz.obj");
+    const medulla::TriangleMesh mesh =
+        text.starts_with("ply")                                                    ? medulla::parsePly(text, "fuzz.ply")
+        : text.starts_with("solid") || text.starts_with(std::string_view("\0", 1)) ? medulla::parseStl(text, "fuzz.stl")
+        : text.substr(0, 16).find("OFF") != std::string_view::npos                 ? medulla::parseOff(text, "fuzz.off")
+                                                                   : medulla::parseObj(text, "fuzz.obj");
     medulla::requireWhole(medulla::repairMesh(mesh), mesh);
   } catch (const std::runtime_error& e) {
     medulla::require(std::string_view(e.what()).find('\n') == std::string_view::npos);
