@@ -96,6 +96,12 @@ TEST(Plot, WritesPngAndSvgOfWhatALogHolds) {
   ASSERT_EQ(plot(folder / "one.csv", folder / "one.svg").exitCode, 0);
   EXPECT_TRUE(has(readFile(folder / "one.svg"), "hook: force on the hand, N"));
   EXPECT_EQ(plot(folder / "run.csv", folder / "run.csv/a.png").exitCode, 1);
+  folder.write("cut.csv", shortLog().substr(0, shortLog().size() - 8));
+  const ProgramResult cut = plot(folder / "cut.csv", folder / "cut.svg");
+  EXPECT_EQ(cut.exitCode, 0) << cut.err;
+  EXPECT_TRUE(has(cut.err, "cut.csv ends in the midst of a row: the rows before it are drawn\n")) << cut.err;
+  folder.write("noted.csv", "\n# my run\n" + shortLog());
+  EXPECT_TRUE(runProgram({"info", folder / "noted.csv"}).out.starts_with("kind log\n"));
 }
 
 // gnuplot runs what stands between backticks, unless it is told not to.

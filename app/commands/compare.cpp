@@ -163,7 +163,7 @@ void noteCut(const LogTable& log) {
 }
 
 int compareLogs(const CompareOptions& options) {
-  const LogTable a = readLog(options.a, true), b = readLog(options.b, true);
+  const LogTable a = readLog(options.a), b = readLog(options.b);
   noteCut(a);
   noteCut(b);
   const auto [inA, inB] = std::mismatch(a.columns.begin(), a.columns.end(), b.columns.begin(), b.columns.end());

@@ -5,6 +5,7 @@
 #include "app/commands/commands.h"
 #include "app/commands/mesh_notes.h"
 #include "app/enum_names.h"
+#include "app/files/csv_rows.h"
 #include "app/files/input_error.h"
 #include "app/files/log_table.h"
 #include "app/files/mesh_file.h"
@@ -203,7 +204,7 @@ std::vector<Result> cacheResults(const std::string& path) {
 }
 
 std::vector<Result> logResults(const std::string& path) {
-  const LogTable log = readLog(path, true);
+  const LogTable log = readLog(path);
   if (log.isCut) tell("{}: note: ends in the midst of a row\n", path);
   std::vector<Result> results = {
       {"kind", "log", ""}, {"rows", numberText(log.value.size()), ""}, {"columns", numberText(log.columns.size()), ""}};
@@ -219,7 +220,9 @@ std::vector<Result> tableResults(const std::string& path, const std::string& tab
         path, 0,
         "is of no kind that is known here, expected a mesh, a model, a scene, a trajectory, a recording, a "
         "log or a state cache");
-  const bool isLog = table.substr(0, table.find('\n')).find(",energy.kinetic,") != std::string::npos;
+  CsvRows rows(table, path);
+  const bool isLog =
+      rows.next() && std::find(rows.cells().begin(), rows.cells().end(), "energy.kinetic") != rows.cells().end();
   return isLog ? logResults(path) : trajectoryResults(readTrajectory(path));
 }
 

@@ -22,6 +22,13 @@ static void noteOtherRun(const LogTable& log, const LogTable& frameTimes) {
     tell("note: {} ends at {:.6g} s, {} at {:.6g} s: are they of one run?\n", log.path, end, frameTimes.path, other);
 }
 
+// Of a run that was killed, or goes on.
+static LogTable readTable(const std::string& path) {
+  LogTable table = readLog(path);
+  if (table.isCut) tell("note: {} ends in the midst of a row: the rows before it are drawn\n", path);
+  return table;
+}
+
 int runPlot(const PlotOptions& options) {
   const std::filesystem::path path = options.output;
   if (path.extension() != ".png" && path.extension() != ".svg")
@@ -29,9 +36,9 @@ int runPlot(const PlotOptions& options) {
   std::vector<std::string> inputs{options.log};
   if (!options.frameTimes.empty()) inputs.push_back(options.frameTimes);
   requireDistinctFiles({options.output}, inputs);
-  const LogTable log = readLog(options.log);
+  const LogTable log = readTable(options.log);
   std::optional<LogTable> frameTimes;
-  if (!options.frameTimes.empty()) frameTimes = readLog(options.frameTimes);
+  if (!options.frameTimes.empty()) frameTimes = readTable(options.frameTimes);
   const PlotFormat format = path.extension() == ".png" ? PlotFormat::png : PlotFormat::svg;
   const std::string script =
       plotScript(log, frameTimes ? &*frameTimes : nullptr, std::filesystem::path(options.log).stem().string(), format);

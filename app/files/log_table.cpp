@@ -24,7 +24,7 @@ static bool endsWithin(const CsvRows& rows, std::ptrdiff_t open, std::size_t col
   return rows.cells().size() < columns || (rows.cells().size() == columns && !parseNumber<double>(rows.cells().back()));
 }
 
-LogTable readLog(const std::string& path, bool mayBeCut) {
+LogTable readLog(const std::string& path) {
   LogTable table;
   table.path = path;
   table.content = std::make_shared<const std::string>(readTextFile(path));
@@ -35,7 +35,7 @@ LogTable readLog(const std::string& path, bool mayBeCut) {
   table.columns.assign(rows.cells().begin(), rows.cells().end());
   if (table.columns[0] != "t") rows.fail("this is no log: expected a header that begins with the column t");
   const std::string expected = fmt::format("{} as in the header", table.columns.size());
-  const std::ptrdiff_t open = mayBeCut ? openLine(text) : 0;
+  const std::ptrdiff_t open = openLine(text);
   while (rows.next()) {
     checkInterrupt();
     table.isCut = endsWithin(rows, open, table.columns.size());

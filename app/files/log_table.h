@@ -19,8 +19,8 @@ struct LogTable {
 };
 
 // Throws std::runtime_error "FILE:LINE: ..." where it is missing or has no header, and on rows that have not as many
-// cells as the header or a cell that is no finite number, or whose time goes back. With `mayBeCut` a last row without
-// its end, as a full disk or a killed copy leaves it, is no fault.
-LogTable readLog(const std::string& path, bool mayBeCut = false);
+// cells as the header or a cell that is no finite number, or whose time goes back. A last row without its end, as a
+// full disk or a killed copy leaves it, is no fault: see isCut.
+LogTable readLog(const std::string& path);
 
 }  // namespace medulla
