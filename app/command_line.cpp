@@ -84,7 +84,7 @@ void refuseOtherKinds(const std::string& option, const std::string& path, const 
                                         ".mp4", ".gif", ".webm", ".png",   ".webp", ".html", ".svg", ".md",
                                         ".c",   ".h",   ".cpp",  ".py",    ".sh",   ".json", ".yml"};
   const std::string own = lowered(std::filesystem::path(path).extension().string());
-  if (own == ending) return;
+  if (own == ending || path.starts_with("/dev/")) return;  // streams, pipes and devices
   if (std::find(std::begin(kinds), std::end(kinds), own) != std::end(kinds))
     usageError(option, path, "a file that ends in " + ending);
   std::error_code unknown;

@@ -390,7 +390,7 @@ TEST_F(SceneFile, WrongValuesOfThePictureLikewise) {
       {"caustics=\"0.5\"", "caustics=\"2\"", R"(x.xml:24: <light> caustics="2": expected 1 number >= 0 and <= 1)"},
       {"640 480", "641 480", R"(x.xml:25: <output> size="641 480": expected even width and height (video needs them))"},
       {"640 480", "640 8", R"(x.xml:25: <output> size="640 8": expected 2 integers >= 16 and <= 8192)"},
-      {"let go", "放す", R"(x.xml:25: <caption> text="放す": expected Latin letters, digits and signs, not "放")"},
+      {"let go", "放す", R"(x.xml:25: <caption> text="放す": expected Latin letters, digits and signs, not '放')"},
       {"0.5 3 7", "0.5 13", R"(x.xml:25: <output> golden="0.5 13": a time beyond the scene's duration)"},
       {"0.5 3 7", "3 0.5", R"(x.xml:25: <output> golden="3 0.5": expected increasing times)"},
   });
