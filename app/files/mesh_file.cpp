@@ -47,7 +47,7 @@ double metresPerUnit(const std::string& unit) {
 bool isMeshFile(const std::string& path) {
   const std::string extension = extensionOf(path);
   return extension == ".obj" || extension == ".off" || extension == ".ply" || extension == ".stl" ||
-         (extension != ".xml" && assimpReads(extension));
+         assimpReads(extension);
 }
 
 TriangleMesh readMesh(const std::string& path, double metresPerFileUnit) {
