@@ -299,13 +299,8 @@ void evaluateLoads(WorldData& d, ImplicitData& s, const StageLoads& stage) {
       settleTool(d, s, stage, s.loads[k], &s.rows[3 * k]);
   }
   addDeadLoads(d, s, stage);
-  for (const LoadRow& row : s.rows) {
-    if (row.impulse == 0) continue;
-    for (int k = row.first; k < row.end; ++k) {
-      Quad& to = s.residual[s.rowQuad[k]];
-      store(to, fnma(splat(row.impulse), load(s.rowCoefficient[k]), load(to)));
-    }
-  }
+  for (const LoadRow& row : s.rows)
+    if (row.impulse != 0) addAlong(s, row, -row.impulse, s.residual);
 }
 
 }  // namespace medulla

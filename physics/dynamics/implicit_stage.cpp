@@ -307,10 +307,7 @@ void setReach(const WorldData& d, ImplicitData& s) {
 void sumGiven(const ImplicitData& s, Motion& out) {
   out.assign(s.residual.size(), Quad{});
   for (std::size_t k = 3 * contactsAmong(s.loads); k < s.rows.size(); ++k)
-    for (int e = s.rows[k].first; e < s.rows[k].end; ++e) {
-      Quad& to = out[s.rowQuad[e]];
-      store(to, fma(splat(s.rows[k].impulse), load(s.rowCoefficient[e]), load(to)));
-    }
+    addAlong(s, s.rows[k], s.rows[k].impulse, out);
 }
 
 // From the bodies' residuals where the stage begins: `share` of them, or less. The first guess may be far from anything

@@ -37,6 +37,14 @@ void sumWorkOfLoads(ImplicitData& s);      // ImplicitData::workOfLoads; a conta
 inline bool isEmpty(const LoadRow& row) {  // of a held node of a skin
   return row.first == row.end;
 }
+// Adds what an impulse (N s) along the row gives to each of its quads.
+inline void addAlong(const ImplicitData& s, const LoadRow& row, double impulse, Motion& to) {
+  for (int k = row.first; k < row.end; ++k) {
+    Quad& at = to[s.rowQuad[k]];
+    store(at, fma(splat(impulse), load(s.rowCoefficient[k]), load(at)));
+  }
+}
+
 inline int bodyOf(const ImplicitData& s, const LoadRow& row) {  // the first, where two touch
   return s.bodyOf[s.rowQuad[row.first]];
 }

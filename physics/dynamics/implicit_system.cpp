@@ -227,10 +227,7 @@ void applyRows(const ImplicitData& s, const Motion& x, Motion& y) {
     if (row.weight == 0) continue;
     double rate = 0;
     for (int k = row.first; k < row.end; ++k) rate += dotProduct(load(s.rowCoefficient[k]), load(x[s.rowQuad[k]]));
-    for (int k = row.first; k < row.end; ++k) {
-      Quad& to = y[s.rowQuad[k]];
-      store(to, fma(splat(row.weight * rate), load(s.rowCoefficient[k]), load(to)));
-    }
+    addAlong(s, row, row.weight * rate, y);
   }
 }
 
