@@ -133,7 +133,7 @@ void dampBodies(WorldData& d, const Batch& batch) {
     const double damping = d.frame < 0 ? r.settlingDamping : r.massDamping;
     if (damping == 0) continue;
     const double lost = 1 - 1 / (1 + d.substep * damping);
-    const bool turns = r.support.freedom != RigidFreedom::none;
+    const bool turns = canTurn(r);
     const RigidLanes rigid = isFree(r) ? freeMotion(d, r) : supportedMotion(d, r);
     turns ? dampAgainst<true>(rigid, lost, r, d) : dampAgainst<false>(rigid, lost, r, d);
   }

@@ -90,7 +90,7 @@ enum class Verdict { passes, slows, rests, fails };
 struct EnergyBalance {
   double kineticBefore = 0, elasticBefore = 0, kinetic = 0, elastic = 0;
   double given = 0;                       // by gravity, loads, contacts and paths
-  double chords = 0;                      // of velocities across the tangents, because free bodies turn
+  double chords = 0;                      // of velocities across the tangents, because bodies turn
   double mass = 0;                        // kg
   double most = 0, due = 0, mostDue = 0;  // EnergyLedger's, before
 };
@@ -137,7 +137,7 @@ struct ImplicitData {
   // enough.
   std::vector<double> left, enough;
   std::vector<double> reach;    // J, per body: what a stage's speeds can come from, its weight and its loads apart
-  std::vector<double> turning;  // J^1/2, per free body: root of twice its energy of turning, times the angle; 0: slow
+  std::vector<double> turning;  // J^1/2, per body: root of twice its energy of turning, times the angle; 0: slow
   std::vector<double> workOfPaths, workOfLoads;  // J, per body, in this stage
   std::vector<EnergyBalance> bodies, islands;    // per body
   DisjointSets joined;                           // bodies that touch

@@ -172,17 +172,18 @@ void leadDriven(WorldData& d, ImplicitData& s, double end) {
 void followArcs(WorldData& d, ImplicitData& s) {
   s.turning.assign(d.ranges.size(), 0);
   for (EnergyBalance& e : s.bodies) e.chords = 0;
-  if (std::none_of(d.ranges.begin(), d.ranges.end(), isFree)) return;
+  if (std::none_of(d.ranges.begin(), d.ranges.end(), canTurn)) return;
   place(d, s, 0);
   d.spheres.angularMomentum = s.start.angularMomentum;
   wholeMotions(d, s.whole);
   for (std::size_t b = 0; b < s.whole.size(); ++b) {
     const BodyRange& range = d.ranges[b];
-    if (!isFree(range)) continue;
-    const RigidMotion motion = rigidMotionOf(s.whole[b]);
+    if (!canTurn(range)) continue;
+    const Pivot pivot = pivotOf(d, static_cast<int>(b));
+    const RigidMotion motion = rigidMotionOf(s.whole[b], pivot);
     const double angle = s.duration * motion.spin.norm();
     if (!(angle > 1e-6)) continue;
-    s.turning[b] = angle * std::sqrt(std::max(0.0, motion.spin.dot(spinMomentum(s.whole[b]))));
+    s.turning[b] = angle * std::sqrt(std::max(0.0, motion.spin.dot(spinMomentum(s.whole[b], pivot))));
     const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, motion.spin.normalized()).toRotationMatrix();
     const auto bend = [&](const Eigen::Matrix3d& by, const Vector3d& x) {  // (by - 1) r / T less w x r
       const Vector3d r = x - motion.centre;
@@ -311,10 +312,10 @@ void sumGiven(const ImplicitData& s, Motion& out) {
 }
 
 // From the bodies' residuals where the stage begins: `share` of them, or less. The first guess may be far from anything
-// that a body can come to: a contact's is its approach over its softness, and what turns about a pin is stretched by
-// its arc. Of stiff bodies a thousandth of these is more than all their momentum, and left in a step it lets friction
-// push past Coulomb's limit and holds up what falls. So it is `share` of the speeds that weight, loads and energy can
-// bring about at most; of what turns freely and begins along its arc, of what acts, of its turning and of its strain.
+// that a body can come to: a contact's is its approach over its softness. Of stiff bodies a thousandth of that is more
+// than all their momentum, and left in a step it lets friction push past Coulomb's limit and holds up what falls. So it
+// is `share` of the speeds that weight, loads and energy can bring about at most; of what turns and begins along its
+// arc, of what acts, of its turning and of its strain.
 void setEnough(const WorldData& d, ImplicitData& s, double share) {
   s.enough.resize(s.left.size());
   setReach(d, s);

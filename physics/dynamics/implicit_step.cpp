@@ -82,15 +82,22 @@ void addToolImpulses(const WorldData& d, double time, std::vector<Vector3d>& imp
 // tried again.
 enum class Ending { done, failed, touched };
 
-// Adds up what a stage takes of free bodies' momenta. The sum of a body's residuals is what Newton's iteration left
-// open, `share` of it lasts. Its spin shrinks besides, because the stage follows tangents: forces balance about the
-// places at its end, and the momenta p0 that they change were about those at its start; for `tangents` s, the sum of u
-// x p0 of motion against the body's own mean motion, without what is left open of that. For a rigid body turning at w,
-// a rate of T w^2.
+// m/s: of what a body turns about, its centre or its pivot, where its masses move so.
+Vector3d leadOf(const WorldData& d, const BodyRange& r, const Motion& motion, const Vector3d& momentum, double mass) {
+  if (isFree(r)) return momentum / mass;
+  const int sphere = r.support.point.sphere;
+  return sphere >= 0 ? vectorOf(motion[2 * (r.firstSphere + sphere)]) : Vector3d::Zero();
+}
+
+// Adds up what a stage takes of the momenta of bodies that turn. The sum of a body's residuals is what Newton's
+// iteration left open, `share` of it lasts. Its spin shrinks besides, because the stage follows tangents: forces
+// balance about the places at its end, and the momenta p0 that they change were about those at its start; for
+// `tangents` s, the sum of u x p0 of motion against the body's own mean motion, or its pivot's, without what is left
+// open of that. For a rigid body turning at w, a rate of T w^2.
 void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents) {
   for (std::size_t b = 0; b < s.lost.size(); ++b) {
     const BodyRange& r = d.ranges[b];
-    if (!isFree(r)) continue;
+    if (!canTurn(r)) continue;
     Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero(), turning = Vector3d::Zero();
     Vector3d start = Vector3d::Zero(), end = Vector3d::Zero();  // N s, of the whole body
     double whole = 0;
@@ -105,8 +112,10 @@ void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents
       whole += mass;
     });
     for (const int i : spheresOf(r)) angular += vectorOf(s.residual[2 * i + 1]);
+    const Vector3d lead = leadOf(d, r, s.motion, end - linear, whole), led = leadOf(d, r, s.start.motion, start, whole);
+    turning += whole * lead.cross(led) - lead.cross(start) - (end - linear).cross(led);
     s.lost[b].linear += share * linear;
-    s.lost[b].angular += share * angular + tangents * (turning - (end - linear).cross(start) / whole);
+    s.lost[b].angular += share * angular + tangents * turning;
   }
 }
 
@@ -114,7 +123,7 @@ void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents
 void keepMomenta(WorldData& d, ImplicitData& s) {
   wholeMotions(d, s.whole);
   for (std::size_t b = 0; b < s.whole.size(); ++b)
-    if (isFree(d.ranges[b])) addMomenta(d, static_cast<int>(b), s.whole[b], -s.lost[b].linear, -s.lost[b].angular);
+    if (canTurn(d.ranges[b])) addMomenta(d, static_cast<int>(b), s.whole[b], -s.lost[b].linear, -s.lost[b].angular);
 }
 
 // One or two stages from s.before.

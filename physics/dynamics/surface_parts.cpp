@@ -166,19 +166,23 @@ void partsChanged(WorldData& d) {
 }
 
 // Changing which parts move loses momentum: a node does not move exactly like its share of a turning sphere, and the
-// momentum that edges gave a node vanishes when it is carried again. A free body gets the difference back as one rigid
-// motion of the whole; at the hosts alone it would be a jolt. What is kept about is the body's own centre: that of its
-// masses jumps by what nodes' shares lie off them, and about a fixed point a body that travels would begin to spin.
+// momentum that edges gave a node vanishes when it is carried again. A body that turns gets the difference back as one
+// rigid motion of the whole; at the hosts alone it would be a jolt. What is kept about is the pivot, or the body's own
+// centre: that of its masses jumps by what nodes' shares lie off them, and about a fixed point a body that travels
+// would begin to spin.
 void changeParts(WorldData& d) {
   std::vector<WholeMotion> before, now;
   wholeMotions(d, before);
   partsChanged(d);
   wholeMotions(d, now);
   for (std::size_t b = 0; b < now.size(); ++b) {
-    if (d.bodies[b].surface != SurfaceMode::contact || !isFree(d.ranges[b])) continue;
+    if (d.bodies[b].surface != SurfaceMode::contact || !canTurn(d.ranges[b])) continue;
     if (before[b].mass == 0 || now[b].mass == 0) continue;  // asleep
-    const Vector3d linear = before[b].linear - now[b].linear, spin = spinMomentum(before[b]) - spinMomentum(now[b]);
-    addMomenta(d, static_cast<int>(b), now[b], linear, spin + (now[b].moment / now[b].mass).cross(linear));
+    const Pivot pivot = pivotOf(d, static_cast<int>(b));
+    const Vector3d about = isFree(d.ranges[b]) ? Vector3d(now[b].moment / now[b].mass) : pivot.point;
+    const Vector3d linear = before[b].linear - now[b].linear;
+    const Vector3d spin = spinMomentum(before[b], pivot) - spinMomentum(now[b], pivot);
+    addMomenta(d, static_cast<int>(b), now[b], linear, spin + about.cross(linear));
   }
 }
 

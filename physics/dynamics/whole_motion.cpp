@@ -45,26 +45,57 @@ void wholeMotions(const WorldData& d, std::vector<WholeMotion>& out) {
   }
 }
 
-RigidMotion rigidMotionOf(const WholeMotion& whole) {
-  const Vector3d centre = whole.moment / whole.mass;
-  const Matrix3d inertia = whole.inertia - whole.mass * inertiaAt(centre);
-  return {centre, whole.linear / whole.mass, inertia.inverse() * spinMomentum(whole)};
+Pivot pivotOf(const WorldData& d, int body) {
+  const BodyRange& r = d.ranges[body];
+  Pivot out{r.support.freedom};
+  if (isFree(r)) return out;
+  const auto placeOf = [&](const SupportPoint& p) {
+    return p.sphere >= 0 ? vectorOf(d.spheres.position[r.firstSphere + p.sphere])
+                         : vectorAt(d.nodes.position, r.node[p.node]);
+  };
+  const SupportPoint& point = r.support.point;
+  out.point = placeOf(point);
+  if (point.sphere >= 0) out.velocity = vectorOf(d.spheres.velocity[r.firstSphere + point.sphere]);
+  if (out.freedom == RigidFreedom::aboutLine) out.line = placeOf(r.support.second) - out.point;
+  return out;
+}
+
+Vector3d spinMomentum(const WholeMotion& whole, const Pivot& pivot) {
+  if (pivot.freedom == RigidFreedom::all) return whole.angular - whole.moment.cross(whole.linear) / whole.mass;
+  const Vector3d moment = whole.moment - whole.mass * pivot.point;
+  return whole.angular - pivot.point.cross(whole.linear) - moment.cross(pivot.velocity);
+}
+
+RigidMotion rigidMotionOf(const WholeMotion& whole, const Pivot& pivot) {
+  const Vector3d centre = whole.moment / whole.mass, momentum = spinMomentum(whole, pivot);
+  const Matrix3d own = whole.inertia - whole.mass * inertiaAt(centre);
+  if (pivot.freedom == RigidFreedom::all) return {centre, whole.linear / whole.mass, own.inverse() * momentum};
+  const Matrix3d inertia = own + whole.mass * inertiaAt(centre - pivot.point);
+  const Vector3d& line = pivot.line;
+  const Vector3d spin = pivot.freedom == RigidFreedom::aboutPoint
+                            ? Vector3d(inertia.inverse() * momentum)
+                            : Vector3d(line.dot(momentum) / line.dot(inertia * line) * line);
+  return {pivot.point, pivot.velocity, spin};
 }
 
 void addMomenta(WorldData& d, int body, const WholeMotion& now, const Vector3d& linear, const Vector3d& angular) {
   WholeMotion added = now;
   added.linear = linear;
   added.angular = angular;
-  const RigidMotion motion = rigidMotionOf(added);
+  Pivot pivot = pivotOf(d, body);
+  pivot.velocity.setZero();
+  const RigidMotion motion = rigidMotionOf(added, pivot);
   const Vector3d& spin = motion.spin;
   const BodyRange& r = d.ranges[body];
   for (const int i : spheresOf(r)) {
-    addTo(d.spheres.velocity[i], load(quadOf(velocityAt(motion, vectorOf(d.spheres.position[i])))));
+    if (d.spheres.groups[i / 4].inverseMass[i % 4] > 0)
+      addTo(d.spheres.velocity[i], load(quadOf(velocityAt(motion, vectorOf(d.spheres.position[i])))));
     d.spheres.angularVelocity[i] = quadOf(vectorOf(d.spheres.angularVelocity[i]) + spin);
     d.spheres.angularMomentum[i] = quadOf(vectorOf(d.spheres.angularMomentum[i]) + inertiaOf(d, i) * spin);
   }
   for (const int i : r.node)
-    setVector(d.nodes.velocity, i, vectorAt(d.nodes.velocity, i) + velocityAt(motion, vectorAt(d.nodes.position, i)));
+    if (d.nodes.inverseMass[i] > 0 || d.nodes.mass[i] == 0)
+      setVector(d.nodes.velocity, i, vectorAt(d.nodes.velocity, i) + velocityAt(motion, vectorAt(d.nodes.position, i)));
 }
 
 }  // namespace medulla

@@ -21,15 +21,22 @@ struct WholeMotion {
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // kg m2
 };
 
+// What a body that can turn turns about: rigid_support.h.
+struct Pivot {
+  RigidFreedom freedom = RigidFreedom::all;
+  Eigen::Vector3d point = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();  // m, m/s; but for `all`
+  Eigen::Vector3d line = Eigen::Vector3d::Zero();                                       // m, of `aboutLine`
+};
+// Of such a body, as it stands.
+Pivot pivotOf(const WorldData& d, int body);
+
 struct RigidMotion {
-  Eigen::Vector3d centre, velocity, spin;  // m, m/s, rad/s
+  Eigen::Vector3d centre, velocity, spin;  // m, m/s, rad/s; what is held turns about its pivot
 };
 // The rigid motion of these momenta; not finite where there is no mass or no inertia.
-RigidMotion rigidMotionOf(const WholeMotion& whole);
-// N m s, about its own centre.
-inline Eigen::Vector3d spinMomentum(const WholeMotion& whole) {
-  return whole.angular - whole.moment.cross(whole.linear) / whole.mass;
-}
+RigidMotion rigidMotionOf(const WholeMotion& whole, const Pivot& pivot);
+// N m s, about its own centre, or its pivot.
+Eigen::Vector3d spinMomentum(const WholeMotion& whole, const Pivot& pivot);
 inline Eigen::Vector3d velocityAt(const RigidMotion& m, const Eigen::Vector3d& x) {
   return m.velocity + m.spin.cross(x - m.centre);
 }
@@ -37,8 +44,8 @@ inline Eigen::Vector3d velocityAt(const RigidMotion& m, const Eigen::Vector3d& x
 // Of spheres and of the nodes that move by WorldData::awake.
 void wholeMotions(const WorldData& d, std::vector<WholeMotion>& out);
 
-// Adds the rigid motion of these momenta (N s; N m s about the origin) to all of a body. Nodes that are carried are
-// placed anew after it.
+// Adds the rigid motion of these momenta (N s; N m s about the origin) to all of a body that is not held. Nodes that
+// are carried are placed anew after it.
 void addMomenta(WorldData& d, int body, const WholeMotion& now, const Eigen::Vector3d& linear,
                 const Eigen::Vector3d& angular);
 

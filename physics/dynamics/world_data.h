@@ -228,6 +228,9 @@ struct BodyRange {
 inline bool isFree(const BodyRange& range) {
   return range.support.freedom == RigidFreedom::all;
 }
+inline bool canTurn(const BodyRange& range) {
+  return range.support.freedom != RigidFreedom::none;
+}
 // Its spheres' numbers, to loop over; std::views::iota is beyond clang++ 14.
 struct SphereNumbers {
   struct Iterator {
