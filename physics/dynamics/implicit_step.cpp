@@ -1,8 +1,7 @@
-#include <cmath>
+#include <array>
 #include <cstddef>
 
 #include "physics/dynamics/contact_stages.h"
-#include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/point_spring.h"
 #include "physics/dynamics/stages.h"
@@ -119,9 +118,29 @@ void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents
   }
 }
 
-// Gives that back.
+// A contact's impulse acts at its two ends, on what turns where these are when the stage ends, on what travels where it
+// was when the stage began. In the meantime the ends have parted by the slip: a couple, half of which either body has
+// too much. `s.whole` is of the stage's end.
+void noteCouples(const WorldData& d, ImplicitData& s) {
+  for (std::size_t k = 0; k < s.loads.size() && s.loads[k].isContact; ++k) {
+    const std::array<int, 2> body = bodiesOf(d, d.contact.contacts[s.loads[k].index].key);
+    if (body[1] < 0 || !isFree(d.ranges[body[0]]) || !isFree(d.ranges[body[1]])) continue;
+    Vector3d couple = Vector3d::Zero();
+    for (const LoadRow* row = &s.rows[3 * k]; row < &s.rows[3 * k] + 3; ++row) {
+      for (int t = row->first; t < row->end; t += 2) {  // a sphere's linear and angular velocity
+        const WholeMotion& of = s.whole[s.bodyOf[s.rowQuad[t]]];
+        const Vector3d at = vectorOf(d.spheres.position[s.rowQuad[t] / 2]) - s.duration / of.mass * of.linear;
+        couple += row->impulse * (at.cross(vectorOf(s.rowCoefficient[t])) + vectorOf(s.rowCoefficient[t + 1]));
+      }
+    }
+    for (const int b : body) s.lost[b].angular += 0.5 * couple;
+  }
+}
+
+// Gives back what was lost.
 void keepMomenta(WorldData& d, ImplicitData& s) {
   wholeMotions(d, s.whole);
+  noteCouples(d, s);
   for (std::size_t b = 0; b < s.whole.size(); ++b)
     if (canTurn(d.ranges[b])) addMomenta(d, static_cast<int>(b), s.whole[b], -s.lost[b].linear, -s.lost[b].angular);
 }
