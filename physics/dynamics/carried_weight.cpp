@@ -72,9 +72,7 @@ struct OwnAxes {
 };
 OwnAxes toOwnAxes(const WorldData& d, const std::vector<Quad>& ofBodies, int g) {
   const int* body = &d.spheres.bodyOf[4 * g];
-  Lanes w;
-  const Lanes3 q = gatherFour(d.spheres.orientation, 4 * g, w);
-  const Rotation r = rotationOf(q, w);
+  const Rotation r = rotationsFour(d.spheres.orientation, 4 * g);
   return {r, rotateBack(r, gather(ofBodies[body[0]], ofBodies[body[1]], ofBodies[body[2]], ofBodies[body[3]]))};
 }
 

@@ -10,11 +10,10 @@ void placeBalls(WorldData& d) {
   const Spheres& s = d.spheres;
   ContactData& c = d.contact;
   for (std::size_t i = 0; i < s.position.size(); i += 4) {
-    Lanes w, radius;
-    const Lanes3 q = gatherFour(s.orientation, i, w);
+    Lanes radius;
     const Lanes3 rest = gatherFour(c.restBall, i, radius);
     const Lanes3 frame = gatherFour(s.position, i);
-    const Lanes3 centre = frame + rotate(rotationOf(q, w), rest);
+    const Lanes3 centre = frame + rotate(rotationsFour(s.orientation, i), rest);
     storeFour(centre - frame, c.arm, i);
     storeFour(centre, radius, c.ball, i);
   }
@@ -30,7 +29,7 @@ double farthestMove(const ContactData& c, const std::vector<Quad>& from) {
     }
     largest = larger(largest, sumsOfLanes(move[0], move[1], move[2], move[3]));
   }
-  return std::sqrt(std::max(std::max(largest[0], largest[1]), std::max(largest[2], largest[3])));
+  return std::sqrt(largestOfLanes(largest));
 }
 
 // What balls may move before pairs are looked for anew, over that for which lists are made from them anew: more takes

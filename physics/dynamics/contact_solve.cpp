@@ -48,9 +48,7 @@ void prepareSpheres(WorldData& d) {
     const SphereGroup& group = s.groups[g];
     const std::size_t i = 4 * g;
     ContactSphere* out = &d.contact.spheres[i];
-    Lanes w;
-    const Lanes3 q = gatherFour(s.orientation, i, w);
-    const Rotation r = rotationOf(q, w);
+    const Rotation r = rotationsFour(s.orientation, i);
     const Lanes3 momentum = gatherFour(s.angularMomentum, i);
     const auto put = [out](const Lanes3& a, Quad& (*place)(ContactSphere&)) {
       scatter(a, splat(0), place(out[0]), place(out[1]), place(out[2]), place(out[3]));

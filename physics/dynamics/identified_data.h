@@ -24,6 +24,12 @@ struct CarriedFrame {
   Quad restArm;   // m, from the sphere's frame, in it
   Quad worldArm;  // m, of the current substep
 };
+// Adds what acts on a carried frame to what acts on its sphere.
+inline void giveToSphere(const CarriedFrame& c, const FrameLoad& given, Quad& linear, Quad& angular) {
+  const Lanes force = load(given.force);
+  addTo(linear, force);
+  store(angular, load(angular) + load(given.torque) + crossProduct(load(c.worldArm), force));
+}
 
 // Measures of four links in the frame half way between their two frames, which lies as the model frame does at rest:
 // t (m), and L w (m) with the rotation vector w. Stiffness is that of these, the links' own axes multiplied into it.

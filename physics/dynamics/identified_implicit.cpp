@@ -250,11 +250,8 @@ void returnFrameImpulses(const WorldData& d, Motion& motion) {
   const Identified& s = d.identified;
   for (std::size_t i = 0; i < s.frames.size(); ++i) {
     const CarriedFrame& c = s.carried[i];
-    const Lanes force = load(s.loads[i].force), torque = load(s.loads[i].torque);
     if (c.sphere < 0) continue;
-    Quad &linear = motion[2 * c.sphere], &angular = motion[2 * c.sphere + 1];
-    addTo(linear, force);
-    store(angular, load(angular) + torque + crossProduct(load(c.worldArm), force));
+    giveToSphere(c, s.loads[i], motion[2 * c.sphere], motion[2 * c.sphere + 1]);
   }
 }
 

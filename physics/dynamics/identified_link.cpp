@@ -124,10 +124,7 @@ void returnFrameForces(WorldData& d, const Batch& batch) {
     for (int i = body.firstFrame; i < body.endFrame; ++i) {
       const CarriedFrame& c = s.carried[i];
       if (c.sphere < 0) continue;
-      const Lanes force = load(s.loads[i].force);
-      Quad &onSphere = d.spheres.force[c.sphere], &turning = d.spheres.torque[c.sphere];
-      addTo(onSphere, force);
-      store(turning, load(turning) + load(s.loads[i].torque) + crossProduct(load(c.worldArm), force));
+      giveToSphere(c, s.loads[i], d.spheres.force[c.sphere], d.spheres.torque[c.sphere]);
     }
   }
 }

@@ -23,12 +23,6 @@ struct Orientation {
   Lanes w;
 };
 
-Orientation gatherOrientations(const std::vector<Quad>& q, std::size_t i) {
-  Orientation out;
-  out.q = gatherFour(q, i, out.w);
-  return out;
-}
-
 // exp(turn) q; what does not turn keeps its bits.
 Orientation turned(const Orientation& from, const Lanes3& turn) {
   const Lanes zero = splat(0);
@@ -52,8 +46,7 @@ void setSum(const Quad& a, double f, const Quad& b, Quad& out) {
 }  // namespace
 
 Lanes3 angularMomenta(const WorldData& d, const ImplicitData& s, std::size_t group) {
-  const Orientation o = gatherOrientations(d.spheres.orientation, 4 * group);
-  const Rotation r = rotationOf(o.q, o.w);
+  const Rotation r = rotationsFour(d.spheres.orientation, 4 * group);
   const Lanes3 omega = gatherFour(d.spheres.angularVelocity, 4 * group);
   return rotate(r, timesSymmetric(s.inertia[group].entry, rotateBack(r, omega)));
 }
@@ -67,8 +60,9 @@ void place(WorldData& d, const ImplicitData& s, double time) {
     to.angularVelocity[i] = s.motion[2 * i + 1];
   }
   for (std::size_t i = 0; i < to.orientation.size(); i += 4) {
-    const Orientation now =
-        turned(gatherOrientations(s.start.orientation, i), splat(time) * gatherFour(to.angularVelocity, i));
+    Orientation now;
+    now.q = gatherFour(s.start.orientation, i, now.w);
+    now = turned(now, splat(time) * gatherFour(to.angularVelocity, i));
     storeFour(now.q, now.w, to.orientation, i);
   }
   for (int g = 0; g < d.nodes.dynamicEnd / 4; ++g) {

@@ -167,9 +167,7 @@ static void setMasses(const WorldData& d, ImplicitData& s) {
   const Matrix3Lanes none = zeroMatrix();
   for (int i = 0; i < d.spheres.count; i += 4) {
     const Spheres& from = d.spheres;
-    Lanes w;
-    const Lanes3 q = gatherFour(from.orientation, i, w);
-    const Rotation r = rotationOf(q, w);
+    const Rotation r = rotationsFour(from.orientation, i);
     const Lanes(&inertia)[6] = s.inertia[i / 4].entry;
     const Lanes mass = from.groups[i / 4].mass;
     Matrix3Lanes turning = none;  // R I R^T, of the columns of R and of R I

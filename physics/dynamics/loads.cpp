@@ -22,10 +22,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-void add(Quad& q, const Vector3d& a) {
-  for (int k = 0; k < 3; ++k) q.v[k] += a[k];
-}
-
 // Angular velocity after stepVelocities: new momentum, orientation of the substep's beginning.
 Vector3d angularVelocity(const WorldData& d, int sphere) {
   const Eigen::Matrix3d r = quaternionOf(d.spheres.orientation[sphere]).toRotationMatrix();
@@ -36,8 +32,8 @@ Vector3d angularVelocity(const WorldData& d, int sphere) {
 
 void addImpulse(WorldData& d, int sphere, const Vector3d& linear, const Vector3d& angular) {
   const SphereGroup& g = d.spheres.groups[sphere / 4];
-  add(d.spheres.velocity[sphere], g.inverseMass[sphere % 4] * linear);
-  add(d.spheres.angularMomentum[sphere], g.freeToTurn[sphere % 4] * angular);
+  addTo(d.spheres.velocity[sphere], load(quadOf(g.inverseMass[sphere % 4] * linear)));
+  addTo(d.spheres.angularMomentum[sphere], load(quadOf(g.freeToTurn[sphere % 4] * angular)));
 }
 
 // On a skin, with what contacts will presumably make of it: as much as a substep ago. Contacts come after the loads,

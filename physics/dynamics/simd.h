@@ -243,6 +243,13 @@ Lanes3 gatherFour(const Array& q, std::size_t i) {
   Lanes unused;
   return gatherFour(q, i, unused);
 }
+// Of four unit quaternions, x, y, z, w.
+template <class Array>
+Rotation rotationsFour(const Array& q, std::size_t i) {
+  Lanes w;
+  const Lanes3 axis = gatherFour(q, i, w);
+  return rotationOf(axis, w);
+}
 template <class Array>
 Lanes loadFour(const Array& numbers, std::size_t i) {
   return _mm256_loadu_pd(&numbers[i]);

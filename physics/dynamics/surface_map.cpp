@@ -110,6 +110,16 @@ void addSquare(const Lanes* row, Lanes weight, Lanes* sum) {
   }
 }
 
+// From the sums that addSquare() made.
+template <int size>
+Eigen::Matrix<double, size, size> symmetricOf(const Lanes* sum) {
+  Eigen::Matrix<double, size, size> m;
+  int e = 0;
+  for (int i = 0; i < size; ++i)
+    for (int j = i; j < size; ++j, ++e) m(i, j) = m(j, i) = sumOfLanes(sum[e]);
+  return m;
+}
+
 Lanes massesOf(const std::vector<double>& mass, int g) {
   return loadFour(mass, 4 * g);
 }
@@ -125,10 +135,7 @@ void addCarriedMass(const WorldData& d, const std::vector<double>& mass, std::ve
     for (int g = range.firstGroup; g < range.endGroup; ++g)
       for (int k = 0; k < 3; ++k)
         addSquare<12>(anchorRow(link, d.nodes.groups[g], d.nodes.offset[g], unit(k)).c, massesOf(mass, g), sum);
-    Eigen::Matrix<double, 12, 12> m;
-    int e = 0;
-    for (int i = 0; i < 12; ++i)
-      for (int j = i; j < 12; ++j, ++e) m(i, j) = m(j, i) = sumOfLanes(sum[e]);
+    const Eigen::Matrix<double, 12, 12> m = symmetricOf<12>(sum);
     diagonal[link.sphere0] += m.topLeftCorner<6, 6>();
     diagonal[link.sphere1] += m.bottomRightCorner<6, 6>();
     beside[range.host] += m.topRightCorner<6, 6>();
@@ -144,11 +151,7 @@ void addCarriedMass(const WorldData& d, const std::vector<double>& mass, std::ve
         addSquare<6>(row, massesOf(mass, g), sum);
       }
     }
-    Block6 m;
-    int e = 0;
-    for (int i = 0; i < 6; ++i)
-      for (int j = i; j < 6; ++j, ++e) m(i, j) = m(j, i) = sumOfLanes(sum[e]);
-    diagonal[range.host] += m;
+    diagonal[range.host] += symmetricOf<6>(sum);
   }
 }
 
