@@ -70,6 +70,25 @@ TEST(ContactBlow, WhatPassesByIsNotTurnedAside) {
   EXPECT_NEAR((v - Vector3d(8, 0, 0)).norm(), 0, 1e-12);
 }
 
+// What comes aslant passes beside that place of a rod which is nearest to it now, and hits another.
+TEST(ContactBlow, WhatFallsOnASlopingLinkDoesNotPassIt) {
+  const auto rod = synthetic::ballModel({{{-0.04, 0.04, 0}, kRadius}, {{0.04, -0.04, 0}, kRadius}}, {{0, 1}});
+  for (const double speed : {3.5, 6.5, 9.0}) {
+    double deepest = 0;
+    for (int k = 0; k < 20; ++k) {
+      BodyDescription held = synthetic::ballBody("held", rod, Vector3d::Zero());
+      held.fixed = {{0}, {1}};
+      WorldSettings swept = settings();
+      swept.contact = ContactMode::swept;
+      World world(swept, {held, ball("falling", 0.006, {0.003, 0.5 + 0.007 * k, 0})});
+      synthetic::throwBody(world, 1, {0, -speed, 0});
+      for (int frame = 0; frame < 12; ++frame) world.advance({});
+      deepest = std::max(deepest, world.penetration().bodies);
+    }
+    EXPECT_LT(deepest, 20) << speed;
+  }
+}
+
 // Of sleepers no contact with what bears them is listed: before a blow they wake.
 TEST(ContactBlow, ASleeperThatIsStruckStandsOnWhatBearsIt) {
   for (const double height : {0.1, 0.3, 0.5}) {
