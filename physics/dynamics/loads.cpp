@@ -183,13 +183,18 @@ void carryLoadForces(WorldData& d, const Loads& loads) {
   std::swap(before, d.loadForces);
   if (before.empty()) std::fill(d.contact.change.begin(), d.contact.change.end(), MomentumChange{});
   d.loadForces.assign(loads.toolSprings.size() + loads.heldNodes.size(), Vector3d::Zero());
+  auto next = d.settling.begin();  // behind the last one that was found: nearly always the one that is asked for
   for (std::size_t k = 0; k < d.loadForces.size(); ++k) {
     const PointSpring now = pointSpring(d, loads, k, 0);
-    const auto same = std::find_if(d.settling.begin(), d.settling.end(), [&](const SettlingSpring& s) {
+    const auto isSame = [&](const SettlingSpring& s) {
       return s.spring.tool == now.tool && s.spring.count == now.count && s.spring.nodes == now.nodes;
-    });
+    };
+    const bool follows = next != d.settling.end() && isSame(*next);
+    const auto same = follows ? next : std::find_if(d.settling.begin(), d.settling.end(), isSame);
+    if (same == d.settling.end()) continue;
     const auto j = static_cast<std::size_t>(same - d.settling.begin());
-    if (j < before.size() && j < d.settling.size()) d.loadForces[k] = before[j];
+    if (j < before.size()) d.loadForces[k] = before[j];
+    next = same + 1;
   }
 }
 
