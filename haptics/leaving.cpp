@@ -27,10 +27,22 @@ static ProxyContact contactBelow(const Buckets& buckets, double alpha, const Ser
   return nearest;
 }
 
+// Another body than it touched last is another tissue, of which nothing has been learnt.
+static bool touchesBodyOf(const BlendedSurface& surface, const ProxyContact& last, const Proxy& proxy) {
+  const auto bodyOf = [&](const ProxyContact& c) { return surface.bodyOfNode[surface.triangles[c.triangle][0]]; };
+  const auto touched = proxy.touched();
+  return last.triangle >= 0 &&
+         std::any_of(touched.begin(), touched.end(), [&](const ProxyContact& c) { return bodyOf(c) == bodyOf(last); });
+}
+
 void followLeaving(const Buckets& buckets, double alphaBefore, double alpha, ServoTool& tool) {
   const BlendedSurface& surface = buckets.surface();
   auto& [last, below] = tool.left;
   if (tool.proxy.inContact()) {
+    if (!touchesBodyOf(surface, last, tool.proxy)) {
+      tool.motion.seen = {};
+      tool.isLeaving = false;
+    }
     last = below = tool.proxy.mainContact();
     last.share = 1;
     below.share = 0;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 #include <numbers>
@@ -164,6 +166,43 @@ TEST(Servo, OneToolTouchesTwoBodiesAtOnce) {
     EXPECT_LT((force[0] - half * Vector3d(0, -slope, -1)).norm(), 1e-2 * half * slope) << degrees;
     EXPECT_LT((force[1] - half * Vector3d(0, slope, -1)).norm(), 1e-2 * half * slope) << degrees;
   }
+}
+
+// How far tissue follows is learnt of each body anew: behind one that was pushed away a fixed one was met as if it gave
+// way, too, and felt a frame and a half late.
+TEST(Servo, WhatGaveWayTellsNothingOfWhatLiesBehindIt) {
+  constexpr double kFrame = 0.02, kSpeed = 0.1, kGap = 0.02;  // s, m/s, m
+  const TouchShape shape = plate(6, 0.03, thickness, 3);
+  const ToolSettings tool = frictionless();
+  const double meets = 0.1;  // s, the first plate; it goes along, and is gone before the second
+  const auto deviceY = [&](double t) { return top + tool.radius + kSpeed * (meets - t); };
+  const double turns = meets + (kGap - 0.008) / kSpeed;
+  const auto forces = [&](bool withFirst) {
+    const auto frameOf = [&](double t) {
+      const double down = -kSpeed * std::max(0.0, t - meets), gone = t > turns ? 1 : 0;
+      DynamicsFrame frame = frameAt(
+          *shape, t, [=](const Vector3d& x, double) { return Vector3d(x + Vector3d(withFirst ? gone : 1, down, 0)); });
+      frame.bodies.push_back(frameAt(*shape, t, [=](const Vector3d& x, double) {
+                               return Vector3d(x - kGap * Vector3d::UnitY());
+                             }).bodies[0]);
+      return frame;
+    };
+    Servo servo({{shape}, {shape}}, {tool}, 1e-3, frameOf(0), {deviceAt({0, deviceY(0), 0})});
+    std::vector<double> out;
+    for (int frame = 0; frame < 20; ++frame) {
+      for (int k = 1; k <= 20; ++k) {
+        servo.tick(k / 20.0, {deviceAt({0, deviceY(frame * kFrame + k * 1e-3), 0})});
+        out.push_back(servo.tools()[0].force.y());
+      }
+      servo.commit(frameOf((frame + 0) * kFrame), frameOf((frame + 1) * kFrame), servo.tools());
+      servo.beginFrame();
+    }
+    return out;
+  };
+  const std::vector<double> alone = forces(false), behind = forces(true);
+  const auto touches = static_cast<std::size_t>(std::lround((meets + kGap / kSpeed) / 1e-3));
+  EXPECT_GT(*std::max_element(behind.begin(), behind.begin() + 200), 0.5);  // the first was pushed
+  for (std::size_t k = touches; k < alone.size(); ++k) EXPECT_NEAR(behind[k], alone[k], 0.01) << k;
 }
 
 // ---- Against a soft body ---------------------------------------------------------------------------------
