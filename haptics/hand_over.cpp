@@ -26,9 +26,11 @@ struct Part {
 
 // The device's path, with the frame's mean rather than its end kept: the dynamics then feels the same mean
 // pull that the hand felt, however the device moved within the frame. Ticks stand at dt, 2 dt .. T, their mean time is
-// T/2 + dt/2, so the path's end lies (T - dt)/2 later than their mean.
+// T/2 + dt/2, so the path's end lies (T - dt)/2 later than their mean. What a grip took hold of within the frame is led
+// from where the device was then: from where it had come from, tissue would be drawn back against the hand's motion.
 static Path devicePath(const ServoTool& tool, double frameDuration, double tickDuration) {
   if (tool.ticks == 0) return {tool.device.position, Vector3d::Zero()};
+  if (tool.holdBegan) return {tool.device.position, (tool.device.position - tool.holdBegan->position) / frameDuration};
   const Vector3d velocity = (tool.device.position - tool.deviceAtFrameStart.position) / (tool.ticks * tickDuration);
   return {tool.deviceSum / tool.ticks + 0.5 * (frameDuration - tickDuration) * velocity, velocity};
 }
@@ -159,7 +161,7 @@ static void handOverContacts(const BlendedSurface& surface, double alpha, double
 static void handOverGrip(const BlendedSurface& surface, const ServoTool& tool, const Path& path, double frameDuration,
                          Loads& out) {
   const int body = surface.bodyOfNode[tool.grip.held.front().node];
-  ToolSample end = tool.device, start = tool.deviceAtFrameStart;
+  ToolSample end = tool.device, start = tool.holdBegan.value_or(tool.deviceAtFrameStart);
   end.position = path.end;
   start.position = path.end - frameDuration * path.velocity;
   for (const HeldOffset& held : tool.grip.held) {

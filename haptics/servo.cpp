@@ -208,6 +208,14 @@ static const ProxyContact* contactToHold(const ServoTool& tool, const Vector3d& 
   return tool.isLeaving && !felt.isZero(0) ? &tool.left[0] : nullptr;
 }
 
+// What is held while the late surface has come off the proxy carries it nevertheless.
+static void rideOn(const BlendedSurface& surface, double alpha, const ProxyContact& contact, Proxy& proxy) {
+  proxy.contacts[0] = contact;
+  proxy.contacts[0].point = pointAt(surface.triangle(contact.triangle, alpha), contact.weights);
+  proxy.contacts[0].share = 1;
+  proxy.contactCount = 1;
+}
+
 // Opens or closes. The targets of what it takes hold of are measured where the nodes are by now, and then shifted so
 // that the springs, with what motion adds, start with the force `felt` so far (N): neither hand nor tissue is jerked.
 static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d& felt, const ToolSample& before,
@@ -225,6 +233,8 @@ static void tickGrip(const BlendedSurface& surface, double alpha, const Vector3d
     return;
   }
   tool.pathEnd.reset();
+  tool.holdBegan = tool.device;
+  if (!tool.proxy.inContact()) rideOn(surface, alpha, tool.left[0], tool.proxy);
   beginHold(surface, alpha, grip, tool.settings.stiffness, tool.motion);
   const Eigen::Quaterniond toolFromWorld = tool.device.worldFromTool.conjugate();
   for (HeldOffset& held : grip.held) held.offset += toolFromWorld * surface.nodeLead(held.node, alpha);
@@ -312,6 +322,7 @@ static void startFrame(const BlendedSurface& surface, double tickDuration, Servo
   const double way = (tool.device.position - tool.deviceAtFrameStart.position).norm();
   fadePatch(surface, 0, tool.proxy, tool.settings.radius, way, tool.ticks * tickDuration, tool.patch);
   tool.deviceAtFrameStart = tool.device;
+  tool.holdBegan.reset();
   tool.deviceSum.setZero();
   const bool holds = !tool.grip.held.empty();
   Vector3d lag = tool.pathEnd ? Vector3d(tool.device.position - *tool.pathEnd) : Vector3d::Zero();

@@ -39,6 +39,7 @@ struct ServoTool {
   double stillFor = 0;                     // s, that its device has been still while it pushes
   int ticks = 0;                           // in this frame
   bool isLeaving = false;
+  std::optional<ToolSample> holdBegan;  // in this frame: the device, when the grip took hold
 };
 
 }  // namespace medulla

@@ -191,6 +191,50 @@ TEST(Grab, JawsHoldWhatIsStillFelt) {
   }
 }
 
+// Off the late surface when the jaws close, the proxy rides on what they hold nevertheless.
+TEST(Grab, TheProxyRidesOnWhatIsHeld) {
+  double pressed = 0;  // m
+  for (int k = 0; k < 25; ++k) {
+    const double closing = 1 + 0.008 * k;
+    ToolRun run = grabbing();
+    run.ticksPerFrame = 60;
+    run.device = [=](double t) {
+      const double up = 0.1 * std::clamp(t - 1, 0.0, closing - 1);
+      return deviceAt(approach(t) + up * Vector3d::UnitZ() + 0.03 * ease(t, closing, 0.5) * Vector3d::UnitX(),
+                      t > closing ? 1 : 0);
+    };
+    Vector3d last = Vector3d::Zero();
+    bool holding = false, rides = true;
+    run.run(closing + 1, [&](double, const ToolState& tool) {
+      holding = tool.holding;
+      rides = rides && (tool.inContact || !holding);
+      last = tool.proxy;
+    });
+    if (!holding) continue;  // it had come off
+    EXPECT_TRUE(rides) << closing;
+    const double apart = (last - run.device(closing + 1).position).norm();
+    if (k == 0) pressed = apart;
+    EXPECT_NEAR(apart, pressed, 0.05 * pressed) << closing;
+  }
+}
+
+// What it takes hold of in the midst of a frame is led from where the hand was then: along the whole frame's path it
+// would first be drawn back to where the tool came from.
+TEST(Grab, ClosingOnTheMoveDrawsNothingBack) {
+  constexpr double kSpeed = 0.1;  // m/s
+  for (const int tick : {1, 12, 23}) {
+    const double closing = 0.2 + tick / 1200.0 - 1e-6;
+    ToolRun run = grabbing();
+    run.device = [=](double t) {
+      return deviceAt(touch - kSpeed * std::max(0.0, t - 0.17) * Vector3d::UnitZ(), t > closing ? 1 : 0);
+    };
+    run.run(0.22);
+    ASSERT_FALSE(run.loads.heldNodes.empty());
+    for (const HeldNode& held : run.loads.heldNodes)
+      EXPECT_LT((held.anchorVelocity + kSpeed * (24 - tick) / 24 * Vector3d::UnitZ()).norm(), 1e-9) << tick;
+  }
+}
+
 TEST(Grab, PullingTakesTheTissueAlongAndReleaseLetsItGo) {
   ToolRun run = grabbing();
   run.device = [](double t) {
