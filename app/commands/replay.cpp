@@ -48,7 +48,7 @@ int runReplay(const RunOptions& options) {
     if (report.lateTicks > 0 || report.standingTicks > 0)
       tell(
           "medulla: {} of {} ticks woke more than a tick late, up to {:.3g} ms; in {} the surface stood still "
-          "because the dynamics was late\n",
+          "because the dynamics was late: these are in no log, recording or total\n",
           report.lateTicks, report.ticks, 1e3 * report.latest, report.standingTicks);
   }
   printResults(results);
