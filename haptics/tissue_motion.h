@@ -35,7 +35,8 @@ struct DeviceMotion {
   std::array<double, 2> follows{};
   // m2, sums over frames, of which older ones fade: step's change times the change of the way that it answers, and the
   // latter's square; and what the tissue's force changed by, over the tool's stiffness, times the length that tissue or
-  // device went, and the latter's square. They outlast a contact: what comes back soon is likely the same tissue.
+  // device went, and the latter's square. They outlast a contact: what comes back soon, of the same body, is likely the
+  // same tissue.
   struct {
     double stepChange = 0, wayChange = 0, forceLength = 0, length = 0;
   } seen{};
