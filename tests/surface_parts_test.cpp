@@ -340,6 +340,14 @@ TEST(SurfaceParts, AFallingBodyKeepsItsSpin) {
   EXPECT_LT((spin() - before).norm(), 1e-6 * before.norm());
 }
 
+// Where the drag bears it, weight is felt no more than in free fall: carried nodes' weight alone would turn it.
+TEST(SurfaceParts, ABodyThatSinksDoesNotTurn) {
+  World world({.gravity = {0, -9.81, 0}, .ambientDrag = 2}, {lopsided(SurfaceMode::contact, {})});
+  for (int k = 0; k < 200; ++k) world.advance({});
+  const double cosine = std::min(1.0, std::abs(world.data().spheres.orientation[0].v[3]));
+  EXPECT_LT(2 * std::acos(cosine), 1e-3);  // rad
+}
+
 // A free tube is pulled along: what the tool gives is what spheres and moving nodes have, while nodes join and leave.
 // Not to rounding: what edges pull at carried nodes is nobody's until these join, a frame later.
 TEST(SurfaceParts, JoiningAndLeavingKeepMomentum) {

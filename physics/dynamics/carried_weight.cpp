@@ -177,7 +177,8 @@ void feelGravity(WorldData& d, const Batch& batch) {
   if (s.felt.empty()) return;
   for (const int b : batch.bodies) {
     const Lanes now = fallingVelocity(d, b);
-    store(s.felt[b], fnma(splat(1 / d.substep), now - load(s.falling[b]), load(d.gravity)));
+    const Lanes borne = fnma(splat(d.settings.ambientDrag), now, load(d.gravity));  // the drag acts on all alike
+    store(s.felt[b], fnma(splat(1 / d.substep), now - load(s.falling[b]), borne));
     store(s.falling[b], now);
   }
 }
