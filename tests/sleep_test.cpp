@@ -204,4 +204,21 @@ TEST(Sleep, TheImplicitIntegratorKnowsNone) {
   EXPECT_GT(world.dynamicNodes(0), 0);
 }
 
+// At a turning point what swings slowly keeps still for longer than that.
+TEST(Sleep, NothingSleepsBeforeASwingOfItsOwnHasPassed) {
+  BodyDescription slow = rod("slow", Vector3d::Zero());
+  slow.tissue.young = 50;
+  slow.tissue.damping = 5;
+  slow.fixed = {{0, FixedFreedom::all}};
+  WorldSettings s = settings(0.02);
+  s.gravity = {0, -0.02, 0};
+  World world(s, {slow});
+  const double swing = 2 * std::numbers::pi / world.lowestFrequency(0);
+  ASSERT_GT(swing, 0.3);
+  while (world.time() + 0.01 < swing) {
+    world.advance({});
+    ASSERT_EQ(bodiesAwake(world), 1) << world.time() << " of " << swing << " s";
+  }
+}
+
 }  // namespace medulla

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numbers>
 #include <utility>
 
 #include "physics/dynamics/contact_stages.h"
@@ -222,12 +223,19 @@ void fallAsleep(WorldData& d, const Loads& loads) {
     if (!d.bodies[b].driven.empty()) busy[b] = 1;
   countStillFrames(d, busy);
   const double enough = d.settings.sleepAfter / d.settings.frameDuration;
-  const auto isTired = [enough](const Rest& r) { return !r.asleep && r.stillFrames > enough; };
-  if (std::none_of(d.rest.begin(), d.rest.end(), isTired)) return;
+  // Through a swing of its slowest mode at least: at a turning point, or creeping, what is slow seems still for long.
+  const auto isTired = [&](std::size_t b) {
+    const double lowest = d.ranges[b].lowestFrequency;
+    const double swing = lowest > 0 ? 2 * std::numbers::pi / (lowest * d.settings.frameDuration) : 0;
+    return !d.rest[b].asleep && d.rest[b].stillFrames > std::max(enough, swing);
+  };
+  bool isAny = false;
+  for (std::size_t b = 0; b < d.rest.size() && !isAny; ++b) isAny = isTired(b);
+  if (!isAny) return;
   const std::vector<int> island = islandsOf(d, d.contact.carried);
   std::vector<char> sleeps(d.bodies.size(), 1);  // by the island's first body
   for (std::size_t b = 0; b < island.size(); ++b)
-    if (!isTired(d.rest[b])) sleeps[island[b]] = 0;
+    if (!isTired(b)) sleeps[island[b]] = 0;
   bool any = false;
   for (std::size_t b = 0; b < island.size(); ++b) {
     if (!sleeps[island[b]]) continue;
