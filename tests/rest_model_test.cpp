@@ -104,6 +104,18 @@ TEST(RestModel, FrequenciesKnowNodesThatAreHeldOnSpheresThatAreNot) {
   }
 }
 
+// Of slender bodies the lowest modes are a billionth of the highest and less.
+TEST(RestModel, SlowModesOfSlenderBodiesAreListed) {
+  for (const bool held : {true, false}) {
+    BodyDescription body = synthetic::body(synthetic::chainModel(synthetic::straightTube(80, 1.6, 0.004, 81, 6)), 6e3);
+    body.surface = SurfaceMode::skin;
+    if (held) body.fixed = {{0, FixedFreedom::all}};
+    const BodyMechanics mechanics = bodyMechanics(body);
+    const double lowest = lowestFrequency(body, mechanics) / (2 * std::numbers::pi);
+    EXPECT_NEAR(naturalFrequencies(body, mechanics, 1).at(0), lowest, 0.02 * lowest) << held;
+  }
+}
+
 // Of the energy after it is let go, over four swings, along z as its lowest mode does. Edges have no dampers.
 TEST(RestModel, DampingKnowsNodesThatAreHeldOnSpheresThatAreNot) {
   const auto ratioOf = [](Integrator integrator) {

@@ -49,6 +49,13 @@ std::vector<int> freeFreedoms(const BodyMechanics& mechanics) {
   return out;
 }
 
+// Of all freedoms, which of the free ones each is; -1: held.
+std::vector<int> placesOf(const std::vector<int>& free, const SoftBodyModel& model) {
+  std::vector<int> out(6 * model.spheres.size(), -1);
+  for (std::size_t f = 0; f < free.size(); ++f) out[free[f]] = static_cast<int>(f);
+  return out;
+}
+
 // The rigid motions that the fixed freedoms and held nodes allow, one per column, over the free freedoms.
 MatrixXd freeRigidMotions(const SoftBodyModel& m, const std::vector<Vector3d>& heldNodes,
                           const std::vector<int>& freedom, int freeCount) {
@@ -109,6 +116,12 @@ bool holdsByLinks(const BodyDescription& body, const BodyMechanics& mechanics) {
   const auto held = [&](const IdentifiedLink& l) { return l.frame1 >= static_cast<int>(body.model->spheres.size()); };
   return !mechanics.identifiedLinks.empty() &&
          std::any_of(body.model->identified->links.begin(), body.model->identified->links.end(), held);
+}
+
+MatrixXd rigidMotionsLeft(const BodyDescription& body, const BodyMechanics& mechanics, const std::vector<int>& freedom,
+                          int freeCount) {
+  if (holdsByLinks(body, mechanics)) return MatrixXd(freeCount, 0);
+  return freeRigidMotions(*body.model, heldNodes(body), freedom, freeCount);
 }
 
 // Of nodes that are held while the spheres that carry them are not. Identified links hold their patches themselves: no
@@ -192,11 +205,9 @@ double ownShareOf(const BodyMechanics& mechanics, const VectorXd& motion) {
 
 LowestMode lowestMode(const BodyDescription& body, const BodyMechanics& mechanics) {
   const SoftBodyModel& m = *body.model;
-  const int spheres = static_cast<int>(m.spheres.size());
   const std::vector<int> free = freeFreedoms(mechanics);
   const int count = static_cast<int>(free.size());
-  std::vector<int> freedom(6 * spheres, -1);
-  for (int f = 0; f < count; ++f) freedom[free[f]] = f;
+  const std::vector<int> freedom = placesOf(free, m);
   const RestRates links = linkRates(m, mechanics);
   const RestRates held = heldRates(body, mechanics);
   if (count == 0 || links.rows() + held.rows() == 0) return {};
@@ -207,8 +218,7 @@ LowestMode lowestMode(const BodyDescription& body, const BodyMechanics& mechanic
   const Eigen::SparseMatrix<double> mm = wholeMasses(body, freedom, count);
 
   // Inverse iteration, rigid motions projected out; a shift far below any mode keeps the factorisation regular.
-  MatrixXd rigid =
-      holdsByLinks(body, mechanics) ? MatrixXd(count, 0) : freeRigidMotions(m, heldNodes(body), freedom, count);
+  MatrixXd rigid = rigidMotionsLeft(body, mechanics, freedom, count);
   for (int i = 0; i < rigid.cols(); ++i) {
     for (int j = 0; j < i; ++j) rigid.col(i) -= rigid.col(j).dot(mm * rigid.col(i)) * rigid.col(j);
     rigid.col(i) /= std::sqrt(rigid.col(i).dot(mm * rigid.col(i)));
@@ -250,7 +260,7 @@ double lowestFrequency(const BodyDescription& body, const BodyMechanics& mechani
 }
 
 std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMechanics& mechanics, int count) {
-  constexpr double kRigid = 1e-9;  // of the largest eigenvalue: motion that deforms nothing
+  constexpr double kNothing = 1e-15;  // of the largest eigenvalue: what no link resists
   const RestModel rest(body, mechanics);
   const std::vector<int> free = freeFreedoms(mechanics);
   if (free.empty()) return {};
@@ -258,10 +268,13 @@ std::vector<double> naturalFrequencies(const BodyDescription& body, const BodyMe
   const MatrixXd all = rest.linkStiffness() + MatrixXd(held.transpose() * held);
   const MatrixXd mass = rest.carriedMass(mechanics)(free, free);
   const VectorXd modes = eigenvaluesOf(all(free, free), mass);
+  // As many as there are rigid motions are these. (By their size: of slender bodies true modes were below any share of
+  // the largest that rounding leaves of rigid ones.)
+  const auto freeCount = static_cast<int>(free.size());
+  const Eigen::Index rigid = rigidMotionsLeft(body, mechanics, placesOf(free, *body.model), freeCount).cols();
   std::vector<double> out;
-  for (const double squared : modes)
-    if (squared > kRigid * modes.maxCoeff() && static_cast<int>(out.size()) < count)
-      out.push_back(std::sqrt(squared) / (2 * std::numbers::pi));
+  for (Eigen::Index k = rigid; k < modes.size() && static_cast<int>(out.size()) < count; ++k)
+    if (modes[k] > kNothing * modes.maxCoeff()) out.push_back(std::sqrt(modes[k]) / (2 * std::numbers::pi));
   return out;
 }
 
