@@ -50,6 +50,15 @@ TEST(NodeGive, ANodeGivesByItself) {
   EXPECT_EQ(world.nodeGive()[0][0].own, 0);
 }
 
+// Beams' skins follow their spheres wherever their nodes are named.
+TEST(NodeGive, NamedNodesOfASkinGiveAsFarAsTheyMove) {
+  BodyDescription body = synthetic::body(synthetic::shortTube(), 6e3);
+  body.surface = SurfaceMode::skin;
+  body.fixedNodes = {kPushed};
+  const World world(WorldSettings{}, {body});
+  EXPECT_GT(world.nodeGive()[0][kPushed].carried, 0);
+}
+
 // On a skin nothing else gives: bodies that hardly move within a frame, and such as go all the way.
 TEST(NodeGive, SpheresCarryANodeWithinAFrame) {
   for (const bool isHeld : {true, false}) {

@@ -59,7 +59,7 @@ void setCarried(const BodyDescription& body, const BodyMechanics& mechanics, con
   if (columns <= std::min(kMostColumns, static_cast<Eigen::Index>(out.size())))
     compliance = factor.solve(Eigen::MatrixXd::Identity(columns, columns));
   for (std::size_t n = 0; n < out.size(); ++n) {
-    if (!mechanics.nodeMoves[n]) continue;
+    if (!mechanics.nodeMoves[n] && holdsByNodes(body)) continue;
     const VectorXd push = onFree(mechanics, nodes.middleRows(3 * n, 3).transpose() * mechanics.normal[n]);
     if (compliance.size() == 0) {
       out[n].carried = push.dot(factor.solve(push));
