@@ -125,10 +125,11 @@ void VideoEncoder::Data::describeFrame(AVFrame& f) const {
   f.format = AV_PIX_FMT_YUV420P;
   f.width = width;
   f.height = height;
-  f.colorspace = AVCOL_SPC_BT709;
+  f.colorspace = matrixOf(format) == YuvMatrix::bt709 ? AVCOL_SPC_BT709 : AVCOL_SPC_SMPTE170M;
   f.color_primaries = AVCOL_PRI_BT709;
   f.color_trc = AVCOL_TRC_BT709;
   f.color_range = AVCOL_RANGE_MPEG;
+  f.chroma_location = AVCHROMA_LOC_CENTER;
 }
 
 void VideoEncoder::Data::openCodec(int pixelFormat) {
@@ -145,6 +146,7 @@ void VideoEncoder::Data::openCodec(int pixelFormat) {
     codec->color_primaries = frame->color_primaries;
     codec->color_trc = frame->color_trc;
     codec->color_range = frame->color_range;
+    codec->chroma_sample_location = frame->chroma_location;
   }
   if ((muxer->oformat->flags & AVFMT_GLOBALHEADER) != 0) codec->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
   Dictionary codecOptions(encoding.codecOptions), muxerOptions(encoding.muxerOptions);

@@ -39,13 +39,19 @@ VideoFormat checkedFormat(const std::string& path, int width, int height, double
   return format->format;
 }
 
-VideoEncoder openEncoder(const std::string& path, const PartialFile& partial, int width, int height, double fps) {
-  const VideoFormat format = checkedFormat(path, width, height, fps);
+// What the encoder complains of is the file's.
+template <class Work>
+auto named(const std::string& path, const Work& work) {
   try {
-    return {format, partial.path(), width, height, fps};
+    return work();
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(path + ": cannot be written: " + error.what());
   }
+}
+
+VideoEncoder openEncoder(const std::string& path, const PartialFile& partial, int width, int height, double fps) {
+  const VideoFormat format = checkedFormat(path, width, height, fps);
+  return named(path, [&] { return VideoEncoder(format, partial.path(), width, height, fps); });
 }
 
 }  // namespace
@@ -54,6 +60,7 @@ struct VideoWriter::Data {
   std::string path;
   PartialFile partial;
   int width, height;
+  YuvMatrix matrix;
   VideoEncoder encoder;
   PictureQueue queue;  // of 4:2:0 planes; before what it encodes with goes
 
@@ -62,18 +69,9 @@ struct VideoWriter::Data {
         partial(p),
         width(w),
         height(h),
+        matrix(matrixOf(findFormat(p)->format)),
         encoder(openEncoder(p, partial, w, h, fps)),
         queue([this](PictureQueue::Entry& entry) { encoder.write(entry.bytes); }) {}
-
-  // What the encoder complains of is the file's.
-  template <class F>
-  void named(const F& work) const {
-    try {
-      work();
-    } catch (const std::runtime_error& error) {
-      throw std::runtime_error(path + ": cannot be written: " + error.what());
-    }
-  }
 };
 
 bool isVideoName(const std::string& path) {
@@ -88,7 +86,8 @@ VideoWriter::VideoWriter(VideoWriter&&) noexcept = default;
 
 void VideoWriter::write(const Image& image) {
   assert(image.width == data_->width && image.height == data_->height);
-  data_->named([&] { data_->queue.push([&](PictureQueue::Entry& entry) { rgbaToI420(image, entry.bytes); }); });
+  named(data_->path,
+        [&] { data_->queue.push([&](PictureQueue::Entry& entry) { rgbaToI420(image, data_->matrix, entry.bytes); }); });
 }
 
 const StageTimes::Stage& VideoWriter::encoding() const {
@@ -96,7 +95,7 @@ const StageTimes::Stage& VideoWriter::encoding() const {
 }
 
 void VideoWriter::finish(const std::function<void()>& goOn) {
-  data_->named([&] {
+  named(data_->path, [&] {
     data_->queue.finish();
     data_->encoder.finish(goOn);
   });

@@ -40,16 +40,20 @@ Image flat(int width, int height, std::uint8_t r, std::uint8_t g, std::uint8_t b
   return image;
 }
 
-// ITU-R BT.709, table 4: the corners of the RGB cube in limited range.
-TEST_F(VideoWriterTest, I420FollowsBt709) {
+// ITU-R BT.709, table 4, and BT.601: the corners of the RGB cube in limited range.
+TEST_F(VideoWriterTest, I420FollowsBt709AndBt601) {
   const struct {
+    YuvMatrix matrix;
     std::uint8_t r, g, b;
     int y, u, v;
-  } cases[] = {{255, 255, 255, 235, 128, 128}, {0, 0, 0, 16, 128, 128},   {255, 0, 0, 63, 102, 240},
-               {0, 255, 0, 173, 42, 26},       {0, 0, 255, 32, 240, 118}, {255, 255, 0, 219, 16, 138}};
+  } cases[] = {{YuvMatrix::bt709, 255, 255, 255, 235, 128, 128}, {YuvMatrix::bt709, 0, 0, 0, 16, 128, 128},
+               {YuvMatrix::bt709, 255, 0, 0, 63, 102, 240},      {YuvMatrix::bt709, 0, 255, 0, 173, 42, 26},
+               {YuvMatrix::bt709, 0, 0, 255, 32, 240, 118},      {YuvMatrix::bt709, 255, 255, 0, 219, 16, 138},
+               {YuvMatrix::bt601, 255, 255, 255, 235, 128, 128}, {YuvMatrix::bt601, 255, 0, 0, 81, 90, 240},
+               {YuvMatrix::bt601, 0, 255, 0, 145, 54, 34},       {YuvMatrix::bt601, 0, 0, 255, 41, 240, 110}};
   for (const auto& c : cases) {
     std::vector<std::uint8_t> planes;
-    rgbaToI420(flat(4, 2, c.r, c.g, c.b), planes);
+    rgbaToI420(flat(4, 2, c.r, c.g, c.b), c.matrix, planes);
     ASSERT_EQ(planes.size(), 12u);
     EXPECT_NEAR(planes[0], c.y, 1);
     EXPECT_NEAR(planes[7], c.y, 1);
