@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "app/model_drawing.h"
 #include "haptics/monotone_cubic.h"
 #include "physics/dynamics/rigid_support.h"
+#include "physics/model/disjoint_sets.h"
+#include "physics/model/mesh_topology.h"
 
 namespace medulla {
 
@@ -26,7 +29,44 @@ SurfaceShape shapeOf(const std::vector<std::array<int, 3>>& triangles, const std
   return shape;
 }
 
-SurfaceShape shapeOf(const TriangleMesh& mesh, const Eigen::Isometry3d& worldFromMesh, const std::string& look) {
+// Triangles that meet at a sharp edge get corners of their own there: normals are those of vertices, and light would
+// run round a table's edge as round a ball.
+TriangleMesh creased(TriangleMesh mesh) {
+  constexpr double kSmooth = 0.34;  // cosine of 70 degrees: folds of organs are drawn by fewer triangles than that
+  std::vector<Eigen::Vector3d> normal;
+  std::vector<std::vector<int>> around(mesh.vertices.size());  // triangles
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    normal.push_back(areaVector(mesh, mesh.triangles[t]).normalized());
+    for (const int v : mesh.triangles[t]) around[v].push_back(static_cast<int>(t));
+  }
+  const std::vector<std::array<int, 3>> triangles = mesh.triangles;
+  const auto share = [&](int t, int u) {  // an edge, by the vertex that both have
+    return std::count_if(triangles[t].begin(), triangles[t].end(), [&](int v) {
+             return std::find(triangles[u].begin(), triangles[u].end(), v) != triangles[u].end();
+           }) > 1;
+  };
+  const auto isSmooth = [&](int t, int u) {  // what has no area says nothing
+    return normal[t].isZero() || normal[u].isZero() || normal[t].dot(normal[u]) > kSmooth;
+  };
+  for (std::size_t v = 0; v < around.size(); ++v) {
+    const std::vector<int>& fan = around[v];
+    DisjointSets smooth(fan.size());
+    for (std::size_t i = 0; i < fan.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j)
+        if (isSmooth(fan[i], fan[j]) && share(fan[i], fan[j])) smooth.join(static_cast<int>(i), static_cast<int>(j));
+    std::map<int, int> corner{{0, static_cast<int>(v)}};
+    for (std::size_t i = 0; i < fan.size(); ++i) {
+      const auto [at, isNew] =
+          corner.try_emplace(smooth.of(static_cast<int>(i)), static_cast<int>(mesh.vertices.size()));
+      if (isNew) mesh.vertices.push_back(Eigen::Vector3d(mesh.vertices[v]));
+      std::replace(mesh.triangles[fan[i]].begin(), mesh.triangles[fan[i]].end(), static_cast<int>(v), at->second);
+    }
+  }
+  return mesh;
+}
+
+SurfaceShape shapeOf(const TriangleMesh& smooth, const Eigen::Isometry3d& worldFromMesh, const std::string& look) {
+  const TriangleMesh mesh = creased(smooth);
   SurfaceShape shape = shapeOf(mesh.triangles, look);
   for (const Eigen::Vector3d& v : mesh.vertices) shape.restPositions.push_back(toGlm(worldFromMesh * v));
   return shape;
