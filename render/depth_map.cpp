@@ -32,8 +32,11 @@ void rasterizeRow(float* row, int count, Ramp e0, Ramp e1, Ramp e2, Ramp z) {
 
 }  // namespace
 
-DepthMap::DepthMap(int sideInTexels)
-    : side(sideInTexels), stride(sideInTexels + kBlock), depth(std::size_t(stride) * side, 1.f) {}
+DepthMap::DepthMap(int widthInTexels, int heightInTexels)
+    : width(widthInTexels),
+      height(heightInTexels),
+      stride(widthInTexels + kBlock),
+      depth(std::size_t(stride) * height, 1.f) {}
 
 void DepthMap::clear() {
   std::fill(depth.begin(), depth.end(), 1.f);
@@ -42,11 +45,11 @@ void DepthMap::clear() {
 void DepthMap::rasterize(glm::vec3 a, glm::vec3 b, glm::vec3 c) {
   const float area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
   if (!(area > 0)) return;
-  const float last = float(side - 1);
+  const float right = float(width - 1), bottom = float(height - 1);
   const int x0 = int(std::max(0.f, std::ceil(std::min({a.x, b.x, c.x}) - 0.5f)));
-  const int x1 = int(std::min(last, std::floor(std::max({a.x, b.x, c.x}) - 0.5f)));
+  const int x1 = int(std::min(right, std::floor(std::max({a.x, b.x, c.x}) - 0.5f)));
   const int y0 = int(std::max(0.f, std::ceil(std::min({a.y, b.y, c.y}) - 0.5f)));
-  const int y1 = int(std::min(last, std::floor(std::max({a.y, b.y, c.y}) - 0.5f)));
+  const int y1 = int(std::min(bottom, std::floor(std::max({a.y, b.y, c.y}) - 0.5f)));
   if (x0 > x1 || y0 > y1) return;  // most triangles of a fine mesh fall between texel centres
   const float dzdx = ((b.z - a.z) * (c.y - a.y) - (c.z - a.z) * (b.y - a.y)) / area;
   const float dzdy = ((c.z - a.z) * (b.x - a.x) - (b.z - a.z) * (c.x - a.x)) / area;

@@ -145,7 +145,7 @@ struct Renderer::Data {
         model(s.height),
         post(s.width, s.height),
         shadow(shadowSideFor(s.height)),
-        seen(fineHeight) {
+        seen(fineWidth, fineHeight) {
     if (s.supersample > 1) finePost.emplace(fineWidth, fineHeight);
     tissue.addLook(findLook("steel"));
     GLint most[2] = {};

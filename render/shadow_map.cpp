@@ -12,8 +12,9 @@ constexpr float kBehind = -1e9f, kFarAway = 1e6f;
 constexpr float kNearest = 0.1f;
 
 glm::vec3 texelOf(const glm::vec4& clip, const ShadowMap& s) {
-  const float half = 0.5f * float(s.map.side), inverse = 1 / std::max(clip.w, 1e-6f);
-  const glm::vec3 texel((clip.x * inverse + 1) * half, (clip.y * inverse + 1) * half, clip.z * inverse * 0.5f + 0.5f);
+  const float half = 0.5f * float(s.map.width), inverse = 1 / std::max(clip.w, 1e-6f);
+  const glm::vec3 texel((clip.x * inverse + 1) * half, (clip.y * inverse + 1) * half,
+                        std::min(clip.z * inverse * 0.5f + 0.5f, 1.f));  // nothing stands before what is too far
   // Bounded, so that texels convert to integers whatever the picture holds.
   return glm::clamp(texel, glm::vec3(-kFarAway), glm::vec3(kFarAway));
 }
@@ -77,7 +78,7 @@ int shadowSideFor(int pictureHeight) {
   return std::clamp(side, kShadowSide, kShadowSideMost);
 }
 
-ShadowMap::ShadowMap(int side) : map(side), blocks(side / kBlockSide) {
+ShadowMap::ShadowMap(int side) : map(side, side), blocks(side / kBlockSide) {
   assert(side % kBlockSide == 0);
 }
 

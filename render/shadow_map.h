@@ -22,8 +22,8 @@ constexpr int kShadowSide = 1024, kShadowSideMost = 4096;
 int shadowSideFor(int pictureHeight);
 
 struct ShadowMap {
-  explicit ShadowMap(int side = kShadowSide);                              // a multiple of kBlockSide
-  float fineness() const { return float(map.side) / float(kShadowSide); }  // texels per one of the coarsest map's
+  explicit ShadowMap(int side = kShadowSide);                               // a multiple of kBlockSide
+  float fineness() const { return float(map.width) / float(kShadowSide); }  // texels per one of the coarsest map's
 
   DepthMap map;                  // its stride is no power of two: rows would share cache sets
   std::vector<glm::vec3> texel;  // every vertex of the mesh: texels and depth; x = y = -1e9 when behind the light

@@ -176,7 +176,7 @@ void gatherLight(const SceneMesh& mesh, const Parts& parts, std::vector<vec3>& t
   if (bounds.low.x > bounds.high.x) return;
   const vec3 centre = 0.5f * (bounds.low + bounds.high);
   const float radius = std::max(0.5f * glm::length(bounds.high - bounds.low), 1e-6f);
-  DepthMap map(kMapSide);
+  DepthMap map(kMapSide, kMapSide);
   for (int k = 0; k < kDirections; ++k)
     gatherDirection(mesh, parts, centre, radius, spiralDirection(k), map, texel, sum);
 }

@@ -168,7 +168,7 @@ void TissuePass::upload(const VertexLight& lit, const DrawLists& lists, const Sh
   if (!shadow) return;
   glActiveTexture(GL_TEXTURE1);
   glBindTexture(GL_TEXTURE_2D, shadowTexture_);
-  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, shadow->map.stride, shadow->map.side, GL_RED, GL_FLOAT,
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, shadow->map.stride, shadow->map.height, GL_RED, GL_FLOAT,
                   shadow->map.depth.data());
   glActiveTexture(GL_TEXTURE0);
 }

@@ -88,8 +88,12 @@ Shading shadingOf(const SceneMesh& mesh, const Look& look, std::size_t i, vec3 p
   return v;
 }
 
+float grazingOf(const Shading& v) {
+  return 1 - std::max(glm::dot(v.normal, v.toEye), 0.f);
+}
+
 float fresnelEdge(const Shading& v) {
-  const float grazing = 1 - std::max(glm::dot(v.normal, v.toEye), 0.f);
+  const float grazing = grazingOf(v);
   return grazing * grazing * grazing * grazing;
 }
 
@@ -103,10 +107,8 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
   const float fromLens = s.light.position ? 1.f : 0.55f + 0.75f * std::max(glm::dot(v.normal, v.toEye), 0.f);
   const vec3 sky = glm::mix(s.below, s.above, v.normal.y * 0.5f + 0.5f) * (v.openness * fromLens);
   // Light that came in elsewhere and leaves where the tissue is thin, most of it sideways.
-  if (v.thinness > 0) {
-    const float grazing = 1 - std::max(glm::dot(v.normal, v.toEye), 0.f);
-    out.direct += look.glow * s.lamp * (v.thinness * (0.35f + 0.65f * grazing) * v.falloff * visible);
-  }
+  if (v.thinness > 0)
+    out.direct += look.glow * s.lamp * (v.thinness * (0.35f + 0.65f * grazingOf(v)) * v.falloff * visible);
   // Behind the horizon the shaders know shadow alone: what wraps and glows fades towards it, or triangles that lie
   // across would show as teeth. Of a lamp beside the lens the horizon is the outline, a black line where all is lost:
   // half comes through the tissue, shadow or not. What a lamp in the world leaves dark is wide, and would glow in
@@ -189,7 +191,7 @@ Shade shadeVertex(const ShadowMap& shadow, vec3 texel, float spacing, const Shad
   const auto look = [&](float ring) {
     for (const Tap& tap : kTaps) {
       const int x = int(texel.x + fine * ring * tap.x), y = int(texel.y + fine * ring * tap.y);
-      if (x < 0 || y < 0 || x >= shadow.map.side || y >= shadow.map.side) continue;
+      if (x < 0 || y < 0 || x >= shadow.map.width || y >= shadow.map.height) continue;
       ++tried;
       const float bias = kMinimumBias + depthPerMetre * (0.5f + ring * tap.away) * metresPerTexel * (slope + kBend);
       const float depth = shadow.map.at(x, y);
@@ -231,7 +233,7 @@ namespace {
 Surroundings makeSurroundings(const Viewpoint& view, const Picture& picture, const LightView& lightView,
                               const HazeField* haze) {
   const float corner = view.round ? 2 * view.rim : 1.6f * std::sqrt(1 + view.aspect * view.aspect);
-  const float cone = std::atan(corner * view.tangent);
+  const float cone = std::atan(corner * std::max(view.tangent, kLampTangent));
   const Light& light = picture.light;
   Surroundings s{view,
                  light,

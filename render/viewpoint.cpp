@@ -100,7 +100,7 @@ LightView makeLightView(const Light& light, const Viewpoint& v, const Camera& ca
   l.direction = direction(l.position, camera.target);
   // The view covers what the camera sees; the light sits beside it, hence the margin.
   const float corner = v.round ? 2 * v.rim : std::sqrt(1 + v.aspect * v.aspect);
-  l.tangent = std::min(1.15f * corner * v.tangent, 3.f);
+  l.tangent = std::min(1.15f * corner * std::max(v.tangent, kLampTangent), 3.f);
   l.nearDistance = 0.2f * light.referenceDistance;
   l.farDistance = 20 * light.referenceDistance;
   lookFromLamp(l, std::abs(glm::dot(l.direction, v.up)) < 0.95f ? v.up : v.right);

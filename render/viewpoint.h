@@ -30,6 +30,10 @@ struct Viewpoint {
   glm::mat4 clipFromWorld{1};  // y points down, so that the first row read back is the top one
 };
 
+// The endoscope's lamp lights no less than what this half field of view sees: it sits beside the lens, and the narrow
+// cone of a camera that zooms in would miss what is nearer than its target.
+constexpr float kLampTangent = 0.38f;  // of 42 degrees
+
 // x, y in picture heights from the centre (y up), z = depth in m.
 inline glm::vec3 pictureFromWorld(const Viewpoint& v, glm::vec3 p) {
   const glm::vec3 d = p - v.position;

@@ -42,11 +42,11 @@ void gatherFacing(const SceneMesh& mesh, const MeshPart& part, const Viewpoint& 
 }
 
 void drawDepth(const Viewpoint& view, VisibleTriangles& out) {
-  const auto side = float(out.nearest.side);
+  const auto width = float(out.nearest.width), height = float(out.nearest.height);
   out.texel.resize(out.picture.size());
   for (std::size_t i = 0; i < out.texel.size(); ++i) {
     const glm::vec3 p = out.picture[i];
-    out.texel[i] = {(p.x / view.aspect + 0.5f) * side, (p.y + 0.5f) * side,
+    out.texel[i] = {(p.x / view.aspect + 0.5f) * width, (p.y + 0.5f) * height,
                     1 - view.nearPlane / std::max(p.z, view.nearPlane)};
   }
   out.nearest.clear();
@@ -61,12 +61,13 @@ bool isHidden(const VisibleTriangles& seen, const std::uint32_t* t) {
   constexpr float kMargin = 2.5f;   // texels: the map knows its texels' centres only
   constexpr float kBias = 0.0001f;  // 0.8 mm at 0.2 m: a fine surface must not hide itself
   const glm::vec3 a = seen.texel[t[0]], b = seen.texel[t[1]], c = seen.texel[t[2]];
-  const float last = float(seen.nearest.side - 1), z = std::min({a.z, b.z, c.z}) - kBias;
+  const float right = float(seen.nearest.width - 1), bottom = float(seen.nearest.height - 1);
+  const float z = std::min({a.z, b.z, c.z}) - kBias;
   if (z <= 0) return false;
-  const int x0 = int(std::clamp(std::min({a.x, b.x, c.x}) - kMargin, 0.f, last)),
-            x1 = int(std::clamp(std::max({a.x, b.x, c.x}) + kMargin, 0.f, last)),
-            y0 = int(std::clamp(std::min({a.y, b.y, c.y}) - kMargin, 0.f, last)),
-            y1 = int(std::clamp(std::max({a.y, b.y, c.y}) + kMargin, 0.f, last));
+  const int x0 = int(std::clamp(std::min({a.x, b.x, c.x}) - kMargin, 0.f, right)),
+            x1 = int(std::clamp(std::max({a.x, b.x, c.x}) + kMargin, 0.f, right)),
+            y0 = int(std::clamp(std::min({a.y, b.y, c.y}) - kMargin, 0.f, bottom)),
+            y1 = int(std::clamp(std::max({a.y, b.y, c.y}) + kMargin, 0.f, bottom));
   for (int y = y0; y <= y1; ++y)
     for (int x = x0; x <= x1; ++x)
       if (seen.nearest.at(x, y) >= z) return false;
@@ -91,8 +92,9 @@ void keepSeen(std::size_t first, std::size_t last, bool opaque, VisibleTriangles
 
 }  // namespace
 
-// Texels of 2.5 by 1.4 pixels in pictures of 16:9: what shows through a narrower crack may be missed.
-VisibleTriangles::VisibleTriangles(int pictureHeight) : nearest((pictureHeight * 5 / 7 + 7) / 8 * 8) {}
+// Texels of 1.4 by 1.4 pixels: what shows through a narrower crack may be missed.
+VisibleTriangles::VisibleTriangles(int pictureWidth, int pictureHeight)
+    : nearest((pictureWidth * 5 / 7 + 7) / 8 * 8, (pictureHeight * 5 / 7 + 7) / 8 * 8) {}
 
 void findVisibleTriangles(const SceneMesh& mesh, const Viewpoint& view, bool opaque, VisibleTriangles& out) {
   out.picture.resize(mesh.position.size());

@@ -17,7 +17,7 @@ struct VisiblePart : MeshRange {
 
 // Two of three triangles never reach OpenGL, and their vertices are never lit.
 struct VisibleTriangles {
-  explicit VisibleTriangles(int pictureHeight);  // pixels
+  VisibleTriangles(int pictureWidth, int pictureHeight);  // pixels
 
   std::vector<VisiblePart> parts;       // front to back: hidden pixels are never shaded
   std::vector<std::uint32_t> vertices;  // of the mesh, those that triangles use

@@ -18,6 +18,20 @@ TEST(Viewpoint, NothingBetweenTheLensAndWhatItLooksAtIsCutAway) {
   EXPECT_FLOAT_EQ(makeViewpoint(camera, 1, false).nearPlane, 0.005f);
 }
 
+// Its lamp stands beside the lens: of the narrow cone of a camera that zooms in, what is nearer would see nothing.
+TEST(Viewpoint, ZoomingInDoesNotNarrowTheLampsCone) {
+  Light light;
+  light.offset = {-0.03f, 0.03f, 0};
+  Camera camera;
+  camera.position = {0, 0, 0.2f};
+  const auto tangentAt = [&](float fov) {
+    camera.fovDegrees = fov;
+    return makeLightView(light, makeViewpoint(camera, 1.78f, true), camera, SceneMesh()).tangent;
+  };
+  EXPECT_GT(tangentAt(60), tangentAt(42));
+  EXPECT_NEAR(tangentAt(10), tangentAt(42), 0.02f * tangentAt(42));
+}
+
 // As one that is tilted there from the horizontal: a film does not turn by a right angle in the picture in between.
 TEST(Viewpoint, StraightUpAndDownTheLastTiltIsKept) {
   for (const float y : {-1.f, 1.f}) {

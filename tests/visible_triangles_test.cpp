@@ -30,10 +30,11 @@ void addSquare(SceneMesh& mesh, glm::vec3 centre, float halfSide, std::uint32_t 
   mesh.parts.push_back(part);
 }
 
-// Triangles seen per part of a picture of 480 x 480 pixels, from 0.3 m along +z.
-std::vector<std::uint32_t> trianglesSeen(const SceneMesh& mesh, bool opaque) {
-  VisibleTriangles seen(480);
-  findVisibleTriangles(mesh, makeViewpoint({.position = {0, 0, 0.3f}, .fovDegrees = 40}, 1, false), opaque, seen);
+// Triangles seen per part of a picture of so many pixels, from 0.3 m along +z.
+std::vector<std::uint32_t> trianglesSeen(const SceneMesh& mesh, bool opaque, int width = 480, int height = 480) {
+  VisibleTriangles seen(width, height);
+  const float aspect = float(width) / float(height);
+  findVisibleTriangles(mesh, makeViewpoint({.position = {0, 0, 0.3f}, .fovDegrees = 40}, aspect, false), opaque, seen);
   std::vector<std::uint32_t> count(mesh.parts.size(), 0);
   for (const VisiblePart& part : seen.parts) {
     count[part.part] = part.indexCount / 3;
@@ -63,6 +64,15 @@ TEST(VisibleTriangles, WhatPeeksOutStays) {
   const std::uint32_t kept = trianglesSeen(mesh, true)[1];
   EXPECT_GE(kept, 2u * (40 * 40 - 24 * 24));
   EXPECT_LE(kept, 2u * (40 * 40 - 20 * 20));
+}
+
+// However wide the picture is: between two slabs, through a gap of three pixels.
+TEST(VisibleTriangles, ASlitOfAFewPixelsIsSeenThrough) {
+  SceneMesh mesh;
+  constexpr float kPixel = 2 * 0.25f * 0.36397f / 256;  // m, at the slabs' depth; tan 20 degrees
+  for (const float side : {-1.f, 1.f}) addSquare(mesh, {side * (0.02f + 1.5f * kPixel), 0, 0.05f}, 0.02f, 10);
+  addSquare(mesh, {0, 0, 0}, 0.02f, 10);
+  for (const int width : {256, 1024, 4096}) EXPECT_GT(trianglesSeen(mesh, true, width, 256)[2], 0u) << width;
 }
 
 TEST(VisibleTriangles, ASurfaceDoesNotHideItselfNorWhatLiesOnIt) {
