@@ -9,6 +9,7 @@ TEST(Text, WordsInMessagesAreShortAndOnOneLine) {
   EXPECT_EQ(inQuotes("word", '"'), "\"word\"");
   EXPECT_EQ(inQuotes("two\nlines\x1b[31m\x7f"), "'two lines?[31m?'");
   EXPECT_EQ(inQuotes(std::string(1000, 'a')), "'" + std::string(60, 'a') + "...'");
+  EXPECT_EQ(inQuotes(std::string(59, 'a') + "\u00e9" + "b"), "'" + std::string(59, 'a') + "...'");  // not half a letter
 }
 
 TEST(Text, WordsThatResembleNothingAreToldWhatThereIs) {

@@ -9,12 +9,15 @@ namespace medulla {
 // On one line, without what terminals obey.
 static std::string shortened(std::string_view word) {
   constexpr std::size_t kLongest = 60;
+  std::size_t length = std::min(kLongest, word.size());
+  if (length < word.size())
+    while (length > 0 && (word[length] & 0xC0) == 0x80) --length;  // not within a letter of UTF-8
   std::string out;
-  for (const char c : word.substr(0, kLongest)) {
+  for (const char c : word.substr(0, length)) {
     const bool blank = c == '\n' || c == '\t' || c == '\r', control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
     out += blank ? ' ' : control ? '?' : c;
   }
-  if (word.size() > kLongest) out += "...";
+  if (length < word.size()) out += "...";
   return out;
 }
 
