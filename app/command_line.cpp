@@ -85,8 +85,7 @@ void refuseOtherKinds(const std::string& option, const std::string& path, const 
                                         ".c",   ".h",   ".cpp",  ".py",    ".sh",   ".json", ".yml"};
   const std::string own = lowered(std::filesystem::path(path).extension().string());
   if (own == ending || path.starts_with("/dev/")) return;  // streams, pipes and devices
-  if (std::find(std::begin(kinds), std::end(kinds), own) != std::end(kinds))
-    usageError(option, path, "a file that ends in " + ending);
+  if (isOneOf(own, kinds)) usageError(option, path, "a file that ends in " + ending);
   std::error_code unknown;
   if (std::filesystem::is_regular_file(path, unknown))
     usageError(option, path, "a file that ends in " + ending + ", or one that does not exist yet");
@@ -178,7 +177,7 @@ void requireCommand(const CLI::App& app, const std::string& word) {
   std::vector<std::string> known;
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
     known.push_back(command->get_name());
-  if (word.starts_with('-') || std::find(known.begin(), known.end(), word) != known.end()) return;
+  if (word.starts_with('-') || isOneOf(word, known)) return;
   throw CLI::ParseError("there is no command \"" + word + "\"; " + hintOfNames(word, known),
                         CLI::ExitCodes::ExtrasError);
 }
@@ -205,7 +204,7 @@ void requireOptions(const CLI::App& command, const std::vector<std::string>& wor
   for (const std::string& word : words) {
     if (word == "--") return;
     const std::string name = word.substr(0, word.find('='));
-    if (!name.starts_with("--") || std::find(known.begin(), known.end(), name) != known.end()) continue;
+    if (!name.starts_with("--") || isOneOf(name, known)) continue;
     throw CLI::ParseError("medulla " + command.get_name() + " has no option " + name + "; " + hintOfNames(name, known),
                           CLI::ExitCodes::ExtrasError);
   }

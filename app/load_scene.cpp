@@ -35,8 +35,7 @@ static const Attributes kRegions{"box", "sphere", "plane"};
 // command line.
 static std::runtime_error valueError(const Scene& scene, int line, Attributes attributes, const std::string& message) {
   for (const OverriddenAttribute& o : scene.overridden)
-    if (o.line == line && std::find(attributes.begin(), attributes.end(), o.attribute) != attributes.end())
-      return inputError("--set " + o.path, 0, message);
+    if (o.line == line && isOneOf(o.attribute, attributes)) return inputError("--set " + o.path, 0, message);
   return inputError(scene.path, line, message);
 }
 
@@ -224,7 +223,7 @@ static void loadModels(Scene& scene) {
 // Known looks are the renderer's, but a run without pictures should not accept what a run with pictures refuses.
 static void requireLook(const Scene& scene, int line, const std::string& look) {
   const std::vector<std::string> known = lookNames();
-  if (std::find(known.begin(), known.end(), look) != known.end()) return;
+  if (isOneOf(look, known)) return;
   throw valueError(scene, line, {"look"}, fmt::format("unknown look \"{}\": expected {}", look, joined(known, ", ")));
 }
 

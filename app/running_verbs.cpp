@@ -142,7 +142,7 @@ void checkRender(const RenderArguments& a) {
   files.insert(files.end(), a.run.records.begin(), a.run.records.end());
   for (const std::string& file : files) checkPlaces(file, a.scenes.size() > 1);
   const bool asksForRun = !a.run.log.empty() || !a.run.frameTimes.empty() || !a.run.surfaces.empty() ||
-                          !a.run.records.empty() || std::find(a.show.begin(), a.show.end(), "force") != a.show.end();
+                          !a.run.records.empty() || isOneOf("force", a.show);
   if (!a.cache.empty() && asksForRun)
     usageError("--cache", a.cache,
                "no --log, --frame-times, --surface-at, --record or --show force: nothing is simulated, and a cache has "

@@ -49,13 +49,11 @@ struct SurfacePoint {
 std::vector<SurfacePoint> touchablePoints(const SoftBodyModel& m, double size) {
   constexpr double kLarge = 0.2;  // of the body, a triangle's longest edge
   std::vector<SurfacePoint> points;
-  const std::vector<Vector3d> normals = vertexNormals({m.restNodes, m.triangles});
+  const TriangleMesh mesh{m.restNodes, m.triangles};
+  const std::vector<Vector3d> normals = vertexNormals(mesh);
   for (std::size_t i = 0; i < normals.size(); ++i) points.push_back({m.restNodes[i], normals[i]});
-  for (const auto& [i, j, k] : m.triangles) {
-    const Vector3d &a = m.restNodes[i], &b = m.restNodes[j], &c = m.restNodes[k];
-    if (std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()}) > kLarge * size)
-      points.push_back({(a + b + c) / 3, (b - a).cross(c - a).normalized()});
-  }
+  for (const std::array<int, 3>& t : m.triangles)
+    if (longestEdge(mesh, t) > kLarge * size) points.push_back({centroid(mesh, t), areaVector(mesh, t).normalized()});
   return points;
 }
 

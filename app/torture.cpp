@@ -285,7 +285,7 @@ const std::vector<Trial>& trials() {
       {"shuffled", [](BodyDescription& b) { b.model = shuffledModel(*b.model, b); }, stretchByHalf, {}},
       {"hand_step", {}, {}, [](double t) { return t > 0.1 ? 0.02 : 0.0; }},
       {"hand_chirp", {}, {}, [](double t) { return 0.01 * std::sin(2 * std::numbers::pi * (1 + 30 * t) * t); }},
-      {"hand_jump_5m/s", {}, {}, [](double t) { return 5 * std::clamp(t - 0.1, 0.0, 0.02); }},
+      {"hand_jump_5_m/s", {}, {}, [](double t) { return 5 * std::clamp(t - 0.1, 0.0, 0.02); }},
   };
   return all;
 }
@@ -415,7 +415,7 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
       checkInterrupt();
       const double t = world.time() + step;
       world.advance(t <= handTime ? handOn(end, body, found, t, step) : Loads{});
-      if (afterStep) afterStep();
+      afterStep();
       const double now = energy();
       out.largestEnergy = std::max(out.largestEnergy, now);
       if (t <= handTime) out.startEnergy = out.largestEnergy;

@@ -27,10 +27,11 @@ struct TortureOutcome {
 };
 
 // One trial of one body, alone, without gravity or contact, in steps of `step` (s), for as long as its slowest mode
-// takes to die, or until it has recovered; `afterStep` may be empty. The body must be held somewhere. Throws
-// std::runtime_error where the trial or the body is not known or not held. Trials may run side by side.
-TortureOutcome torture(const BodyDescription& body, const TortureMethod& method, const std::string& trial, double step,
-                       const std::function<void()>& afterStep = {});
+// takes to die, or until it has recovered. The body must be held somewhere. Throws std::runtime_error where the trial
+// or the body is not known or not held. Trials may run side by side.
+TortureOutcome torture(
+    const BodyDescription& body, const TortureMethod& method, const std::string& trial, double step,
+    const std::function<void()>& afterStep = [] {});
 
 // How many steps that takes at most. Throws likewise.
 double tortureSteps(const BodyDescription& body, const std::string& trial, double step);

@@ -15,8 +15,9 @@ static double roundingOf(const Vector3d& goal, double depth) {
 }
 
 // Point of the intersection of the chosen planes that is nearest to the goal: goal + N^T p with N N^T p = b - N goal.
-static bool nearestOnPlanes(const Vector3d& goal, const HalfSpace* halfSpaces, const int* chosen, int count,
+static bool nearestOnPlanes(const Vector3d& goal, std::span<const HalfSpace> halfSpaces, std::span<const int> chosen,
                             Vector3d& result, std::array<double, 3>& pressure) {
+  const int count = static_cast<int>(chosen.size());
   Eigen::Matrix3d gram = Eigen::Matrix3d::Identity();
   Vector3d depth = Vector3d::Zero();
   for (int i = 0; i < count; ++i) {
@@ -37,17 +38,19 @@ static bool nearestOnPlanes(const Vector3d& goal, const HalfSpace* halfSpaces, c
   return true;
 }
 
-bool nearestInHalfSpaces(const Vector3d& goal, const HalfSpace* halfSpaces, int count, Vector3d& result,
+bool nearestInHalfSpaces(const Vector3d& goal, std::span<const HalfSpace> halfSpaces, Vector3d& result,
                          std::array<double, 3>& pressure) {
   static constexpr int subsets[8][4] = {{0}, {1, 0}, {1, 1}, {1, 2}, {2, 0, 1}, {2, 0, 2}, {2, 1, 2}, {3, 0, 1, 2}};
+  const int count = static_cast<int>(halfSpaces.size());
   double best = std::numeric_limits<double>::infinity();
   for (const auto& subset : subsets) {
-    if (std::any_of(subset + 1, subset + 1 + subset[0], [&](int k) { return k >= count; })) continue;
+    const std::span<const int> chosen(subset + 1, subset[0]);
+    if (std::any_of(chosen.begin(), chosen.end(), [&](int k) { return k >= count; })) continue;
     Vector3d x;
     std::array<double, 3> p;
-    if (!nearestOnPlanes(goal, halfSpaces, subset + 1, subset[0], x, p)) continue;
+    if (!nearestOnPlanes(goal, halfSpaces, chosen, x, p)) continue;
     const double rounding = roundingOf(goal, (x - goal).norm());
-    const bool allowed = std::all_of(halfSpaces, halfSpaces + count,
+    const bool allowed = std::all_of(halfSpaces.begin(), halfSpaces.end(),
                                      [&](const HalfSpace& h) { return h.normal.dot(x) >= h.offset - rounding; });
     if (!allowed || (x - goal).squaredNorm() >= best) continue;
     best = (x - goal).squaredNorm();

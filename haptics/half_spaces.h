@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <span>
 
 // What a sphere's centre may reach: beyond each touched plane, the point nearest to where it is drawn (Zilles and
 // Salisbury 1995).
@@ -15,7 +16,7 @@ struct HalfSpace {
 // The point nearest to `goal` in up to three half-spaces, by enumeration of which of them are active. `pressure[k]` is
 // the Kuhn-Tucker multiplier: result = goal + sum pressure[k] normal[k], all >= 0. Returns false, with result
 // untouched, when no point satisfies all (within rounding, a millionth of the way there), as between opposite walls.
-bool nearestInHalfSpaces(const Eigen::Vector3d& goal, const HalfSpace* halfSpaces, int count, Eigen::Vector3d& result,
+bool nearestInHalfSpaces(const Eigen::Vector3d& goal, std::span<const HalfSpace> halfSpaces, Eigen::Vector3d& result,
                          std::array<double, 3>& pressure);
 
 }  // namespace medulla

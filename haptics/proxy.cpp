@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <string>
 
 #include "haptics/force_bounds.h"
@@ -32,6 +33,8 @@ struct TouchedPlanes {
   std::array<int, 3> triangles{};
   std::array<double, 3> pressure{};
   int count = 0;
+
+  std::span<const HalfSpace> all() const { return std::span(planes).first(count); }
 };
 }  // namespace
 
@@ -98,7 +101,7 @@ static TouchedPlanes slideTo(const Buckets& buckets, double alpha, const Vector3
       addPlane(touched, {hit.normal, hit.normal.dot(proxy.centre)}, hit.triangle);
     // Not at the end: a proxy that is still rolling over an edge has not lost contact.
     if (k + 1 < kMaxSweeps) dropLeftPlanes(buckets, alpha, proxy, touched);
-    if (nearestInHalfSpaces(goal, touched.planes.data(), touched.count, target, touched.pressure)) continue;
+    if (nearestInHalfSpaces(goal, touched.all(), target, touched.pressure)) continue;
     // Wedged between walls that leave no point free: it stays, and presses on what opposes the goal.
     for (int i = 0; i < touched.count; ++i)
       touched.pressure[i] = std::max(0.0, -touched.planes[i].normal.dot(goal - proxy.centre));
@@ -159,7 +162,7 @@ static void shade(const Buckets& buckets, double alpha, const TouchedPlanes& tou
   Vector3d nearest;
   std::array<double, 3> pressure;
   proxy.felt = Vector3d::Zero();
-  if (count > 0 && !isFlat && nearestInHalfSpaces(device, shaded.data(), count, nearest, pressure)) {
+  if (count > 0 && !isFlat && nearestInHalfSpaces(device, std::span(shaded).first(count), nearest, pressure)) {
     proxy.felt = nearest - device;
     if (const double length = before.norm(); length > 0) {
       const double moved = -before.dot(advance) / length;
@@ -188,12 +191,11 @@ static bool freeOfTouched(const Buckets& buckets, double alpha, Proxy proxy, con
   const Vector3d start = proxy.centre, inwards = start + step(device - start);
   TouchedPlanes touched = slideTo(buckets, alpha, inwards, proxy);
   std::array<double, 3> pressure;
-  if (touched.count == 0 || !nearestInHalfSpaces(device, touched.planes.data(), touched.count, free, pressure))
-    return false;
+  if (touched.count == 0 || !nearestInHalfSpaces(device, touched.all(), free, pressure)) return false;
   proxy.centre = start;
   const TouchedPlanes ahead = slideTo(buckets, alpha, inwards + step(free - start), proxy);
   for (int k = 0; k < ahead.count; ++k) addPlane(touched, ahead.planes[k], ahead.triangles[k]);
-  if (!nearestInHalfSpaces(device, touched.planes.data(), touched.count, free, pressure)) return false;
+  if (!nearestInHalfSpaces(device, touched.all(), free, pressure)) return false;
   pressed = sumOf(pressure, touched.count);
   return (free - device).norm() > kArrived * proxy.toolRadius;
 }
@@ -363,7 +365,7 @@ static void pushOut(const Buckets& buckets, double alpha, Proxy& proxy) {
     if (nearest < 0 || k == kMaxPushes) return;
     addClearance(buckets, alpha, nearest, proxy, touched);
     Vector3d target;
-    if (!nearestInHalfSpaces(start, touched.planes.data(), touched.count, target, touched.pressure)) return;
+    if (!nearestInHalfSpaces(start, touched.all(), target, touched.pressure)) return;
     if ((target - start).norm() > std::min(2 * proxy.toolRadius, kSteepest * missingFrom(start, touched))) return;
     SurfaceHit hit;
     if (moveTo(buckets, alpha, target, proxy, hit)) addClearance(buckets, alpha, hit.triangle, proxy, touched);

@@ -266,7 +266,7 @@ double heldSince(const BlendedSurface& surface, double alpha, const TissueMotion
 WayAndChange recentWays(const DeviceMotion& device, double alpha) {
   WayAndChange ways;
   ways.col(0) = latestWay(device, alpha);
-  ways.col(1) = ways.col(0) - blendPoint(device.way[2], device.way[1], alpha);
+  ways.col(1) = ways.col(0) - wayOfStep(device, alpha);
   return ways;
 }
 

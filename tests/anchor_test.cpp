@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "physics/dynamics/identified_stages.h"
 #include "physics/dynamics/implicit_stages.h"
 #include "physics/dynamics/node_motion.h"
 #include "tests/dynamics_states.h"
@@ -17,21 +16,8 @@ using namespace states;
 
 namespace {
 
-// A chain with uneven sections and arms at its ends.
 BodyDescription chain(SurfaceMode surface, LinkModel links) {
-  BodyDescription body = synthetic::body(synthetic::chainModel(synthetic::straightTube(4, 0.06, 0.01, 8, 6)), 5e3);
-  auto model = std::make_shared<SoftBodyModel>(*body.model);
-  for (ElasticLink& link : model->links) {
-    for (int k = 0; k < ElasticLink::kSections; ++k) {
-      const LinkSection s = link.sections[k];
-      const double wider = 1 + 0.1 * k;
-      link.sections[k] = {wider * s.area, 1.7 * wider * s.bendingMomentU, wider * s.bendingMomentV,
-                          wider * wider * s.torsionConstant};
-    }
-  }
-  model->spheres.front().restLinkEnd += Vector3d(-0.004, 0.002, 0.001);
-  model->spheres.back().restLinkEnd += Vector3d(0.003, -0.001, 0.002);
-  body.model = model;
+  BodyDescription body = synthetic::body(synthetic::unevenChain(4, 8), 5e3);
   body.surface = surface;
   body.links = links;
   body.tissue.damping = 0;

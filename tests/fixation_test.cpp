@@ -15,11 +15,6 @@ namespace medulla {
 
 using namespace states;
 
-// Five spheres along x from 0 to 0.08, 20 mm apart.
-static std::shared_ptr<const SoftBodyModel> tube() {
-  return synthetic::shortTube();
-}
-
 static Region box(const Vector3d& low, const Vector3d& high) {
   Region region;
   region.box = {low, high};
@@ -27,7 +22,7 @@ static Region box(const Vector3d& low, const Vector3d& high) {
 }
 
 TEST(Fixation, RegionsFindTheNodesInside) {
-  const auto model = tube();
+  const auto model = synthetic::shortTube();
   const double end = model->spheres.back().restFrame.x();
   const auto inBox = nodesInRegion(*model, box({0.6 * end, -1, -1}, {1, 1, 1}));
   Region ball;
@@ -52,7 +47,7 @@ TEST(Fixation, RegionsFindTheNodesInside) {
 }
 
 TEST(Fixation, HoldsSpheresByHalfOfTheirSurface) {
-  const auto model = tube();
+  const auto model = synthetic::shortTube();
   std::vector<int> all(model->restNodes.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   EXPECT_EQ(spheresHeldBy(*model, all).size(), model->spheres.size());
@@ -105,7 +100,7 @@ TEST(Fixation, AJaggedRimClampsABeamFartherOutInOnePlane) {
 }
 
 TEST(Fixation, FixedNodesStayToTheBitAndTheBodyHangsOnThem) {
-  BodyDescription b = synthetic::body(tube(), 2e4);
+  BodyDescription b = synthetic::body(synthetic::shortTube(), 2e4);
   const double end = b.model->spheres.back().restFrame.x();
   b.fixedNodes = nodesInRegion(*b.model, box({0.9 * end, -1, -1}, {1, 1, 1}));
   ASSERT_FALSE(b.fixedNodes.empty());
@@ -121,7 +116,7 @@ TEST(Fixation, FixedNodesStayToTheBitAndTheBodyHangsOnThem) {
 }
 
 TEST(Fixation, NodesThatDoNotExistAreRefused) {
-  BodyDescription b = synthetic::body(tube(), 2e4);
+  BodyDescription b = synthetic::body(synthetic::shortTube(), 2e4);
   b.fixedNodes = {100000};
   EXPECT_THROW(World({}, {b}), std::runtime_error);
 }

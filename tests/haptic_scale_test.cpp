@@ -39,7 +39,7 @@ class HapticScale : public OwnScene {
     const ProgramResult r = run({"replay", "own/organ.xml", "--log", "log.csv", "--log-rate", "tick"});
     EXPECT_EQ(r.exitCode, 0) << r.err;
     const LogTable log = readLog(folder / "log.csv");
-    const auto column = std::find(log.columns.begin(), log.columns.end(), "tool.force.x") - log.columns.begin();
+    const std::size_t column = columnOf(log, "tool.force.x");
     Forces out;
     for (const std::vector<double>& row : log.value)
       out.push_back(Eigen::Vector3d(row[column], row[column + 1], row[column + 2]) / (volume * scale));

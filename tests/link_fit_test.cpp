@@ -53,7 +53,7 @@ TEST(LinkFit, StrainsOfCellsAreTheFullFormsAloneAndBringItNearer) {
   const Eigen::MatrixXd compliance = inverseOf(stiffnessOf(meant));
   const auto errorOf = [&](LinkForm form, bool strained) {
     std::vector<IdentifiedLink> links = coupledLinks();
-    fitLinks(compliance, {}, {}, 1, form, links, {});
+    fitLinks(compliance, {}, {}, 1, form, links);
     for (const IdentifiedLink& l : links) EXPECT_EQ(!l.strain0.isZero(0), strained);
     return (inverseOf(stiffnessOf(links)) - compliance).norm() / compliance.norm();
   };
@@ -88,8 +88,8 @@ TEST(LinkFit, ARowIsFoundFromLoadsOnItsEndThatAreNotItsOwn) {
   // Of couples spread over cells, the cells' own turns are what no row answers.
   Eigen::MatrixXd spread = compliance;
   for (const int turn : {3, 9, 15}) spread(turn, turn) *= 0.9;
-  fitLinks(spread, {}, {}, 1, LinkForm::diagonal, plain, {});
-  fitLinks(spread, {}, ends, 1, LinkForm::diagonal, found, {});
+  fitLinks(spread, {}, {}, 1, LinkForm::diagonal, plain);
+  fitLinks(spread, {}, ends, 1, LinkForm::diagonal, found);
   for (int k = 0; k < 3; ++k) {
     const double twist = meant[k].stiffness(3, 3);
     EXPECT_LT(std::abs(found[k].stiffness(3, 3) / twist - 1), 0.5 * std::abs(plain[k].stiffness(3, 3) / twist - 1))

@@ -11,20 +11,7 @@ namespace medulla {
 using namespace states;
 
 static World bareChain(int spheres, SurfaceMode surface, double damping) {
-  BodyDescription b =
-      synthetic::body(synthetic::chainModel(synthetic::straightTube(spheres, 0.02 * (spheres - 1), 0.01, 4, 6)), 5e3);
-  // Unequal sections and factors: no symmetry hides a wrong axis.
-  auto model = std::make_shared<SoftBodyModel>(*b.model);
-  for (ElasticLink& l : model->links) {
-    for (int k = 0; k < ElasticLink::kSections; ++k) {
-      LinkSection& s = l.sections[k];
-      const double taper = 1 + 0.1 * k;
-      s = {taper * s.area, 1.7 * taper * s.bendingMomentU, taper * s.bendingMomentV, taper * taper * s.torsionConstant};
-    }
-  }
-  model->spheres.front().restLinkEnd += Vector3d(-0.004, 0.002, 0.001);  // links end off their frames
-  model->spheres.back().restLinkEnd += Vector3d(0.003, -0.001, 0.002);
-  b.model = model;
+  BodyDescription b = synthetic::body(synthetic::unevenChain(spheres, 4), 5e3);
   b.surface = surface;
   b.tissue.damping = damping;
   b.steered = {{{1.3, 0.8, 1.6}}};

@@ -22,11 +22,9 @@ static SoftBodyModel build(const TriangleMesh& mesh, const BuildSettings& settin
 }
 
 TEST(MassProperties, BoxFarFromTheOrigin) {
-  TriangleMesh mesh;
   const Vector3d at(100, -50, 20), size(1, 2, 3);
-  for (int k = 0; k < 8; ++k) mesh.vertices.push_back(at + size.cwiseProduct(Vector3d(k & 1, k >> 1 & 1, k >> 2)));
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  TriangleMesh mesh = boxMesh(size);
+  for (Vector3d& x : mesh.vertices) x += at;
   const MassProperties m = massProperties(mesh);
   EXPECT_NEAR(m.volume, 6, 1e-10);
   EXPECT_LT((m.centroid - at - size / 2).norm(), 1e-10);

@@ -31,7 +31,7 @@ struct Body {
   DissectionPlan plan = planDissection(grid);
   MatrixXd perPoint = stiffnessPerPoint(0.4);
 
-  FrontFactors factors(const std::function<void(double)>& progress = {}) const {
+  FrontFactors factors(const std::function<void(double)>& progress = [](double) {}) const {
     const auto matrices = [&](std::span<const int> cells) {
       MatrixXd out = hexStiffness(grid, perPoint, cells);
       for (int k = 0; k < kHexFreedoms; ++k) out.row(k * (kHexFreedoms + 1)).array() += 1e-3 * grid.size;

@@ -27,7 +27,7 @@ TEST(HalfSpaces, NearestPointIsFeasibleAndNoSampledPointIsNearer) {
     const Vector3d goal = random.vector(2);
     Vector3d x;
     std::array<double, 3> pressure;
-    ASSERT_TRUE(nearestInHalfSpaces(goal, planes, count, x, pressure));
+    ASSERT_TRUE(nearestInHalfSpaces(goal, std::span(planes, count), x, pressure));
     Vector3d pushed = goal;
     for (int k = 0; k < count; ++k) {
       EXPECT_GE(planes[k].normal.dot(x), planes[k].offset - 1e-9);
@@ -61,7 +61,7 @@ TEST(HalfSpaces, FacesThatLieNearlyAlikeLeaveRoomAtAnyDepth) {
       }
       Vector3d x;
       std::array<double, 3> pressure;
-      if (!nearestInHalfSpaces(goal, planes, 3, x, pressure)) ++missed;
+      if (!nearestInHalfSpaces(goal, planes, x, pressure)) ++missed;
     }
   }
   EXPECT_EQ(missed, 0);
@@ -71,7 +71,7 @@ TEST(HalfSpaces, OppositeWallsWithoutRoomAreReported) {
   const HalfSpace walls[2] = {{Vector3d::UnitX(), 0.001}, {-Vector3d::UnitX(), 0.001}};
   Vector3d x;
   std::array<double, 3> pressure;
-  EXPECT_FALSE(nearestInHalfSpaces({0, 0, 0}, walls, 2, x, pressure));
+  EXPECT_FALSE(nearestInHalfSpaces({0, 0, 0}, walls, x, pressure));
 }
 
 // ---- Whole ticks -----------------------------------------------------------------------------------------

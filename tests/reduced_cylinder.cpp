@@ -40,10 +40,8 @@ Reduced reduceCylinder(bool held) {
   SolidSettings settings;
   settings.heldTriangles = r.heldTriangles;
   r.solid = makeVoxelSolid(r.mesh, 0.007, settings);
-  std::vector<Ball> balls;
-  for (const FillingSphere& s : cylinderModel().spheres) balls.push_back({s.restBallCentre, s.radius});
-  r.cells = makeCellFrames(r.mesh, balls, r.solid);
-  r.responses = solveFrames(r.solid, r.cells, Eigen::VectorXd::Ones(static_cast<Index>(r.mesh.vertices.size())), {});
+  r.cells = makeCellFrames(r.mesh, ballsOf(cylinderModel()), r.solid);
+  r.responses = solveFrames(r.solid, r.cells, Eigen::VectorXd::Ones(static_cast<Index>(r.mesh.vertices.size())));
   return r;
 }
 

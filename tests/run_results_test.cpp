@@ -15,10 +15,10 @@ namespace {
 struct Log {
   explicit Log(const std::string& path) : table(readLog(path)) {}
   std::vector<double> column(const std::string& name) const {
-    const auto found = std::find(table.columns.begin(), table.columns.end(), name);
-    EXPECT_NE(found, table.columns.end()) << name;
+    const std::size_t place = columnOf(table, name);
+    EXPECT_LT(place, table.columns.size()) << name;
     std::vector<double> out;
-    for (const std::vector<double>& row : table.value) out.push_back(row.at(found - table.columns.begin()));
+    for (const std::vector<double>& row : table.value) out.push_back(row.at(place));
     return out;
   }
   // N on the hand, per row.

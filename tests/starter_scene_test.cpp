@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "app/files/log_table.h"
 #include "app/scene.h"
@@ -73,7 +72,7 @@ TEST(StarterScene, ItsToolHoldsBodiesOfFewSpheres) {
     ASSERT_EQ(run.exitCode, 0) << run.err;
     EXPECT_EQ(complaints(run).size(), 0) << organ << ", " << spheres << " spheres: " << run.err;
     const LogTable table = readLog(log);
-    const auto held = std::find(table.columns.begin(), table.columns.end(), "grasper.held") - table.columns.begin();
+    const std::size_t held = columnOf(table, "grasper.held");
     EXPECT_GT(std::count_if(table.value.begin(), table.value.end(), [&](const auto& row) { return row[held] != 0; }),
               100)
         << organ << ", " << spheres << " spheres";
@@ -90,14 +89,12 @@ TEST(StarterScene, AToolThatHoldsStillFeelsAForceThatDoes) {
                                         "tool.grasper.stiffness=2540", "--log", log, "--log-rate", "tick"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const LogTable table = readLog(log);
-  const auto column = [&](const std::string& name) {
-    return std::find(table.columns.begin(), table.columns.end(), name) - table.columns.begin();
-  };
   double count = 0, sum = 0, squares = 0;
   for (const std::vector<double>& row : table.value) {
     if (row[0] < 2) continue;  // pressed since 1.8 s
     double square = 0;
-    for (const char axis : {'x', 'y', 'z'}) square += std::pow(row[column(std::string("grasper.force.") + axis)], 2);
+    for (const char axis : {'x', 'y', 'z'})
+      square += std::pow(row[columnOf(table, std::string("grasper.force.") + axis)], 2);
     ++count;
     sum += std::sqrt(square);
     squares += square;

@@ -1,5 +1,4 @@
 #include <Eigen/Geometry>
-#include <algorithm>
 
 #include "app/files/log_table.h"
 #include "tests/own_scene.h"
@@ -27,7 +26,7 @@ TEST_F(OwnScene, AStillToolComesToRestDeepInADent) {
   const ProgramResult r = run({"replay", "own/liver.xml", "--log", "log.csv", "--log-rate", "tick"});
   ASSERT_EQ(r.exitCode, 0) << r.err;
   const LogTable log = readLog(folder / "log.csv");
-  const auto column = std::find(log.columns.begin(), log.columns.end(), "tool.force.x") - log.columns.begin();
+  const std::size_t column = columnOf(log, "tool.force.x");
   Eigen::AlignedBox3d forces;
   for (const std::vector<double>& row : log.value)
     if (row[0] > 3) forces.extend(Eigen::Vector3d(row[column], row[column + 1], row[column + 2]));

@@ -151,6 +151,20 @@ std::shared_ptr<SoftBodyModel> chainModel(const Tube& tube, double surfaceShare,
   return model;
 }
 
+std::shared_ptr<SoftBodyModel> unevenChain(int spheres, int rings) {
+  auto model = chainModel(straightTube(spheres, 0.02 * (spheres - 1), 0.01, rings, 6));
+  for (ElasticLink& link : model->links) {
+    for (int k = 0; k < ElasticLink::kSections; ++k) {
+      LinkSection& s = link.sections[k];
+      const double wider = 1 + 0.1 * k;
+      s = {wider * s.area, 1.7 * wider * s.bendingMomentU, wider * s.bendingMomentV, wider * wider * s.torsionConstant};
+    }
+  }
+  model->spheres.front().restLinkEnd += Vector3d(-0.004, 0.002, 0.001);
+  model->spheres.back().restLinkEnd += Vector3d(0.003, -0.001, 0.002);
+  return model;
+}
+
 std::shared_ptr<SoftBodyModel> shortTube() {
   return chainModel(straightTube(5, 0.08, 0.012, 8, 10));
 }

@@ -26,6 +26,10 @@ void addLink(SoftBodyModel& m, int a, int b, double radius, double share = 1);
 // link beyond their sphere, so that all cells of an even chain are alike.
 std::shared_ptr<SoftBodyModel> chainModel(const Tube& tube, double surfaceShare = 0.2, bool closeFirstTriple = false);
 
+// Of spheres 20 mm apart, 20 mm across and six nodes around, with uneven sections and arms at its ends: no symmetry
+// hides a wrong axis.
+std::shared_ptr<SoftBodyModel> unevenChain(int spheres, int rings);
+
 // Of 5 spheres and 82 nodes: 8 cm long, 24 mm across.
 std::shared_ptr<SoftBodyModel> shortTube();
 

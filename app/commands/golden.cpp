@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <deque>
 #include <filesystem>
 #include <fstream>
@@ -191,7 +190,7 @@ Update updateOf(const std::string& path, const GoldenOptions& options, const std
   const bool none = momentsOf(readScene(path)).empty();  // any more: what is stored goes
   const std::vector<Moment> moments = none ? std::vector<Moment>{} : renderMoments(path, options.context);
   for (const Moment& m : moments) {
-    if (!whole && std::find(options.update.begin(), options.update.end(), m.name) == options.update.end()) continue;
+    if (!whole && !isOneOf(m.name, options.update)) continue;
     update.written.emplace_back(fmt::format("{}/{}.png", update.folder, m.name),
                                 encodePng(m.image, {{kSceneKey, scene},
                                                     {kRendererKey, renderedWith},
@@ -237,7 +236,7 @@ int updateImages(const std::vector<std::string>& scenes, const GoldenOptions& op
                       "updated takes an --update",
                       name, joined(scenes, ", ")));
     const std::vector<std::string> known = namesOf(momentsOf(readScene(*scene)));
-    if (!namesScene(name, *scene) && std::find(known.begin(), known.end(), name) == known.end())
+    if (!namesScene(name, *scene) && !isOneOf(name, known))
       throw std::runtime_error(fmt::format("--update {}: {} has no such moment", name, *scene));
     const std::string folder = goldenFolderOf(*scene, options);
     for (const std::string& moment : known)

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "app/files/output_file.h"
+#include "app/files/text.h"
 #include "app/files/text_file.h"
 
 namespace medulla {
@@ -79,10 +80,6 @@ std::vector<std::string> chosenScenes(const GoldenOptions& options) {
   std::vector<std::string> paths = filesOf("scenes", ".xml");
   if (paths.empty()) throw std::runtime_error("no scene named and none found: expected scenes/*.xml in this folder");
   return paths;
-}
-
-bool isOneOf(const std::string& name, const std::vector<std::string>& known) {
-  return std::find(known.begin(), known.end(), name) != known.end();
 }
 
 }  // namespace

@@ -221,8 +221,7 @@ std::vector<Result> tableResults(const std::string& path, const std::string& tab
         "is of no kind that is known here, expected a mesh, a model, a scene, a trajectory, a recording, a "
         "log or a state cache");
   CsvRows rows(table, path);
-  const bool isLog =
-      rows.next() && std::find(rows.cells().begin(), rows.cells().end(), "energy.kinetic") != rows.cells().end();
+  const bool isLog = rows.next() && isOneOf("energy.kinetic", rows.cells());
   return isLog ? logResults(path) : trajectoryResults(readTrajectory(path));
 }
 

@@ -35,7 +35,7 @@ std::string meantName(const std::string& option, const NamedFile& file, const st
   if (file.name.empty() && names.size() > 1)
     refuse(fmt::format("{} {}, write NAME=FILE: one of {}", names.size(), kind == "body" ? "bodies" : kind + "s",
                        joined(names, ", ")));
-  if (!file.name.empty() && std::find(names.begin(), names.end(), file.name) == names.end())
+  if (!file.name.empty() && !isOneOf(file.name, names))
     refuse(fmt::format("no {} \"{}\"; {}", kind, file.name, hintOfNames(file.name, names)));
   return file.name.empty() ? names[0] : file.name;
 }

@@ -40,8 +40,7 @@ struct PlannedTrial {
 std::vector<TortureMethod> methodsOf(const StabilityOptions& options) {
   std::vector<TortureMethod> out;
   for (const TortureMethod& method : tortureMethods())
-    if (std::find(options.methods.begin(), options.methods.end(), method.name) != options.methods.end())
-      out.push_back(method);
+    if (isOneOf(method.name, options.methods)) out.push_back(method);
   return out;
 }
 

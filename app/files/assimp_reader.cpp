@@ -3,18 +3,16 @@
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <exception>
-#include <iterator>
 #include <stdexcept>
 #include <string_view>
 
 #include "app/files/input_error.h"
+#include "app/files/text.h"
 
 // In place of assimp's own, which ends the program: Debian builds it with assertions, and a damaged file breaks them.
 namespace Assimp {
@@ -66,12 +64,11 @@ constexpr std::string_view kFormats[] = {".3ds", ".3mf",  ".ac",  ".amf", ".dae"
                                          ".glb", ".gltf", ".lwo", ".wrl", ".x",   ".x3d"};
 
 bool assimpReads(const std::string& extension) {
-  return std::find(std::begin(kFormats), std::end(kFormats), extension) != std::end(kFormats) &&
-         Assimp::Importer().IsExtensionSupported(extension);
+  return isOneOf(extension, kFormats) && Assimp::Importer().IsExtensionSupported(extension);
 }
 
 std::string assimpFormats() {
-  return fmt::format("{}", fmt::join(kFormats, ", "));
+  return joined(kFormats, ", ");
 }
 
 TriangleMesh readWithAssimp(const std::string& path) {

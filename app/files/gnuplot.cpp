@@ -1,6 +1,5 @@
 #include "app/files/gnuplot.h"
 
-#include <fmt/format.h>
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/wait.h>

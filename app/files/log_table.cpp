@@ -52,4 +52,8 @@ LogTable readLog(const std::string& path) {
   return table;
 }
 
+std::size_t columnOf(const LogTable& log, std::string_view name) {
+  return static_cast<std::size_t>(std::find(log.columns.begin(), log.columns.end(), name) - log.columns.begin());
+}
+
 }  // namespace medulla

@@ -23,4 +23,7 @@ struct LogTable {
 // full disk or a killed copy leaves it, is no fault: see isCut.
 LogTable readLog(const std::string& path);
 
+// Where a column stands in each row; as many as there are columns where none has that name.
+std::size_t columnOf(const LogTable& log, std::string_view name);
+
 }  // namespace medulla

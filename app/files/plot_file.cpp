@@ -41,12 +41,12 @@ constexpr const char *kContactShade = "#dcebf7", *kHeldShade = "#fde3c4";
 // ---- What the log holds ----------------------------------------------------------------------------------
 
 Series column(const LogTable& log, const std::string& name, const char* expected = "a log of a run (--log)") {
-  const auto found = std::find(log.columns.begin(), log.columns.end(), name);
-  if (found == log.columns.end())
+  const std::size_t place = columnOf(log, name);
+  if (place == log.columns.size())
     throw inputError(log.path, 0, fmt::format("column {} is missing, expected {}", name, expected));
   Series out;
   out.reserve(log.value.size());
-  for (const auto& row : log.value) out.push_back(row[static_cast<std::size_t>(found - log.columns.begin())]);
+  for (const auto& row : log.value) out.push_back(row[place]);
   return out;
 }
 

@@ -1,7 +1,5 @@
 #include "app/files/report_file.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "app/files/output_file.h"

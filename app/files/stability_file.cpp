@@ -76,11 +76,11 @@ void writeStability(const std::string& path, const std::vector<StabilityPoint>& 
 }
 
 std::string stabilityScript(const std::string& title, const std::vector<StabilityPoint>& map,
-                            const std::vector<StabilityPoint>& torture, const std::vector<StableStep>& limit) {
+                            const std::vector<StabilityPoint>& trials, const std::vector<StableStep>& limit) {
   const auto methods = distinct<std::string>(map, [](const StabilityPoint& p) { return p.method; });
-  const auto trials = distinct<std::string>(torture, [](const StabilityPoint& p) { return p.trial; });
+  const auto names = distinct<std::string>(trials, [](const StabilityPoint& p) { return p.trial; });
   const auto rowOf = [&](const StabilityPoint& p) {
-    return static_cast<double>(std::find(trials.begin(), trials.end(), p.trial) - trials.begin());
+    return static_cast<double>(std::find(names.begin(), names.end(), p.trial) - names.begin());
   };
   std::string out = chartHead(1100, 1000, 13) + "set logscale x\nset xlabel 'step, ms'\nset key off\n";
   std::string limits;
@@ -90,10 +90,10 @@ std::string stabilityScript(const std::string& title, const std::vector<Stabilit
     for (int grade = 0; grade < 3; ++grade) {
       out += block(fmt::format("map{}_{}", m, grade), map, methods[m], grade,
                    [](const StabilityPoint& p) { return p.young; });
-      out += block(fmt::format("trial{}_{}", m, grade), torture, methods[m], grade, rowOf);
+      out += block(fmt::format("trial{}_{}", m, grade), trials, methods[m], grade, rowOf);
     }
   double low = map[0].step, high = low;
-  for (const auto* points : {&map, &torture})
+  for (const auto* points : {&map, &trials})
     for (const StabilityPoint& p : *points) {
       low = std::min(low, p.step);
       high = std::max(high, p.step);
@@ -118,10 +118,10 @@ std::string stabilityScript(const std::string& title, const std::vector<Stabilit
     out += fmt::format(
         "set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen 0.48\nset bmargin at screen "
         "0.1\nunset logscale y\nset yrange [{}:-0.5]\nunset ylabel\nset format y '%g'\nunset title\n",
-        left, left + 0.9 * width, static_cast<double>(trials.size()) - 0.5);
+        left, left + 0.9 * width, static_cast<double>(names.size()) - 0.5);
     out += "set ytics (";
-    for (std::size_t k = 0; k < trials.size(); ++k)
-      out += fmt::format("{}'{}' {}", k == 0 ? "" : ", ", m == 0 ? spaced(trials[k]) : "", k);
+    for (std::size_t k = 0; k < names.size(); ++k)
+      out += fmt::format("{}'{}' {}", k == 0 ? "" : ", ", m == 0 ? spaced(names[k]) : "", k);
     out += ")\n";
     if (m + 1 == methods.size()) out += keyLabels();
     out += fmt::format("plot {}\n", plotOf(fmt::format("trial{}_", m), 0.9));

@@ -29,6 +29,6 @@ void writeStability(const std::string& path, const std::vector<StabilityPoint>& 
 // across and stiffness upwards with the explicit limit drawn over it; below the trials, a panel per method, a row per
 // trial. There is at least one point of each.
 std::string stabilityScript(const std::string& title, const std::vector<StabilityPoint>& map,
-                            const std::vector<StabilityPoint>& torture, const std::vector<StableStep>& limit);
+                            const std::vector<StabilityPoint>& trials, const std::vector<StableStep>& limit);
 
 }  // namespace medulla

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -41,6 +43,12 @@ std::string hintOfNames(const std::string& name, const std::vector<std::string>&
 
 // For short lists, which are named whole: 'did you mean "a"? known: a, b, c', or 'expected one of a, b, c'.
 std::string hintAndNames(const std::string& name, const std::vector<std::string>& known);
+
+// Whether a word is among others.
+template <class Words>
+bool isOneOf(std::string_view word, const Words& words) {
+  return std::find(std::begin(words), std::end(words), word) != std::end(words);
+}
 
 // "a, b, c". By hand: g++ 12 sees an overflow in fmt::join where there is none.
 template <class Names>

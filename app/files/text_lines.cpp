@@ -1,6 +1,5 @@
 #include "app/files/text_lines.h"
 
-#include <algorithm>
 #include <optional>
 
 #include "app/files/input_error.h"

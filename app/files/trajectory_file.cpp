@@ -37,7 +37,7 @@ static std::string_view inAnotherUnit(const std::vector<std::string_view>& cells
 
 static void requireColumn(const CsvRows& header, std::string_view column) {
   const std::vector<std::string_view>& cells = header.cells();
-  if (std::find(cells.begin(), cells.end(), column) != cells.end()) return;
+  if (isOneOf(column, cells)) return;
   const std::string_view found = inAnotherUnit(cells, column);
   header.fail(
       found.empty()

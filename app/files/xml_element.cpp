@@ -107,7 +107,7 @@ void checkAttributes(const XmlElement& element, const XmlRule& rule) {
   std::vector<std::string> known = rule.required;
   known.insert(known.end(), rule.optional.begin(), rule.optional.end());
   for (const XmlAttribute& a : element.attributes) {
-    if (std::find(known.begin(), known.end(), a.name) != known.end()) continue;
+    if (isOneOf(a.name, known)) continue;
     if (a.name.starts_with("xmlns:") || a.name.starts_with("xsi:")) continue;  // by which editors find the schema
     throw complaint(a.where,
                     "<" + element.name + "> has no attribute " + inQuotes(a.name, '"') + suggestion(a.name, known));

@@ -61,9 +61,6 @@ double largestGap(const BodyShape& shape, const std::vector<Ball>& balls) {
 }
 
 std::vector<Ball> fewestBalls(const BodyShape& shape, double gap, int most, const Progress& progress) {
-  const auto report = [&](double done) {
-    if (progress) progress(done);
-  };
   std::vector<Ball> best;
   double closest = std::numeric_limits<double>::infinity();
   const auto reaches = [&](int count) {
@@ -76,7 +73,7 @@ std::vector<Ball> fewestBalls(const BodyShape& shape, double gap, int most, cons
   };
   int high = std::clamp(GreedyCount(candidatesOf(shape, 1), targetsOf(shape, 1))(gap), 1, most), low = 0;
   const int first = high;
-  report(0.1);
+  progress(0.1);
   while (!reaches(high)) {
     if (high == most || high > 4 * first) {
       throw std::runtime_error(
@@ -85,13 +82,13 @@ std::vector<Ball> fewestBalls(const BodyShape& shape, double gap, int most, cons
     low = high;
     high = std::min(most, high + std::max(1, high / 2));
   }
-  report(0.3);
+  progress(0.3);
   const int range = high - low;
   // Improvement saves a quarter or so of the greedy balls: the first probe is there.
   for (int probe = std::max(low + 1, low + 3 * (high - low) / 4); high - low > 1; probe = (low + high) / 2) {
     if (probe >= high) probe = high - 1;
     (reaches(probe) ? high : low) = probe;
-    report(1 - 0.7 * (high - low) / range);
+    progress(1 - 0.7 * (high - low) / range);
   }
   // Now and then one ball less does better than one more.
   for (int below = 2; below <= 3 && high - below >= 1;) {
@@ -112,13 +109,10 @@ std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count, c
     throw std::runtime_error(fmt::format("{} spheres for {} bodies; expected one each at least", count, bodies));
   std::vector<GreedyCount> greedy;
   double high = 0;  // m
-  const auto report = [&](double done) {
-    if (progress) progress(done);
-  };
   for (const BodyShape& shape : shapes) {
     greedy.emplace_back(candidatesOf(shape, 1), targetsOf(shape, 1));
     high = std::max(high, shape.diagonal);
-    report(0.5 * static_cast<double>(greedy.size()) / bodies);
+    progress(0.5 * static_cast<double>(greedy.size()) / bodies);
   }
   const auto countsFor = [&](double gap) {
     std::vector<int> counts(bodies);
@@ -129,7 +123,7 @@ std::vector<int> shareSpheres(const std::vector<BodyShape>& shapes, int count, c
   std::vector<int> counts(bodies, 1), more = countsFor(0);
   double low = 0;
   for (int step = 0; step < kSteps; ++step) {
-    report(0.5 + 0.5 * step / kSteps);
+    progress(0.5 + 0.5 * step / kSteps);
     const std::vector<int> probe = countsFor((low + high) / 2);
     const bool fits = std::accumulate(probe.begin(), probe.end(), 0) <= count;
     (fits ? high : low) = (low + high) / 2;

@@ -237,7 +237,7 @@ Effort effortFor(int count) {
   return count <= 100 ? Effort{4, 4, 60} : Effort{1, 2, 30};
 }
 
-float largestGap(const Reach& r) {
+float gapLeft(const Reach& r) {
   return r.gaps.rowwise().minCoeff().maxCoeff();
 }
 
@@ -264,16 +264,13 @@ Reach chosenOf(const Reach& candidates, const std::vector<int>& numbers) {
 std::vector<Ball> coverWithBalls(const SurfaceTree& tree, const std::vector<Ball>& balls, const CoverTargets& points,
                                  int count, CoverGoal goal, const std::function<void(double)>& progress) {
   assert(count >= 1 && count <= static_cast<int>(balls.size()));
-  const auto report = [&](double done) {
-    if (progress) progress(done);
-  };
   const ScaledTargets targets = scaled(points);
   const Reach candidates = reachOf(targets, balls);
   const GapTable leastGaps = leastOfBlocks(candidates.gaps);
-  report(0.1);
+  progress(0.1);
 
   Reach chosen = chosenOf(candidates, chooseGreedily(candidates.gaps, count));
-  report(0.2);
+  progress(0.2);
 
   const Effort effort = effortFor(count);
   RandomSequence random{7};
@@ -281,21 +278,21 @@ std::vector<Ball> coverWithBalls(const SurfaceTree& tree, const std::vector<Ball
     const double step = (to - from) / (effort.swapPasses + effort.movePasses);
     for (int pass = 0; pass < effort.swapPasses; ++pass) {
       if (!swapPass(candidates, leastGaps, weights, chosen, targets.volume.cols())) break;
-      report(from + step * (pass + 1));
+      progress(from + step * (pass + 1));
     }
     for (int pass = 0; pass < effort.movePasses; ++pass) {
       movePass(tree, targets, pass, effort.trials, weights, random, chosen);
-      report(from + step * (effort.swapPasses + pass + 1));
+      progress(from + step * (effort.swapPasses + pass + 1));
     }
   };
   improve({1, 0}, 0.2, goal == CoverGoal::gap ? 1 : 0.6);
   if (goal == CoverGoal::gap) return chosen.balls;
   const Reach byGap = chosen;
-  const float scale = std::max(1e-3f, largestGap(chosen));
+  const float scale = std::max(1e-3f, gapLeft(chosen));
   improve({scale, 1}, 0.6, 1);
   // Kept where the volume gained is worth the gap that it cost: on finned bodies a third more for a tenth, on tubes
   // next to nothing.
-  const auto price = [&](const Reach& r) { return largestGap(r) / scale + 2 * openShare(r, targets.volume.cols()); };
+  const auto price = [&](const Reach& r) { return gapLeft(r) / scale + 2 * openShare(r, targets.volume.cols()); };
   if (price(byGap) < price(chosen)) return byGap.balls;
   return chosen.balls;
 }

@@ -28,9 +28,9 @@ enum class CoverGoal { gap, gapAndVolume };
 // largest gap that the gap alone has led to. A hundredth of the surface at 1.3 times that gap then weighs as much as 5
 // % of the volume. Less weight for the volume leaves bulky bodies bare, more gives up fins and ducts. What the gap
 // alone has led to is kept where the largest gap grew, in shares of it, by more than twice the share of the volume that
-// was won. 1 <= count <= candidates. `progress`, if given, is called with 0..1. The same input gives the same bytes.
-std::vector<Ball> coverWithBalls(const SurfaceTree& tree, const std::vector<Ball>& candidates,
-                                 const CoverTargets& targets, int count, CoverGoal goal,
-                                 const std::function<void(double)>& progress = {});
+// was won. 1 <= count <= candidates. `progress` is called with 0..1. The same input gives the same bytes.
+std::vector<Ball> coverWithBalls(
+    const SurfaceTree& tree, const std::vector<Ball>& candidates, const CoverTargets& targets, int count,
+    CoverGoal goal, const std::function<void(double)>& progress = [](double) {});
 
 }  // namespace medulla

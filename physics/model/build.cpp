@@ -111,9 +111,7 @@ SpheresAndLinks spheresOfSkeleton(const BodyShape& shape, const Skeleton& skelet
   }
   for (const std::array<int, 2>& link : skeleton.links) s.links.push_back({link[0], link[1]});
   fillCells(shape, s);
-  std::vector<Vector3d> centres;
-  for (const Ball& ball : s.balls) centres.push_back(ball.centre);
-  joinComponents(centres, s.links);
+  joinComponents(s.balls, s.links);
   std::sort(s.links.begin(), s.links.end());
   return s;
 }
@@ -180,9 +178,6 @@ std::string describeSettings(const BuildSettings& s) {
 SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine, const BuildSettings& settings,
                          BuildReport& report, const Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
-  const auto done = [&](double part) {
-    if (progress) progress(part);
-  };
   checkSettings(settings);
   requireDrawable(repaired.mesh.triangles.size(), settings.renderLevels);
   const BodyShape shape = measureShape(repaired.mesh, overshootOf(settings));
@@ -195,29 +190,28 @@ SoftBodyModel buildModel(const RepairedMesh& repaired, const TriangleMesh* fine,
   model.triangles = shape.mesh.triangles;
   model.edges = uniqueEdges(shape.mesh);
   model.skeleton = collapseEdges(shape.mesh);
-  done(0.05);
+  progress(0.05);
 
   SpheresAndLinks s;
-  const auto choosing = [&](double part) { done(std::lerp(0.05, 0.7, part)); };
+  const auto choosing = [&](double part) { progress(std::lerp(0.05, 0.7, part)); };
   if (settings.method == BuildMethod::skeleton)
     s = spheresOfSkeleton(shape, model.skeleton);
   else if (settings.gap > 0)
     s = spheresByCover(shape, fewestBalls(shape, settings.gap, kSpheresMax, choosing));
   else
     s = spheresByCover(shape, chooseBalls(shape, settings.spheres, CoverGoal::gapAndVolume, choosing));
-  done(0.7);
+  progress(0.7);
   hangNodesAndShareMass(shape, s, settings.surfaceMassFraction, model);
   measureLinks(shape.mesh, s.cells.sites, model.spheres, model.links);
   model.buckets = fillBuckets(model.triangles, model.attachments, static_cast<int>(model.spheres.size()), model.links);
-  done(0.8);
+  progress(0.8);
   model.renderSurface = makeRenderSurface(shape.mesh, settings.renderLevels, fine);
-  done(0.9);
+  progress(0.9);
   report = measureModel(model);
-  report.sheetLinks = countSheetLinks(model.spheres, model.links);
   report.hollowLinks = countHollowLinks(shape.mesh, shape.tree, s.cells.sites, model.spheres, model.links);
   report.longEdges = longEdges(shape.mesh, shape.tree);
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  done(1);
+  progress(1);
   return model;
 }
 

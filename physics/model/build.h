@@ -59,11 +59,12 @@ double overshootOf(const BuildSettings& settings);
 // The settings as options of the build command that repeat them.
 std::string describeSettings(const BuildSettings& settings);
 
-// Builds a model (paper 2). `fine`, if given, is the detailed shape that the drawn surface follows. `progress`, if
-// given, is called now and then with 0..1. Deterministic to the byte, `seconds` apart.
+// Builds a model (paper 2). `fine`, if given, is the detailed shape that the drawn surface follows. `progress` is
+// called now and then with 0..1. Deterministic to the byte, `seconds` apart.
 // `name` is left empty, and `meshHash` is that of the repaired mesh: whoever read the input knows the better ones.
 // Throws std::runtime_error on settings out of range and on meshes that hold no ball.
-SoftBodyModel buildModel(const RepairedMesh& mesh, const TriangleMesh* fine, const BuildSettings& settings,
-                         BuildReport& report, const std::function<void(double)>& progress = {});
+SoftBodyModel buildModel(
+    const RepairedMesh& mesh, const TriangleMesh* fine, const BuildSettings& settings, BuildReport& report,
+    const std::function<void(double)>& progress = [](double) {});
 
 }  // namespace medulla

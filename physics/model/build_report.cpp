@@ -5,6 +5,7 @@
 
 #include "physics/model/attachment.h"
 #include "physics/model/link_graph.h"
+#include "physics/model/link_sections.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/node_volumes.h"
 
@@ -28,12 +29,6 @@ double signedDistanceToCone(const Vector3d& p, const Ball& a, const Ball& b) {
 }
 
 namespace {
-
-std::vector<Ball> ballsOf(const SoftBodyModel& model) {
-  std::vector<Ball> balls;
-  for (const FillingSphere& s : model.spheres) balls.push_back({s.restBallCentre, s.radius});
-  return balls;
-}
 
 double distanceToCones(const Vector3d& p, const std::vector<Ball>& balls, const std::vector<ElasticLink>& links) {
   double least = std::numeric_limits<double>::infinity();
@@ -96,14 +91,11 @@ void measureDrawnSurface(const SoftBodyModel& model, const TriangleMesh& mesh, d
 
 void measureGraph(const SoftBodyModel& model, BuildReport& report) {
   SphereLinks links;
-  std::vector<int> degree(model.spheres.size(), 0);
-  for (const ElasticLink& link : model.links) {
-    links.push_back({link.sphere0, link.sphere1});
-    ++degree[link.sphere0];
-    ++degree[link.sphere1];
-  }
+  for (const ElasticLink& link : model.links) links.push_back({link.sphere0, link.sphere1});
   report.components = countComponents(static_cast<int>(model.spheres.size()), links);
-  report.degreeMax = *std::max_element(degree.begin(), degree.end());
+  const std::vector<int> counts = linkCounts(model.spheres.size(), model.links);
+  report.degreeMax = *std::max_element(counts.begin(), counts.end());
+  report.sheetLinks = countSheetLinks(model.spheres, model.links);
 }
 
 }  // namespace

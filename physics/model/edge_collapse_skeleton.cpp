@@ -5,15 +5,11 @@
 #include <set>
 #include <tuple>
 
+#include "physics/model/mesh_topology.h"
+
 namespace medulla {
 
 namespace {
-
-using Edge = std::pair<int, int>;  // lower node first
-
-Edge edgeOf(int a, int b) {
-  return a < b ? Edge(a, b) : Edge(b, a);
-}
 
 // The mesh on its way to a skeleton. Every edge with a triangle is in `queue`; every edge without is in `skeletal`.
 struct Complex {
@@ -22,12 +18,12 @@ struct Complex {
   std::vector<std::array<int, 3>> triangles;
   std::vector<std::set<int>> trianglesOf, neighbours;  // per node
   std::set<std::tuple<double, int, int>> queue;        // length, lower node, higher node
-  std::set<Edge> skeletal;
+  std::set<std::array<int, 2>> skeletal;               // lower node first
 };
 
 std::tuple<double, int, int> queueKey(const Complex& c, int a, int b) {
-  const Edge e = edgeOf(a, b);
-  return {(c.positions[e.first] - c.positions[e.second]).norm(), e.first, e.second};
+  const auto [low, high] = edgeOf(a, b);
+  return {(c.positions[low] - c.positions[high]).norm(), low, high};
 }
 
 Complex makeComplex(const TriangleMesh& mesh) {
@@ -126,7 +122,7 @@ Skeleton skeletonOf(const Complex& c) {
     number[static_cast<int>(node)] = static_cast<int>(skeleton.nodes.size());
     skeleton.nodes.push_back(c.positions[node]);
   }
-  for (const Edge& e : c.skeletal) skeleton.links.push_back({number[e.first], number[e.second]});
+  for (const auto& [a, b] : c.skeletal) skeleton.links.push_back({number[a], number[b]});
   return skeleton;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "physics/model/link_graph.h"
 #include "physics/model/mesh_topology.h"
 #include "physics/model/plane_section.h"
 
@@ -33,17 +34,16 @@ double reachOf(const TriangleMesh& mesh, const SurfaceTree& tree, const PowerSit
 
 void placeLinkEnds(const TriangleMesh& mesh, const SurfaceTree& tree, const PowerSites& sites,
                    const std::vector<ElasticLink>& links, std::vector<FillingSphere>& spheres) {
-  std::vector<int> degree(spheres.size(), 0), neighbour(spheres.size(), -1);
+  const std::vector<int> counts = linkCounts(spheres.size(), links);
+  std::vector<int> neighbour(spheres.size(), -1);
   for (const ElasticLink& link : links) {
     neighbour[link.sphere0] = link.sphere1;
     neighbour[link.sphere1] = link.sphere0;
-    ++degree[link.sphere0];
-    ++degree[link.sphere1];
   }
   const double diagonal = boundsDiagonal(mesh);
   for (std::size_t i = 0; i < spheres.size(); ++i) {
     spheres[i].restLinkEnd = spheres[i].restFrame;
-    if (degree[i] != 1) continue;
+    if (counts[i] != 1) continue;
     const Vector3d way = (spheres[i].restFrame - spheres[neighbour[i]].restFrame).normalized();
     const PowerSites around = sitesAround(sites, {static_cast<int>(i), neighbour[i]});
     spheres[i].restLinkEnd += reachOf(mesh, tree, around, spheres[i].restFrame, way, diagonal) * way;

@@ -55,24 +55,21 @@ SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const st
       further.push_back(c);
   for (const Candidate& c : further)
     if (degree[c.spheres[0]] < degreeMax && degree[c.spheres[1]] < degreeMax) add(c.spheres);
-  std::vector<Eigen::Vector3d> centres;
-  centres.reserve(balls.size());
-  for (const Ball& ball : balls) centres.push_back(ball.centre);
-  joinComponents(centres, links);
+  joinComponents(balls, links);
   std::sort(links.begin(), links.end());
   return links;
 }
 
-void joinComponents(const std::vector<Eigen::Vector3d>& centres, SphereLinks& links) {
-  const int count = static_cast<int>(centres.size());
-  DisjointSets sets(centres.size());
+void joinComponents(const std::vector<Ball>& balls, SphereLinks& links) {
+  const int count = static_cast<int>(balls.size());
+  DisjointSets sets(balls.size());
   for (const std::array<int, 2>& link : links) sets.join(link[0], link[1]);
   for (;;) {
     double shortest = std::numeric_limits<double>::infinity();
     std::array<int, 2> best{};
     for (int i = 0; i < count; ++i) {
       for (int j = i + 1; j < count; ++j) {
-        const double length = (centres[i] - centres[j]).norm();
+        const double length = (balls[i].centre - balls[j].centre).norm();
         if (length < shortest && sets.of(i) != sets.of(j)) {
           shortest = length;
           best = {i, j};
@@ -90,6 +87,15 @@ int countComponents(int spheres, const SphereLinks& links) {
   int components = spheres;
   for (const std::array<int, 2>& link : links) components -= sets.join(link[0], link[1]) ? 1 : 0;
   return components;
+}
+
+std::vector<int> linkCounts(std::size_t spheres, const std::vector<ElasticLink>& links) {
+  std::vector<int> counts(spheres, 0);
+  for (const ElasticLink& link : links) {
+    ++counts[link.sphere0];
+    ++counts[link.sphere1];
+  }
+  return counts;
 }
 
 }  // namespace medulla

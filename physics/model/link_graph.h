@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "physics/model/power_cells.h"
+#include "physics/model/soft_body_model.h"
 #include "physics/model/surface_queries.h"
 
 namespace medulla {
@@ -18,7 +19,10 @@ using SphereLinks = std::vector<std::array<int, 2>>;  // lower sphere first, sor
 SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const std::vector<Ball>& balls);
 
 // Adds the shortest links that join separate components.
-void joinComponents(const std::vector<Eigen::Vector3d>& centres, SphereLinks& links);
+void joinComponents(const std::vector<Ball>& balls, SphereLinks& links);
 int countComponents(int spheres, const SphereLinks& links);
+
+// Of each sphere, how many links end there.
+std::vector<int> linkCounts(std::size_t spheres, const std::vector<ElasticLink>& links);
 
 }  // namespace medulla

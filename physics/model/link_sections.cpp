@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "physics/model/link_graph.h"
 #include "physics/model/plane_section.h"
 #include "physics/model/symmetric_eigen.h"
 
@@ -110,15 +111,11 @@ int countHollowLinks(const TriangleMesh& mesh, const SurfaceTree& tree, const Po
 int countSheetLinks(const std::vector<FillingSphere>& spheres, const std::vector<ElasticLink>& links) {
   constexpr double kFlat = 6;  // of a rectangle's second moments: sides of 1 to 2.4
   constexpr int kNetwork = 3;
-  std::vector<int> degree(spheres.size(), 0);
-  for (const ElasticLink& link : links) {
-    ++degree[link.sphere0];
-    ++degree[link.sphere1];
-  }
+  const std::vector<int> counts = linkCounts(spheres.size(), links);
   return static_cast<int>(std::count_if(links.begin(), links.end(), [&](const ElasticLink& link) {
     const LinkSection& s = link.sections[ElasticLink::kSections / 2];
     const auto [thin, wide] = std::minmax(s.bendingMomentU, s.bendingMomentV);
-    return wide > kFlat * thin && std::min(degree[link.sphere0], degree[link.sphere1]) >= kNetwork;
+    return wide > kFlat * thin && std::min(counts[link.sphere0], counts[link.sphere1]) >= kNetwork;
   }));
 }
 

@@ -35,10 +35,10 @@ std::optional<LongEdges> longEdges(const TriangleMesh& mesh, const SurfaceTree& 
   for (const std::array<int, 3>& t : mesh.triangles) {
     const Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
     const Vector3d across = (b - a).cross(c - a);
-    const double edge = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+    const double edge = longestEdge(mesh, t);
     total += across.norm();
     if (edge < kShort * diagonal || across.isZero(0)) continue;
-    const double thickness = thicknessBehind(tree, (a + b + c) / 3, -across.normalized(), diagonal);
+    const double thickness = thicknessBehind(tree, centroid(mesh, t), -across.normalized(), diagonal);
     if (thickness <= 0 || edge < kLong * thickness) continue;
     area += across.norm();
     found.push_back({edge, thickness});

@@ -6,6 +6,8 @@
 #include <map>
 #include <numbers>
 
+#include "physics/model/mesh_topology.h"
+
 namespace medulla {
 
 using std::numbers::pi;
@@ -74,11 +76,11 @@ SubdivisionLevel subdivideLoop(const SubdivisionLevel& level) {
   }
 
   // Edge vertices: 3/8 of the ends, 1/8 of the two opposite corners.
-  std::map<std::pair<int, int>, std::pair<int, std::array<int, 2>>> edges;  // ends -> new vertex, opposite corners
-  std::vector<std::pair<int, int>> order;
+  std::map<std::array<int, 2>, std::pair<int, std::array<int, 2>>> edges;  // ends -> new vertex, opposite corners
+  std::vector<std::array<int, 2>> order;
   for (const std::array<int, 3>& t : level.triangles) {
     for (int k = 0; k < 3; ++k) {
-      const std::pair<int, int> ends = std::minmax(t[k], t[(k + 1) % 3]);
+      const std::array<int, 2> ends = edgeOf(t[k], t[(k + 1) % 3]);
       const int opposite = t[(k + 2) % 3];
       const auto [entry, fresh] =
           edges.try_emplace(ends, static_cast<int>(vertices + order.size()), std::array<int, 2>{opposite, opposite});
@@ -88,16 +90,16 @@ SubdivisionLevel subdivideLoop(const SubdivisionLevel& level) {
         entry->second.second[1] = opposite;
     }
   }
-  for (const std::pair<int, int>& ends : order) {
+  for (const std::array<int, 2>& ends : order) {
     const std::array<int, 2>& opposite = edges.at(ends).second;
     Stencil terms;
-    for (const int end : {ends.first, ends.second}) addScaled(level.stencils[end], 3. / 8, terms);
+    for (const int end : ends) addScaled(level.stencils[end], 3. / 8, terms);
     for (const int corner : opposite) addScaled(level.stencils[corner], 1. / 8, terms);
     finer.stencils.push_back(gathered(std::move(terms)));
   }
   for (const std::array<int, 3>& t : level.triangles) {
     std::array<int, 3> middle;  // of the edge after corner k
-    for (int k = 0; k < 3; ++k) middle[k] = edges.at(std::minmax(t[k], t[(k + 1) % 3])).first;
+    for (int k = 0; k < 3; ++k) middle[k] = edges.at(edgeOf(t[k], t[(k + 1) % 3])).first;
     for (int k = 0; k < 3; ++k) finer.triangles.push_back({t[k], middle[k], middle[(k + 2) % 3]});
     finer.triangles.push_back(middle);
   }

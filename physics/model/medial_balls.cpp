@@ -5,6 +5,12 @@
 
 namespace medulla {
 
+std::vector<Ball> ballsOf(const SoftBodyModel& model) {
+  std::vector<Ball> balls;
+  for (const FillingSphere& s : model.spheres) balls.push_back({s.restBallCentre, s.radius});
+  return balls;
+}
+
 double distanceToBalls(const Eigen::Vector3d& p, const std::vector<Ball>& balls) {
   double least = std::numeric_limits<double>::infinity();
   for (const Ball& ball : balls) least = std::min(least, (p - ball.centre).norm() - ball.radius);

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "physics/model/soft_body_model.h"
 #include "physics/model/surface_queries.h"
 #include "physics/model/surface_samples.h"
 
@@ -12,6 +13,8 @@ struct Ball {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // m
   double radius = 0;                                 // m
 };
+
+std::vector<Ball> ballsOf(const SoftBodyModel& model);
 
 // m, from the surface of the nearest of them; below 0 inside.
 double distanceToBalls(const Eigen::Vector3d& p, const std::vector<Ball>& balls);

@@ -262,12 +262,12 @@ std::size_t flipOnce(TriangleMesh& mesh, std::set<std::array<int, 2>>& edges) {
     int far = -1;
     for (const int v : mesh.triangles[other])
       if (v != from && v != to) far = v;
-    const std::array<int, 2> edge{std::min(apex, far), std::max(apex, far)};
+    const std::array<int, 2> edge = edgeOf(apex, far);
     if (far == apex || edges.contains(edge)) continue;
     const std::array<int, 3> first{apex, from, far}, second{apex, far, to};
     const double before = std::min(height, relativeHeight(mesh, mesh.triangles[other]));
     if (std::min(relativeHeight(mesh, first), relativeHeight(mesh, second)) <= before) continue;
-    edges.erase({std::min(from, to), std::max(from, to)});
+    edges.erase(edgeOf(from, to));
     edges.insert(edge);
     mesh.triangles[t] = first;
     mesh.triangles[other] = second;

@@ -22,10 +22,6 @@ constexpr std::size_t kMostEdges = 600;
 
 using Edge = std::array<int, 2>;
 
-Edge ordered(int a, int b) {
-  return {std::min(a, b), std::max(a, b)};
-}
-
 struct Loop {
   std::vector<int> vertices;  // in the sense in which triangles that close the hole run along it
   double length = 0;          // m
@@ -89,7 +85,7 @@ std::vector<std::array<int, 3>> triangulate(const TriangleMesh& mesh, const std:
   for (int span = 2; span < n; ++span) {
     for (int i = 0; i + span < n; ++i) {
       const int k = i + span;
-      if (span < n - 1 && edges.contains(ordered(loop[i], loop[k]))) continue;
+      if (span < n - 1 && edges.contains(edgeOf(loop[i], loop[k]))) continue;
       for (int j = i + 1; j < k; ++j) {
         const double sides = cost[i * n + j] + cost[j * n + k];
         if (sides >= cost[i * n + k]) continue;
@@ -150,7 +146,7 @@ void fillSmallHoles(MeshUnderRepair& repair) {
     }
     for (const auto& t : triangles) {
       repair.mesh.triangles.push_back(t);
-      for (int k = 0; k < 3; ++k) edges.insert(ordered(t[k], t[(k + 1) % 3]));
+      for (int k = 0; k < 3; ++k) edges.insert(edgeOf(t[k], t[(k + 1) % 3]));
     }
   }
   const std::string size = fmt::format("of {} ({} edges)", millimetres(longest.length), longest.vertices.size());

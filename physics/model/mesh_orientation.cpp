@@ -59,8 +59,7 @@ bool encloses(const TriangleMesh& mesh, const Component& outer, const Eigen::Vec
 
 void findDepths(const TriangleMesh& mesh, std::vector<Component>& components) {
   for (Component& inner : components) {
-    const auto& t = mesh.triangles[inner.triangles[0]];
-    const Eigen::Vector3d point = (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3;
+    const Eigen::Vector3d point = centroid(mesh, mesh.triangles[inner.triangles[0]]);
     for (const Component& outer : components)
       if (&outer != &inner && encloses(mesh, outer, point)) ++inner.depth;
   }

@@ -49,10 +49,9 @@ double totalLength(const std::vector<TriangleCut>& cuts) {
 }
 
 std::string describe(const TriangleMesh& mesh, const std::vector<TriangleCut>& cuts) {
-  const auto& first = mesh.triangles[cuts[0].triangle0];
   return fmt::format("the surface cuts through itself along {} ({} of triangles, the first near {})",
                      millimetres(totalLength(cuts)), counted(cuts.size(), "pair", "pairs"),
-                     place((mesh.vertices[first[0]] + mesh.vertices[first[1]] + mesh.vertices[first[2]]) / 3));
+                     place(centroid(mesh, mesh.triangles[cuts[0].triangle0])));
 }
 
 }  // namespace
@@ -139,7 +138,7 @@ void requireManifoldEdges(const MeshUnderRepair& repair) {
       if (count[t][k] <= 2) continue;
       const int a = repair.inputOfVertex[repair.mesh.triangles[t][k]],
                 b = repair.inputOfVertex[repair.mesh.triangles[t][(k + 1) % 3]];
-      bad.push_back({std::min(a, b), std::max(a, b)});
+      bad.push_back(edgeOf(a, b));
     }
   }
   if (bad.empty()) return;

@@ -26,8 +26,8 @@ std::vector<Side> sortedSides(const TriangleMesh& mesh) {
   sides.reserve(3 * mesh.triangles.size());
   for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
     for (int k = 0; k < 3; ++k) {
-      const int a = mesh.triangles[t][k], b = mesh.triangles[t][(k + 1) % 3];
-      sides.push_back({std::min(a, b), std::max(a, b), t, k});
+      const auto [low, high] = edgeOf(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]);
+      sides.push_back({low, high, t, k});
     }
   }
   std::sort(sides.begin(), sides.end());
@@ -61,7 +61,7 @@ std::vector<std::array<int, 2>> uniqueEdges(const TriangleMesh& mesh) {
   std::vector<std::array<int, 2>> edges;
   edges.reserve(3 * mesh.triangles.size());
   for (const auto& t : mesh.triangles)
-    for (int k = 0; k < 3; ++k) edges.push_back({std::min(t[k], t[(k + 1) % 3]), std::max(t[k], t[(k + 1) % 3])});
+    for (int k = 0; k < 3; ++k) edges.push_back(edgeOf(t[k], t[(k + 1) % 3]));
   sortUnique(edges);
   return edges;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -19,7 +20,12 @@ struct IndexLists {
 // The lists of (list, item) pairs; items keep their order within a list.
 IndexLists gather(int lists, const std::vector<std::array<int, 2>>& pairs);
 
-// Every edge once: lower vertex first, sorted.
+// Of two vertices, the lower first.
+inline std::array<int, 2> edgeOf(int a, int b) {
+  return {std::min(a, b), std::max(a, b)};
+}
+
+// Every edge once, sorted.
 std::vector<std::array<int, 2>> uniqueEdges(const TriangleMesh& mesh);
 
 // Triangles around each vertex, ascending.
@@ -33,6 +39,16 @@ std::vector<std::array<int, 3>> adjacentTriangles(const TriangleMesh& mesh);
 inline Eigen::Vector3d areaVector(const TriangleMesh& mesh, const std::array<int, 3>& triangle) {
   const Eigen::Vector3d& a = mesh.vertices[triangle[0]];
   return 0.5 * (mesh.vertices[triangle[1]] - a).cross(mesh.vertices[triangle[2]] - a);
+}
+
+inline Eigen::Vector3d centroid(const TriangleMesh& mesh, const std::array<int, 3>& triangle) {
+  return (mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] + mesh.vertices[triangle[2]]) / 3;
+}
+
+inline double longestEdge(const TriangleMesh& mesh, const std::array<int, 3>& triangle) {
+  const Eigen::Vector3d &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]],
+                        &c = mesh.vertices[triangle[2]];
+  return std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
 }
 
 // How many triangles share each triangle's edges: entry k counts those on (corner k, corner k + 1), itself included.

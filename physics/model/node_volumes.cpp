@@ -1,7 +1,6 @@
 #include "physics/model/node_volumes.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "physics/model/attachment.h"
 #include "physics/model/mesh_topology.h"
@@ -30,18 +29,6 @@ std::vector<double> stiffnesses(const std::vector<Attachment>& attachments, cons
     out.push_back(depth > 0 ? attachments[n].area / depth : 0);
   }
   return out;
-}
-
-int cellOf(const PowerCells& cells, const Vector3d& x) {
-  int best = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < cells.cells.size(); ++i) {
-    const double power = (x - cells.sites.centres[i]).squaredNorm() - cells.sites.weights[i];
-    if (!(cells.cells[i].volume > 0) || power >= least) continue;
-    least = power;
-    best = static_cast<int>(i);
-  }
-  return best;
 }
 
 // Of nodes with the volumes c * stiffness: their sums about the cell's centroid.
@@ -171,7 +158,8 @@ std::vector<double> stiffnessesOfLayer(const SoftBodyModel& model, const Identif
 void shareOutMass(const TriangleMesh& mesh, const PowerCells& cells, double fraction,
                   std::vector<Attachment>& attachments, std::vector<FillingSphere>& spheres) {
   constexpr double kMostMomentLoss = 0.7;
-  for (std::size_t n = 0; n < mesh.vertices.size(); ++n) attachments[n].massSphere = cellOf(cells, mesh.vertices[n]);
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
+    attachments[n].massSphere = cellAt(cells.sites, mesh.vertices[n]);
   shareOut(mesh.vertices, cells.cells, stiffnesses(attachments, vertexNormals(mesh), spheres), fraction,
            kMostMomentLoss, attachments, spheres);
 }
@@ -185,20 +173,16 @@ void shareOutMassByLayer(const IdentifiedLayer& layer, double fraction, SoftBody
 
 SoftBodyModel withoutNodeVolumes(const SoftBodyModel& model) {
   SoftBodyModel out = model;
-  std::vector<Vector3d> moment(model.spheres.size(), Vector3d::Zero());  // m4, about the frames
+  const std::vector<MassProperties> cells = cellsOf(model);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    out.spheres[i].restFrame = cells[i].centroid;
+    out.spheres[i].secondMoment = cells[i].secondMoment;
+  }
   for (std::size_t n = 0; n < out.attachments.size(); ++n) {
     Attachment& a = out.attachments[n];
-    moment[a.massSphere] += a.volume * (model.restNodes[n] - model.spheres[a.massSphere].restFrame);
     a.volume = 0;
+    if (!a.onLink) a.restOffset = out.restNodes[n] - out.spheres[a.host].restFrame;  // links end where they did
   }
-  for (std::size_t i = 0; i < moment.size(); ++i) {
-    FillingSphere& s = out.spheres[i];
-    const Vector3d way = moment[i] / s.volume;
-    s.restFrame += way;
-    s.secondMoment -= s.volume * way * way.transpose();
-  }
-  for (std::size_t n = 0; n < out.attachments.size(); ++n)  // links end where they did
-    if (Attachment& a = out.attachments[n]; !a.onLink) a.restOffset = out.restNodes[n] - out.spheres[a.host].restFrame;
   return out;
 }
 

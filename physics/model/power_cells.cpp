@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace medulla {
 
@@ -228,6 +229,18 @@ static std::vector<double> reachesOf(const VoxelBody& body, const PowerSites& si
   }
   for (double& reach : reaches) reach += 2 * body.size;  // thin edges lie beside the voxels' centres
   return reaches;
+}
+
+int cellAt(const PowerSites& sites, const Vector3d& point) {
+  int best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < sites.centres.size(); ++i) {
+    const double power = (point - sites.centres[i]).squaredNorm() - sites.weights[i];
+    if (power >= least) continue;
+    least = power;
+    best = static_cast<int>(i);
+  }
+  return best;
 }
 
 PowerSites sitesAround(const PowerSites& sites, std::pair<int, int> pair) {

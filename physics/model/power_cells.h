@@ -53,6 +53,9 @@ struct PowerSites {
   std::vector<double> reaches;           // m; no point of the body in the cell is further from the centre
 };
 
+// The cell that a point lies in.
+int cellAt(const PowerSites& sites, const Eigen::Vector3d& point);
+
 // The two sites and those whose cells can border on theirs within the body, in that order.
 PowerSites sitesAround(const PowerSites& sites, std::pair<int, int> pair);
 

@@ -6,17 +6,14 @@
 #include <cstddef>
 #include <numeric>
 
+#include "physics/model/mesh_topology.h"
+
 namespace medulla {
 
 using Eigen::Vector3d;
 
 static constexpr int kLeafSize = 4;
 static constexpr int kStackSize = 64;  // median splits keep the depth below 32
-
-static Vector3d centroid(const TriangleMesh& mesh, int t) {
-  const std::array<int, 3>& c = mesh.triangles[t];
-  return (mesh.vertices[c[0]] + mesh.vertices[c[1]] + mesh.vertices[c[2]]) / 3;
-}
 
 static int addNode(SurfaceTree& tree, const TriangleMesh& mesh, std::vector<int>& order, int begin, int end) {
   SurfaceTree::Node node;
@@ -38,7 +35,7 @@ static int addNode(SurfaceTree& tree, const TriangleMesh& mesh, std::vector<int>
   (node.high - node.low).maxCoeff(&axis);
   const int middle = (begin + end) / 2;
   std::nth_element(order.begin() + begin, order.begin() + middle, order.begin() + end, [&](int a, int b) {
-    const double ca = centroid(mesh, a)[axis], cb = centroid(mesh, b)[axis];
+    const double ca = centroid(mesh, mesh.triangles[a])[axis], cb = centroid(mesh, mesh.triangles[b])[axis];
     return ca != cb ? ca < cb : a < b;
   });
   const int left = addNode(tree, mesh, order, begin, middle);

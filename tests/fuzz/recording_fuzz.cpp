@@ -1,11 +1,10 @@
-#include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <stdexcept>
 #include <string_view>
 
 #include "app/files/recording_file.h"
 #include "tests/fuzz/memory_file.h"
+#include "tests/fuzz/sampled.h"
 
 // Whatever the bytes: either a trajectory that can be sampled, or one std::runtime_error. What stands before the first
 // zero byte describes the rest: XML, or a number for one of these.
@@ -23,16 +22,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (description.size() == 1) description = descriptions[static_cast<unsigned char>(description[0]) % 5];
   try {
     const medulla::MemoryFile file(reinterpret_cast<const std::uint8_t*>(description.data()), description.size());
-    const medulla::Trajectory t = medulla::parseRecording(text, "fuzz.txt", medulla::readRecordingMap(file.path()));
-    const double first = t.samples.front().time, last = t.samples.back().time;
-    for (int k = 0; k <= 8; ++k) {
-      const double time = (1 - k / 8.0) * first + k / 8.0 * last;
-      const medulla::ToolSample sample = medulla::sampleTrajectory(t, time);
-      if (!(sample.grip >= 0 && sample.grip <= 1)) std::abort();
-      if (!(sample.position.lpNorm<Eigen::Infinity>() <= medulla::kToolReach * (1 + 1e-9))) std::abort();
-      if (!(std::abs(sample.worldFromTool.norm() - 1) < 1e-9)) std::abort();
-      medulla::measuredForceAt(t, time);
-    }
+    medulla::sampleThroughout(medulla::parseRecording(text, "fuzz.txt", medulla::readRecordingMap(file.path())));
   } catch (const std::runtime_error&) {
   }
   return 0;

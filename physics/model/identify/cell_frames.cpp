@@ -133,12 +133,4 @@ CellFrames makeCellFrames(const TriangleMesh& mesh, const std::vector<Ball>& bal
   return out;
 }
 
-int cellAt(const PowerSites& sites, const Vector3d& point) {
-  int best = 0;
-  const auto power = [&](int i) { return (point - sites.centres[i]).squaredNorm() - sites.weights[i]; };
-  for (int i = 1; i < static_cast<int>(sites.centres.size()); ++i)
-    if (power(i) < power(best)) best = i;
-  return best;
-}
-
 }  // namespace medulla

@@ -24,7 +24,4 @@ struct CellFrames {
 
 CellFrames makeCellFrames(const TriangleMesh& mesh, const std::vector<Ball>& balls, const VoxelSolid& solid);
 
-// The frame in whose cell a point lies.
-int cellAt(const PowerSites& sites, const Eigen::Vector3d& point);
-
 }  // namespace medulla

@@ -73,8 +73,7 @@ double giveOfHeld(const TriangleMesh& mesh, const SolidSettings& settings, const
   constexpr int count = 16;
   if (solid.isFree) return 0;
   NodeSurface surface = measureNodes(mesh, {});
-  for (const int t : settings.heldTriangles)
-    for (const int n : mesh.triangles[t]) surface.held[n] = true;
+  surface.held = nodesOfTriangles(mesh, settings.heldTriangles);
   const RowMatrix forces = randomLoads(mesh, surface, LoadKind::bulk, boundsDiagonal(mesh), count, 3);
   Alongside<Work> doubled([&](const std::function<void(double)>& goOn) {
     return workOfDoubled(mesh, settings, solid.grid.size, forces, goOn);

@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <memory>
 #include <set>
 #include <stdexcept>
@@ -34,10 +33,17 @@ std::vector<int> wholeTriangles(const TriangleMesh& mesh, const HeldRegion& regi
 
 using Edge = std::pair<int, int>;
 
-std::vector<Edge> rimOf(const std::vector<std::array<int, 3>>& triangles) {
+std::vector<bool> nodesOfTriangles(const TriangleMesh& mesh, const std::vector<int>& triangles) {
+  std::vector<bool> out(mesh.vertices.size(), false);
+  for (const int t : triangles)
+    for (const int n : mesh.triangles[t]) out[n] = true;
+  return out;
+}
+
+std::vector<Edge> rimOf(const TriangleMesh& mesh, const std::vector<int>& triangles) {
   std::set<Edge> edges;
-  for (const std::array<int, 3>& t : triangles)
-    for (int k = 0; k < 3; ++k) edges.insert({t[k], t[(k + 1) % 3]});
+  for (const int t : triangles)
+    for (int k = 0; k < 3; ++k) edges.insert({mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]});
   std::vector<Edge> rim;
   for (const Edge& e : edges)
     if (!edges.contains({e.second, e.first})) rim.push_back(e);
@@ -70,7 +76,7 @@ std::vector<std::vector<Edge>> loopsOf(std::vector<Edge> rim) {
 HeldSpace spaceBehind(const TriangleMesh& mesh, const std::vector<int>& held) {
   HeldSpace out{{mesh.vertices, {}}, static_cast<int>(held.size())};
   for (const int t : held) out.surface.triangles.push_back(mesh.triangles[t]);
-  for (const std::vector<Edge>& loop : loopsOf(rimOf(out.surface.triangles))) {
+  for (const std::vector<Edge>& loop : loopsOf(rimOf(mesh, held))) {
     Vector3d middle = Vector3d::Zero();
     for (const Edge& e : loop) middle += mesh.vertices[e.first] / static_cast<double>(loop.size());
     const int centre = static_cast<int>(out.surface.vertices.size());

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <functional>
 #include <string>
 #include <utility>
@@ -21,8 +20,11 @@ struct HeldRegion {
 // Triangles with all corners in the region, ascending. Throws std::runtime_error where there is none.
 std::vector<int> wholeTriangles(const TriangleMesh& mesh, const HeldRegion& region);
 
+// Of each node of the mesh, whether it is a corner of one of the triangles.
+std::vector<bool> nodesOfTriangles(const TriangleMesh& mesh, const std::vector<int>& triangles);
+
 // Directed edges of triangles that no other of them has the other way round, ascending.
-std::vector<std::pair<int, int>> rimOf(const std::vector<std::array<int, 3>>& triangles);
+std::vector<std::pair<int, int>> rimOf(const TriangleMesh& mesh, const std::vector<int>& triangles);
 
 // The material behind triangles that are held: as far as a fan over each of their rims, about the rim's middle.
 struct HeldSpace {

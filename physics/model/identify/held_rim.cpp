@@ -37,12 +37,9 @@ std::map<std::pair<int, int>, Vector3d> areasByEdge(const TriangleMesh& mesh, co
 
 std::vector<RimEdge> rimOfHeld(const TriangleMesh& mesh, const std::vector<int>& heldTriangles,
                                const std::vector<HeldSpace>& heldSpaces) {
-  std::vector<Corners> triangles;
-  triangles.reserve(heldTriangles.size());
-  for (const int t : heldTriangles) triangles.push_back(mesh.triangles[t]);
   const auto areas = areasByEdge(mesh, heldSpaces);
   std::vector<RimEdge> out;
-  for (const auto& [a, b] : rimOf(triangles)) {
+  for (const auto& [a, b] : rimOf(mesh, heldTriangles)) {
     const Vector3d along = mesh.vertices[b] - mesh.vertices[a];
     const Vector3d &held = areas.at({a, b}), &free = areas.at({b, a});
     const double length = along.norm();

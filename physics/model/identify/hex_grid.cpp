@@ -101,11 +101,9 @@ void layOutCells(const VoxelBody& voxels, const std::vector<bool>& counts, HexGr
   for (int i = 0; i < grid.count[0]; ++i) {
     for (int j = 0; j < grid.count[1]; ++j) {
       for (int k = 0; k < grid.count[2]; ++k) {
-        const double part = inside[indexOf(grid, {i, j, k})];
-        if (part < kFractionMin) continue;
+        if (inside[indexOf(grid, {i, j, k})] < kFractionMin) continue;
         grid.cellAt[indexOf(grid, {i, j, k})] = static_cast<int>(grid.cells.size());
         grid.cells.push_back({i, j, k});
-        grid.fractions.push_back(part);
       }
     }
   }

@@ -20,7 +20,6 @@ struct HexGrid {
   std::vector<std::array<int, 3>> cells;              // by x, y, then z
   std::vector<int> cellAt;                            // cell at (i * count[1] + j) * count[2] + k, -1 where dropped
   std::vector<std::array<int, kHexNodes>> cellNodes;  // node (i * 3 + j) * 3 + k of the cell at i, j, k halves of it
-  std::vector<double> fractions;                      // of each cell inside the body
   Eigen::MatrixXd weights;                            // kHexGauss x cells, 1 in sum over a cell wholly inside
   std::vector<Eigen::Vector3d> nodes;                 // m
 };

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 #include <numbers>
 #include <stdexcept>
 
@@ -158,21 +157,13 @@ VoxelSolid makeSolid(const SoftBodyModel& model, const TriangleMesh& mesh, const
 
 // Calls `progress` at every trial of a fit, of which nobody knows how many there will be: nearer and nearer to the end
 // of its part.
-class FitProgress {
- public:
-  FitProgress(const Progress& progress, double from, double length)
-      : progress_(progress), from_(from), length_(length), trials_(std::make_shared<int>(0)) {}
-  void operator()() const {
-    constexpr double kUsual = 10;
-    const double trials = ++*trials_;
-    progress_(from_ + length_ * trials / (trials + kUsual));
-  }
-
- private:
-  const Progress& progress_;
-  double from_, length_;
-  std::shared_ptr<int> trials_;  // of all copies
-};
+std::function<void()> fitProgress(const Progress& progress, double from, double length) {
+  constexpr double kUsual = 10;
+  return [&progress, from, length, trials = 0.]() mutable {
+    ++trials;
+    progress(from + length * trials / (trials + kUsual));
+  };
+}
 
 // What finite elements say of a body and its cells.
 struct Solved {
@@ -196,7 +187,7 @@ struct Lessons {
 };
 
 IdentifiedLayer layerOf(const Trials& trials, const Lessons& lessons, const MatrixXd& left, double lengthScale,
-                        const FitProgress& progress) {
+                        const std::function<void()>& progress) {
   return fitLayer(trials.layer(), {lessons.forces, left, lessons.pokeWork}, lengthScale, progress);
 }
 
@@ -260,15 +251,15 @@ void fitSurface(const Solved& solved, const Trials& trials, const RowMatrix& for
   const Lessons lessons{forces, trials.deformation(onSurface),
                         forces.rightCols(half).cwiseProduct(beside.rightCols(half)).colwise().sum().transpose()};
   progress(0.2);
-  out.layer = layerOf(trials, lessons, beside, out.lengthScale, FitProgress(progress, 0.2, 0.3));
+  out.layer = layerOf(trials, lessons, beside, out.lengthScale, fitProgress(progress, 0.2, 0.3));
   chooseSkin(solved, trials, lessons, out, [&](double part) { progress(std::lerp(0.5, 0.7, part)); });
   if (!ends.cells.empty()) {
     const RowSparse skin = skinMatrix(out.skin, static_cast<int>(cells.frames.size()));
     out.links = unfitted;
-    fitAndClampLinks(cells, responses, loadsOnEnds(ends, responses.frames, skin), form, out, {});
+    fitAndClampLinks(cells, responses, loadsOnEnds(ends, responses.frames, skin), form, out, [](double) {});
   }
   out.layer = layerOf(trials, lessons, lessons.displacements - trials.ofFrames(forces), out.lengthScale,
-                      FitProgress(progress, 0.7, 0.3));
+                      fitProgress(progress, 0.7, 0.3));
 }
 
 // The network's errors under loads that nothing was fitted to, and the finite elements' by solving those again in
@@ -313,19 +304,15 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   sortUnique(triangles);
   solidSettings.heldSpaces = heldSpaces(mesh, held, patchTriangles);
   const auto stage = [&](double from, double to) -> Progress {
-    return [&progress, from, to](double part) {
-      if (progress) progress(std::lerp(from, to, part));
-    };
+    return [&progress, from, to](double part) { progress(std::lerp(from, to, part)); };
   };
-  std::vector<Ball> balls;
-  for (const FillingSphere& s : model.spheres) balls.push_back({s.restBallCentre, s.radius});
   const CellSize cell = chooseSize(model, mesh, behindHeld(solidSettings.heldSpaces));
   Alongside<VoxelSolid> largerCells([&](const Progress& goOn) {
     return makeVoxelSolid(mesh, kLargerCells * metCellSize(mesh, cell.size), solidSettings, goOn);
   });
   VoxelSolid solid = makeSolid(model, mesh, cell, solidSettings, stage(0, 0.2));
   requireWithinReach(solid.grid, mesh, solidSettings.heldTriangles);
-  const CellFrames cells = makeCellFrames(mesh, balls, solid);
+  const CellFrames cells = makeCellFrames(mesh, ballsOf(model), solid);
   out.voxel = solid.grid.size;
   out.lengthScale = cells.lengthScale;
   out.links = layOutLinks(mesh, cells, out.patches, patchTriangles);

@@ -26,13 +26,14 @@ struct Identification {
 };
 
 // Finds the network of `model` by finite elements of its own mesh, solved once, on several threads.
-// `progress`, if given, is called from the calling thread with 0..1; where it throws, the others end too.
+// `progress` is called from the calling thread with 0..1; where it throws, the others end too.
 // Deterministic: sets Eigen's cache sizes (for the whole program) so that sums run in one order on any processor; bytes
 // may still differ between mathematical libraries. Throws std::runtime_error on a region without a whole triangle, on
 // settings out of range, on more than kIdentifiedSpheresMax spheres, on a single sphere that nothing holds, on a
 // surface with fewer than three free nodes, where finite elements of the size that the mesh needs would not fit, where
 // the mesh is too thin for those that do, and where a number of the result would not be finite.
-Identification identifyNetwork(const SoftBodyModel& model, const std::vector<HeldRegion>& held,
-                               const IdentifySettings& settings, const std::function<void(double)>& progress = {});
+Identification identifyNetwork(
+    const SoftBodyModel& model, const std::vector<HeldRegion>& held, const IdentifySettings& settings,
+    const std::function<void(double)>& progress = [](double) {});
 
 }  // namespace medulla

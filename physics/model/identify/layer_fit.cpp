@@ -168,7 +168,7 @@ IdentifiedLayer fitLayer(const SurfaceLayer& surface, LayerLoads loads, double l
   // Skins leave next to nothing to give across; stiffer springs there would only shorten the step.
   const Vector3d low(0, 0, std::log(1e-3)), high(std::log(1e3), std::log(4.), std::log(0.1));
   const auto objective = [&](const VectorXd& x, VectorXd& gradient) {
-    if (goOn) goOn();
+    goOn();
     if ((x - low).minCoeff() < 0 || (x - high).maxCoeff() > 0) return std::numeric_limits<double>::infinity();
     const Vector3d k = units.cwiseProduct(Vector3d(x.array().exp()));
     if (!solver.factorise(k)) return std::numeric_limits<double>::infinity();

@@ -33,9 +33,9 @@ struct LayerLoads {
 };
 
 // Springs are 1 to 1000 / lengthScale, to 4 / lengthScale across, the membrane 1e-3 to 0.1 lengthScale: softer would
-// leave the frames' work to the layer, stiffer bound the time step for nothing. `goOn`, if given, is called at every
-// trial, of which there may be a hundred of seconds each; it may throw.
-IdentifiedLayer fitLayer(const SurfaceLayer& surface, LayerLoads loads, double lengthScale,
-                         const std::function<void()>& goOn = {});
+// leave the frames' work to the layer, stiffer bound the time step for nothing. `goOn` is called at every trial, of
+// which there may be a hundred of seconds each; it may throw.
+IdentifiedLayer fitLayer(
+    const SurfaceLayer& surface, LayerLoads loads, double lengthScale, const std::function<void()>& goOn = [] {});
 
 }  // namespace medulla

@@ -370,7 +370,7 @@ void fitLinks(const MatrixXd& compliance, const MatrixXd& grounding, const Loads
   int calls = 0;
   const auto value = [&](const LinkFit& fit, double kl, double response) {
     return [&, kl, response](const VectorXd& at, VectorXd& gradient) {
-      if (progress) progress(std::min(1., calls++ / (2.2 * (warmUp + iterations))));
+      progress(std::min(1., calls++ / (2.2 * (warmUp + iterations))));
       return fit.value(at, gradient, kl, response);
     };
   };

@@ -37,9 +37,9 @@ struct LoadsOnCells {
 // kept together by the Kullback-Leibler divergence of the two normal distributions that have these stiffnesses.
 // `grounding`, if not empty, is added to the network's stiffness: what the compliance has on rigid motions of a free
 // body. `progress` gets 0..1.
-void fitLinks(const Eigen::MatrixXd& compliance, const Eigen::MatrixXd& grounding, const LoadsOnCells& ends,
-              double lengthScale, LinkForm form, std::vector<IdentifiedLink>& links,
-              const std::function<void(double)>& progress);
+void fitLinks(
+    const Eigen::MatrixXd& compliance, const Eigen::MatrixXd& grounding, const LoadsOnCells& ends, double lengthScale,
+    LinkForm form, std::vector<IdentifiedLink>& links, const std::function<void(double)>& progress = [](double) {});
 
 // Moves the point at which a link to a patch is held to where it makes a bar of the link: clamped there, with the
 // middle between its two ends its centre of stiffness. In small displacements that changes nothing; in large ones the

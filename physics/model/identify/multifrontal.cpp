@@ -274,7 +274,7 @@ class Factorisation {
   }
 
   void report(const Workspace& w) const {
-    if (w.reports && progress_) progress_(done_ / plan_.operations);
+    if (w.reports) progress_(done_ / plan_.operations);
   }
 
   const DissectionPlan& plan_;

@@ -40,11 +40,12 @@ struct FrontFactors {
 // Matrices of cells, one per column: kHexFreedoms square, lower triangles read. Called from several threads at once.
 using CellMatrices = std::function<Eigen::MatrixXd(std::span<const int> cells)>;
 
-// Halves of the body are factorised at once; the factors' bits do not depend on how many threads there are. `progress`,
-// if given, is called from this thread with 0..1; where it throws, all work ends. Throws std::runtime_error where the
-// matrix is not positive definite.
-FrontFactors factorise(const DissectionPlan& plan, const HexGrid& grid, const CellMatrices& cellMatrices,
-                       const std::function<void(double)>& progress = {});
+// Halves of the body are factorised at once; the factors' bits do not depend on how many threads there are. `progress`
+// is called from this thread with 0..1; where it throws, all work ends. Throws std::runtime_error where the matrix is
+// not positive definite.
+FrontFactors factorise(
+    const DissectionPlan& plan, const HexGrid& grid, const CellMatrices& cellMatrices,
+    const std::function<void(double)>& progress = [](double) {});
 
 // Solves in place, on two threads: 3 nodes x right-hand sides. The more of these at once, the less each of them costs.
 void solve(const DissectionPlan& plan, const FrontFactors& factors, RowMatrix& x);

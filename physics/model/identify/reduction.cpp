@@ -59,7 +59,7 @@ Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const Ve
     x = displacementsUnder(solid, tractions(solid.loading.transpose() * x));
     out.framesUnderTractions.middleCols(first, count) = cells.motion * x;
     out.nodesUnderTractions.middleCols(first, count) = solid.surface * x;
-    if (progress) progress(static_cast<double>(first + count) / static_cast<double>(n));
+    progress(static_cast<double>(first + count) / static_cast<double>(n));
   }
   for (std::size_t i = 0; i < cells.heldGive.size(); ++i)
     out.frames.block<6, 6>(6 * static_cast<Index>(i), 6 * static_cast<Index>(i)) += cells.heldGive[i];

@@ -20,8 +20,9 @@ struct Responses {
 Eigen::MatrixXd solvePositive(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 
 // `areas`: of the mesh's nodes, 0 where held.
-Responses solveFrames(const VoxelSolid& solid, const CellFrames& cells, const Eigen::VectorXd& areas,
-                      const std::function<void(double)>& progress);
+Responses solveFrames(
+    const VoxelSolid& solid, const CellFrames& cells, const Eigen::VectorXd& areas,
+    const std::function<void(double)>& progress = [](double) {});
 
 // Of a free body from that of the pins it stands on, which its balanced loads do not feel. Its own stiffness is the
 // least energy over all rigid motions; on these a stiffness like the others' mean is added, so that there is a

@@ -54,8 +54,7 @@ bool isNearAlong(const Surface& surface, const std::array<int, 3>& from, const V
 // says how far away along the surface a wall has to be.
 double gapBefore(const Surface& surface, const std::array<int, 3>& triangle, double widest, double most) {
   constexpr double kNone = std::numeric_limits<double>::infinity(), kFaces = 0.5, kFar = 6, kOff = 1e-6;
-  const std::vector<Vector3d>& x = surface.mesh.vertices;
-  const Vector3d middle = (x[triangle[0]] + x[triangle[1]] + x[triangle[2]]) / 3;
+  const Vector3d middle = centroid(surface.mesh, triangle);
   const Vector3d normal = areaVector(surface.mesh, triangle).stableNormalized();
   const double gap = firstHit(surface.tree, middle + kOff * widest * normal, normal, most);
   if (!(gap < most)) return kNone;

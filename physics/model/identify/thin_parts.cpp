@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "physics/model/disjoint_sets.h"
+#include "physics/model/identify/held_region.h"
 #include "physics/model/plane_section.h"
 
 namespace medulla {
@@ -121,9 +122,7 @@ void requireLinked(const TriangleMesh& mesh, const CellFrames& cells, const std:
 
 void requireWithinReach(const HexGrid& grid, const TriangleMesh& mesh, const std::vector<int>& heldTriangles) {
   constexpr double reach = 0.5;  // cells, beyond the nearest one's faces: as far as locate() follows
-  std::vector<bool> isHeld(mesh.vertices.size(), false);
-  for (const int t : heldTriangles)
-    for (const int n : mesh.triangles[t]) isHeld[n] = true;
+  const std::vector<bool> isHeld = nodesOfTriangles(mesh, heldTriangles);
   double farthest = reach;
   const Vector3d* where = nullptr;
   for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {

@@ -65,9 +65,7 @@ struct HeldSprings {
 // Springs on what bounds the cells: held triangles where material lies behind them, fans where they cut the body.
 HeldSprings heldSprings(const TriangleMesh& mesh, const SolidSettings& settings, const HexGrid& grid) {
   HeldSprings held;
-  std::vector<std::array<int, 3>> triangles;
-  for (const int t : settings.heldTriangles) triangles.push_back(mesh.triangles[t]);
-  const std::vector<std::pair<int, int>> rim = rimOf(triangles);
+  const std::vector<std::pair<int, int>> rim = rimOf(mesh, settings.heldTriangles);
   const auto hold = [&](const Vector3d& point, double area) {
     const double stiffness = kHeldPenalty / grid.size * area;
     holdPoint(grid, point, stiffness, held.all);
@@ -195,9 +193,7 @@ std::map<int, std::vector<int>> pinnedFreedoms(const HexGrid& grid, const std::v
 // Held nodes do not move; behind what is held there are no cells to say so.
 RowSparse interpolation(const HexGrid& grid, const TriangleMesh& mesh, const std::vector<int>& heldTriangles) {
   const std::vector<Vector3d>& points = mesh.vertices;
-  std::vector<bool> isHeld(points.size(), false);
-  for (const int t : heldTriangles)
-    for (const int n : mesh.triangles[t]) isHeld[n] = true;
+  const std::vector<bool> isHeld = nodesOfTriangles(mesh, heldTriangles);
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(points.size() * kHexFreedoms);
   for (std::size_t p = 0; p < points.size(); ++p) {
@@ -212,7 +208,7 @@ RowSparse interpolation(const HexGrid& grid, const TriangleMesh& mesh, const std
   return out;
 }
 
-int voxelsFor(double volume, double cellSize) {
+int voxelsInCells(double volume, double cellSize) {
   // Beyond, voxels and the plan alone would take minutes and gigabytes; even of a row of single cells no more than
   // these have factors of 3 GB.
   constexpr double cellsMax = 2.5e4;
@@ -239,14 +235,14 @@ void requireRoom(const TriangleMesh& mesh, double cellSize, double memoryMax) {
 
 double metCellSize(const TriangleMesh& mesh, double cellSize) {
   const double volume = massProperties(mesh).volume;
-  return HexGrid::kVoxels * voxelSize(volume, voxelsFor(volume, cellSize));
+  return HexGrid::kVoxels * voxelSize(volume, voxelsInCells(volume, cellSize));
 }
 
 VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
                           const std::function<void(double)>& progress) {
   VoxelSolid solid;
   const double volume = massProperties(mesh).volume;
-  const int voxels = voxelsFor(volume, cellSize);
+  const int voxels = voxelsInCells(volume, cellSize);
   requireRoom(mesh, cellSize, settings.memoryMax);
   solid.voxels = voxeliseEvenly(mesh, volume, voxels);
   const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);

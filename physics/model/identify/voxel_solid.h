@@ -49,8 +49,9 @@ struct OverBudget : std::runtime_error {
 double metCellSize(const TriangleMesh& mesh, double cellSize);
 
 // Throws OverBudget, and std::runtime_error where the body is so thin that its cells do not hang together.
-VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
-                          const std::function<void(double)>& progress = {});
+VoxelSolid makeVoxelSolid(
+    const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
+    const std::function<void(double)>& progress = [](double) {});
 
 // Displacements of the grid's nodes, in place of the forces on them (3 grid nodes x loads).
 void solveSolid(const VoxelSolid& solid, RowMatrix& x);

@@ -101,10 +101,6 @@ def box(low, high):
     return lambda x, n: ((x > low) & (x < high)).all(axis=1)
 
 
-def facing(direction, cosine):
-    return lambda x, n: n @ np.array(direction) > cosine
-
-
 def grids(*numbers):
     return [meshes.Grid(m, times) for m, times in zip(numbers[::2], numbers[1::2])]
 

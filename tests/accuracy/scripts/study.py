@@ -1,7 +1,5 @@
 """Solves the cases of one body on its meshes, and says how far the meshes are from the truth."""
 
-import os
-
 import numpy as np
 
 import calculix
