@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "render/image.h"
 #include "tests/own_scene.h"
 
 // Where pictures go, through the program: the same bytes however a run is cut up, and nothing half-finished under a
@@ -374,6 +375,30 @@ TEST_F(Outputs, WhatCannotBeResumedIsWrongUsage) {
   expectRefused(render({"--still", "0", "--frames", "0:1"}), "--still", 2);
   folder.write("a.txt", "");
   expectRefused(render({"-o", "a.txt"}), "expected FILE.mp4, .webm, .gif or .webp, or a folder");
+}
+
+// Light does not run round a cube's edges as round a ball, though its triangles share their corners.
+TEST_F(Outputs, AMeshWithSharpEdgesIsDrawnAsTheBoxThatItIs) {
+  folder.write("own/cube.obj",
+               "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n"
+               "f 1 4 3\nf 1 3 2\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 4 8 7\nf 4 7 3\nf 1 5 8\nf 1 8 4\n"
+               "f 2 3 7\nf 2 7 6\n");
+  const std::string text = read("own/organ.xml");
+  const auto drawn = [&](const std::string& shape, const std::string& name) {
+    std::string changed = text;
+    changed.insert(changed.find("<tool "), "<static " + shape +
+                                               " position=\"-0.05 -0.04 0.09\" orientation=\"0.9 0.3 0.3 0\" "
+                                               "look=\"matte\" contact=\"false\"/>");
+    folder.write("own/organ.xml", changed);
+    const ProgramResult r = render({"--still", "0", "-o", name});
+    EXPECT_EQ(r.exitCode, 0) << r.err;
+    return readPng(folder / name);
+  };
+  const Image box = drawn("shape=\"box\" size=\"0.02 0.02 0.02\"", "box.png"),
+              mesh = drawn("shape=\"mesh\" mesh=\"cube.obj\" unit=\"cm\"", "mesh.png");
+  double difference = 0;
+  for (std::size_t k = 0; k < box.pixels.size(); ++k) difference += std::abs(box.pixels[k] - mesh.pixels[k]);
+  EXPECT_LT(difference / static_cast<double>(box.pixels.size()), 0.1);
 }
 
 }  // namespace

@@ -57,6 +57,22 @@ TEST_F(RunNotes, SubstepsThatAreTooLongAreSaidBeforeTheRun) {
   EXPECT_NE(notes[0].find(" are above the stable "), std::string::npos) << notes[0];
 }
 
+TEST_F(RunNotes, LinksThatBendFarMoreEasilyThanTheyTwist) {
+  const std::string text = read("own/organ.xml");
+  const auto notesOf = [&](const std::string& factors, const std::string& integrator) {
+    std::string changed = text;
+    changed.insert(changed.find("</body>"), "<links " + factors + "/>");
+    folder.write("own/organ.xml", changed);
+    return complaints(run({"check", "own/organ.xml", "--set", "dynamics.integrator=" + integrator}));
+  };
+  const Notes limp = notesOf("flexion=\"0.1\"", "explicit");
+  ASSERT_EQ(limp.size(), 1u);
+  EXPECT_TRUE(limp[0].starts_with("note: links of body 'organ' bend far more easily than they twist")) << limp[0];
+  EXPECT_EQ(notesOf("flexion=\"0.1\"", "implicit"), Notes{});
+  EXPECT_EQ(notesOf("flexion=\"0.1\" torsion=\"0.1\"", "explicit"), Notes{});
+  EXPECT_EQ(notesOf("flexion=\"0.5\"", "explicit"), Notes{});
+}
+
 TEST_F(RunNotes, GoldenMomentsThatAreOnePictureAreNotValid) {
   expectRefused(run({"check", "own/organ.xml", "--set", "output.golden=0.2 0.21"}),
                 "two golden moments are picture 5 at 25 Hz");

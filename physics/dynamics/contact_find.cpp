@@ -68,7 +68,7 @@ bool willTouch(const WorldData& d, const PairGroup& g, int lane, double gap) {
   const ContactData& c = d.contact;
   const Collider &a = c.colliders[g.collider0[lane]], &b = c.colliders[g.collider1[lane]];
   const std::array<std::uint32_t, 4> ends{a.sphere0, a.sphere1, b.sphere0, b.sphere1};
-  std::array<Lanes, 4> velocity;
+  Lanes velocity[4];
   for (int k = 0; k < 4; ++k) velocity[k] = withoutFourth(velocityOfBall(d, ends[k]));
   double squared = 0, smallest = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 4; ++k) {
