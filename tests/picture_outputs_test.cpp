@@ -387,7 +387,7 @@ TEST_F(Outputs, AMeshWithSharpEdgesIsDrawnAsTheBoxThatItIs) {
   const auto drawn = [&](const std::string& shape, const std::string& name) {
     std::string changed = text;
     changed.insert(changed.find("<tool "), "<static " + shape +
-                                               " position=\"-0.05 -0.04 0.09\" orientation=\"0.9 0.3 0.3 0\" "
+                                               " position=\"-0.05 -0.04 0.09\" orientation=\"0.9 0.3 0.3162278 0\" "
                                                "look=\"matte\" contact=\"false\"/>");
     folder.write("own/organ.xml", changed);
     const ProgramResult r = render({"--still", "0", "-o", name});

@@ -82,7 +82,7 @@ void addToolImpulses(const WorldData& d, double time, std::vector<Vector3d>& imp
 enum class Ending { done, failed, touched };
 
 // m/s: of what a body turns about, its centre or its pivot, where its masses move so.
-Vector3d leadOf(const WorldData& d, const BodyRange& r, const Motion& motion, const Vector3d& momentum, double mass) {
+Vector3d leadOf(const BodyRange& r, const Motion& motion, const Vector3d& momentum, double mass) {
   if (isFree(r)) return momentum / mass;
   const int sphere = r.support.point.sphere;
   return sphere >= 0 ? vectorOf(motion[2 * (r.firstSphere + sphere)]) : Vector3d::Zero();
@@ -111,7 +111,7 @@ void noteLost(const WorldData& d, ImplicitData& s, double share, double tangents
       whole += mass;
     });
     for (const int i : spheresOf(r)) angular += vectorOf(s.residual[2 * i + 1]);
-    const Vector3d lead = leadOf(d, r, s.motion, end - linear, whole), led = leadOf(d, r, s.start.motion, start, whole);
+    const Vector3d lead = leadOf(r, s.motion, end - linear, whole), led = leadOf(r, s.start.motion, start, whole);
     turning += whole * lead.cross(led) - lead.cross(start) - (end - linear).cross(led);
     s.lost[b].linear += share * linear;
     s.lost[b].angular += share * angular + tangents * turning;
