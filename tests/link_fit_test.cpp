@@ -101,7 +101,7 @@ TEST(LinkFit, ARowIsFoundFromLoadsOnItsEndThatAreNotItsOwn) {
 
 // A bar that is clamped 10 mm along x, told of a patch whose nearest point lies aside.
 TEST(LinkFit, ClampsAreCentredWithoutChangingSmallDisplacements) {
-  constexpr double kScale = 0.015;
+  constexpr double kClampScale = 0.015;
   const auto clampedAt = [](const Eigen::Vector3d& point) {
     IdentifiedLink l;
     l.frame1 = 1;
@@ -113,11 +113,11 @@ TEST(LinkFit, ClampsAreCentredWithoutChangingSmallDisplacements) {
   };
   IdentifiedLink bar = clampedAt({0.01, 0, 0}), aside = clampedAt({0.006, 0.004, -0.006});
   bar.stiffness = Vector6d(3, 1, 1, 0.2, 0.4, 0.4).asDiagonal();
-  const Eigen::MatrixXd stiffness = networkStiffness({bar}, kScale, 1);
-  const Matrix6d motions = linkMeasures(aside, kScale).leftCols<6>().inverse();
+  const Eigen::MatrixXd stiffness = networkStiffness({bar}, kClampScale, 1);
+  const Matrix6d motions = linkMeasures(aside, kClampScale).leftCols<6>().inverse();
   aside.stiffness = motions.transpose() * stiffness * motions;
-  centreClamp(kScale, aside);
-  EXPECT_LT((networkStiffness({aside}, kScale, 1) - stiffness).norm(), 1e-12 * stiffness.norm());
+  centreClamp(kClampScale, aside);
+  EXPECT_LT((networkStiffness({aside}, kClampScale, 1) - stiffness).norm(), 1e-12 * stiffness.norm());
   EXPECT_NEAR((aside.restPoint1 - bar.restPoint1).norm(), 0, 1e-12);
 }
 

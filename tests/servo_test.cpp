@@ -14,7 +14,7 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-static constexpr double thickness = 0.01, top = 0.5 * thickness;
+static constexpr double kPlateThickness = 0.01, kPlateTop = 0.5 * kPlateThickness;
 
 static ToolSettings frictionless() {
   ToolSettings tool;
@@ -32,16 +32,16 @@ static void nextFrame(Servo& servo, const DynamicsFrame& from, const DynamicsFra
 }
 
 TEST(Servo, ForceIsTheCouplingAndTheSpringHandedOverGivesTheSame) {
-  const TouchShape shape = plate(10, 0.03, thickness, 5);
+  const TouchShape shape = plate(10, 0.03, kPlateThickness, 5);
   ToolSettings tool = frictionless();
   Servo servo = plateServo(shape, tool, {0.001, 0.02, 0.002});
-  const Vector3d device(0.001, top + 0.001, 0.002);
+  const Vector3d device(0.001, kPlateTop + 0.001, 0.002);
   for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt(device)});
   const ToolState& state = servo.tools()[0];
   const double depth = tool.radius - 0.001;
   EXPECT_TRUE(state.inContact);
   EXPECT_FALSE(state.clamped);
-  EXPECT_LT((state.proxy - Vector3d(0.001, top + tool.radius, 0.002)).norm(), 1e-6);
+  EXPECT_LT((state.proxy - Vector3d(0.001, kPlateTop + tool.radius, 0.002)).norm(), 1e-6);
   EXPECT_LT((state.force - tool.stiffness * depth * Vector3d::UnitY()).norm(), 1e-3);
 
   // A second frame in which the device rests.
@@ -67,12 +67,12 @@ TEST(Servo, ForceIsTheCouplingAndTheSpringHandedOverGivesTheSame) {
 }
 
 TEST(Servo, ForceIsClampedAndSoIsWhatIsHandedOver) {
-  const TouchShape shape = plate(10, 0.03, thickness, 5);
+  const TouchShape shape = plate(10, 0.03, kPlateThickness, 5);
   ToolSettings tool = frictionless();
   tool.forceMax = 1;
   Servo servo = plateServo(shape, tool, {0.001, 0.02, 0.002});
   for (int frame = 0; frame < 2; ++frame) {
-    for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt({0.001, top - 0.004, 0.002})});
+    for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt({0.001, kPlateTop - 0.004, 0.002})});
     if (frame == 0) nextFrame(servo, frameAt(*shape, 0), frameAt(*shape, 0.02));
   }
   EXPECT_TRUE(servo.tools()[0].clamped);
@@ -81,7 +81,7 @@ TEST(Servo, ForceIsClampedAndSoIsWhatIsHandedOver) {
   servo.handOver(0.02, loads);
   double force = 0, stiffness = 0;
   for (const ToolSpring& spring : loads.toolSprings) {
-    force += std::min(spring.forceMax, spring.stiffness * (top - spring.anchor.y()));
+    force += std::min(spring.forceMax, spring.stiffness * (kPlateTop - spring.anchor.y()));
     stiffness += spring.stiffness;
   }
   EXPECT_NEAR(force, 1, 1e-3);
@@ -89,7 +89,7 @@ TEST(Servo, ForceIsClampedAndSoIsWhatIsHandedOver) {
 }
 
 TEST(Servo, BadInputIsRefusedByName) {
-  const TouchShape shape = plate(4, 0.03, thickness, 2);
+  const TouchShape shape = plate(4, 0.03, kPlateThickness, 2);
   Servo servo = plateServo(shape, {}, {0, 0.02, 0});
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   for (const double bad : {nan, inf, 25.0, -1e20}) {
@@ -108,7 +108,7 @@ TEST(Servo, BadInputIsRefusedByName) {
 }
 
 TEST(Servo, TwoToolsTouchTwoBodies) {
-  const TouchShape low = plate(6, 0.03, thickness, 3), high = plate(6, 0.03, thickness, 4);
+  const TouchShape low = plate(6, 0.03, kPlateThickness, 3), high = plate(6, 0.03, kPlateThickness, 4);
   DynamicsFrame frame = frameAt(*low, 0);
   frame.bodies.push_back(
       frameAt(*high, 0, [](const Vector3d& x, double) { return Vector3d(x + Vector3d(0.061, 0.002, 0)); }).bodies[0]);
@@ -117,8 +117,8 @@ TEST(Servo, TwoToolsTouchTwoBodies) {
   coarse.radius = 0.004;
   Servo servo({{low}, {high}}, {fine, coarse}, 1e-3, frame, {deviceAt({0, 0.02, 0}), deviceAt({0.061, 0.02, 0})});
   for (int k = 1; k <= 20; ++k) servo.tick(k / 20.0, {deviceAt({0, 0.003, 0}), deviceAt({0.061, 0.005, 0})});
-  EXPECT_NEAR(servo.tools()[0].proxy.y(), top + fine.radius, 1e-6);
-  EXPECT_NEAR(servo.tools()[1].proxy.y(), top + 0.002 + coarse.radius, 1e-6);
+  EXPECT_NEAR(servo.tools()[0].proxy.y(), kPlateTop + fine.radius, 1e-6);
+  EXPECT_NEAR(servo.tools()[1].proxy.y(), kPlateTop + 0.002 + coarse.radius, 1e-6);
   Loads loads;
   servo.handOver(0.02, loads);
   for (const ToolSpring& spring : loads.toolSprings) {
@@ -172,10 +172,10 @@ TEST(Servo, OneToolTouchesTwoBodiesAtOnce) {
 // way, too, and felt a frame and a half late.
 TEST(Servo, WhatGaveWayTellsNothingOfWhatLiesBehindIt) {
   constexpr double kFrame = 0.02, kSpeed = 0.1, kGap = 0.02;  // s, m/s, m
-  const TouchShape shape = plate(6, 0.03, thickness, 3);
+  const TouchShape shape = plate(6, 0.03, kPlateThickness, 3);
   const ToolSettings tool = frictionless();
   const double meets = 0.1;  // s, the first plate; it goes along, and is gone before the second
-  const auto deviceY = [&](double t) { return top + tool.radius + kSpeed * (meets - t); };
+  const auto deviceY = [&](double t) { return kPlateTop + tool.radius + kSpeed * (meets - t); };
   const double turns = meets + (kGap - 0.008) / kSpeed;
   const auto forces = [&](bool withFirst) {
     const auto frameOf = [&](double t) {
@@ -269,7 +269,7 @@ TEST(Servo, APressBeyondForceMaxIsClampedForHandAndTissue) {
 
 // However the device swings about where it sticks, it feels no more across than static friction carries.
 TEST(Servo, StickingForceStaysWithinTheFrictionCone) {
-  const TouchShape shape = plate(10, 0.03, thickness, 5);
+  const TouchShape shape = plate(10, 0.03, kPlateThickness, 5);
   ToolSettings tool = frictionless();
   tool.staticFriction = 0.3;
   tool.dynamicFriction = 0.2;
@@ -279,7 +279,7 @@ TEST(Servo, StickingForceStaysWithinTheFrictionCone) {
   for (int frame = 0; frame < 60; ++frame) {
     for (int k = 1; k <= 20; ++k) {
       const double t = 0.001 * (20 * frame + k), swing = t < 0.2 ? 0 : 0.00055 * std::sin(100 * (t - 0.2));
-      servo.tick(k / 20.0, {deviceAt({swing, top + 0.001, 0})});
+      servo.tick(k / 20.0, {deviceAt({swing, kPlateTop + 0.001, 0})});
       const Vector3d force = servo.tools()[0].force;
       if (t > 0.1) most = std::max(most, std::hypot(force.x(), force.z()) / force.y());
     }
