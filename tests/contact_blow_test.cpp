@@ -14,7 +14,7 @@ using synthetic::ball;
 
 namespace {
 
-constexpr double kRadius = 0.01;
+constexpr double kStruckRadius = 0.01;
 
 // Substeps as the world chooses them, 10 ms where nothing gives; the struck ball lies above the box.
 WorldSettings settings(const Vector3d& gravity = Vector3d::Zero()) {
@@ -38,7 +38,7 @@ double sinks(World& world, int frames) {
   double lowest = 0;
   for (int k = 0; k < frames; ++k) {
     world.advance({});
-    lowest = std::min(lowest, world.data().spheres.position[0].v[1] - kRadius);
+    lowest = std::min(lowest, world.data().spheres.position[0].v[1] - kStruckRadius);
   }
   return -lowest;
 }
@@ -50,20 +50,22 @@ TEST(ContactBlow, WhatIsStruckStopsAtWhatItIsPushedAgainst) {
   for (const double speed : {1., 2.5, 5., 8.}) {
     double touching = 0;
     for (const double gap : {-1e-5, 1e-5, 1e-4, 1e-3}) {
-      World world(settings(), {ball("struck", kRadius, {0, kRadius + gap, 0}), ball("striking", 0.02, {0, 0.0701, 0})},
+      World world(settings(),
+                  {ball("struck", kStruckRadius, {0, kStruckRadius + gap, 0}), ball("striking", 0.02, {0, 0.0701, 0})},
                   {boxBelowZero(0.02)});
       synthetic::throwBody(world, 1, {0, -speed, 0});
       const double depth = sinks(world, 25);
       if (gap < 0) touching = depth;
-      EXPECT_LT(depth, std::max(1.1 * touching, 0.15 * kRadius)) << gap << " m, " << speed << " m/s";
+      EXPECT_LT(depth, std::max(1.1 * touching, 0.15 * kStruckRadius)) << gap << " m, " << speed << " m/s";
     }
-    EXPECT_LT(touching, 0.5 * kRadius);
+    EXPECT_LT(touching, 0.5 * kStruckRadius);
   }
 }
 
 // Near enough to be listed, and half a millimetre apart when it passes.
 TEST(ContactBlow, WhatPassesByIsNotTurnedAside) {
-  World world(settings(), {ball("near", kRadius, {0, 0, 0}), ball("passing", kRadius, {-0.1, 2.05 * kRadius, 0})});
+  World world(settings(), {ball("near", kStruckRadius, {0, 0, 0}),
+                           ball("passing", kStruckRadius, {-0.1, 2.05 * kStruckRadius, 0})});
   synthetic::throwBody(world, 1, {8, 0, 0});
   for (int k = 0; k < 5; ++k) world.advance({});
   const Eigen::Vector3d v = vectorOf(world.data().spheres.velocity[1]);
@@ -72,7 +74,8 @@ TEST(ContactBlow, WhatPassesByIsNotTurnedAside) {
 
 // What comes aslant passes beside that place of a rod which is nearest to it now, and hits another.
 TEST(ContactBlow, WhatFallsOnASlopingLinkDoesNotPassIt) {
-  const auto rod = synthetic::ballModel({{{-0.04, 0.04, 0}, kRadius}, {{0.04, -0.04, 0}, kRadius}}, {{0, 1}});
+  const auto rod =
+      synthetic::ballModel({{{-0.04, 0.04, 0}, kStruckRadius}, {{0.04, -0.04, 0}, kStruckRadius}}, {{0, 1}});
   for (const double speed : {3.5, 6.5, 9.0}) {
     double deepest = 0;
     for (int k = 0; k < 20; ++k) {
@@ -96,8 +99,8 @@ TEST(ContactBlow, ASleeperThatIsStruckStandsOnWhatBearsIt) {
     for (const double sleepAfter : {0., 0.3}) {
       WorldSettings s = settings({0, -9.81, 0});
       s.sleepAfter = sleepAfter;
-      const double start = 2 * kRadius + 0.015 + height;
-      World world(s, {ball("struck", kRadius, {0, kRadius, 0}), ball("falling", 0.015, {0, start, 0})},
+      const double start = 2 * kStruckRadius + 0.015 + height;
+      World world(s, {ball("struck", kStruckRadius, {0, kStruckRadius, 0}), ball("falling", 0.015, {0, start, 0})},
                   {boxBelowZero(0.01)});
       for (int k = 0; k < 40; ++k) {  // held up until the other sleeps
         world.data().spheres.position[1].v[1] = start + (k % 2 == 0 ? 0 : 0.002);
@@ -108,12 +111,12 @@ TEST(ContactBlow, ASleeperThatIsStruckStandsOnWhatBearsIt) {
       ASSERT_FALSE(world.data().rest[1].asleep);
       depth[sleepAfter > 0 ? 1 : 0] = sinks(world, 60);
     }
-    EXPECT_LT(depth[1], std::max(1.5 * depth[0], 0.1 * kRadius)) << height << " m";
+    EXPECT_LT(depth[1], std::max(1.5 * depth[0], 0.1 * kStruckRadius)) << height << " m";
   }
 }
 
 TEST(ContactBlow, ABodyWithoutNodesKeepsItsVolume) {
-  const World world(settings(), {ball("bare", kRadius, {0, 0, 0})});
+  const World world(settings(), {ball("bare", kStruckRadius, {0, 0, 0})});
   EXPECT_EQ(world.volumeRatio(0), 1);
 }
 
@@ -124,7 +127,8 @@ TEST(ContactBlow, FrictionOfAPairIsTheGeometricMeanOfItsSides) {
     WorldSettings fine = settings();
     fine.frameDuration = 1e-4;
     fine.substeps = 1;
-    World world(fine, {ball("a", kRadius, {-0.020001, 0, 0}, first), ball("b", kRadius, {0, 0, 0}, second)});
+    World world(fine,
+                {ball("a", kStruckRadius, {-0.020001, 0, 0}, first), ball("b", kStruckRadius, {0, 0, 0}, second)});
     const Vector3d before(0.05, 0.1, 0);
     synthetic::throwBody(world, 0, before);
     for (int k = 0; k < 100; ++k) world.advance({});
@@ -133,15 +137,16 @@ TEST(ContactBlow, FrictionOfAPairIsTheGeometricMeanOfItsSides) {
     EXPECT_NEAR(given.y() / given.x(), 0.3, 0.3 * 0.01) << first << ' ' << second;
     EXPECT_NEAR((vectorOf(world.data().spheres.velocity[1]) - given).norm(), 0, 1e-12);
     // Both are spun alike by a force at their surfaces.
-    const double spin = given.y() / (0.4 * kRadius);
+    const double spin = given.y() / (0.4 * kStruckRadius);
     for (int i = 0; i < 2; ++i)
       EXPECT_NEAR(std::abs(vectorOf(world.data().spheres.angularVelocity[i]).z()), spin, 0.01 * spin);
   }
 }
 
 TEST(ContactBlow, PenetrationIsInPercentOfTheSmallerRadius) {
-  for (const auto& [first, second] : {std::pair{kRadius, 0.5 * kRadius}, std::pair{0.5 * kRadius, kRadius}}) {
-    World world(settings(), {ball("a", first, {0, 0, 0}), ball("b", second, {1.2 * kRadius, 0, 0})});
+  for (const auto& [first, second] :
+       {std::pair{kStruckRadius, 0.5 * kStruckRadius}, std::pair{0.5 * kStruckRadius, kStruckRadius}}) {
+    World world(settings(), {ball("a", first, {0, 0, 0}), ball("b", second, {1.2 * kStruckRadius, 0, 0})});
     for (int k = 0; k < 10; ++k) world.advance({});
     EXPECT_NEAR(world.penetration().bodies, 60, 1e-9);  // at the start: 0.3 of 0.5 radii
   }
