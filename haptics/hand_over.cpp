@@ -30,7 +30,8 @@ struct Part {
 // from where the device was then: from where it had come from, tissue would be drawn back against the hand's motion.
 static Path devicePath(const ServoTool& tool, double frameDuration, double tickDuration) {
   if (tool.ticks == 0) return {tool.device.position, Vector3d::Zero()};
-  if (tool.holdBegan) return {tool.device.position, (tool.device.position - tool.holdBegan->position) / frameDuration};
+  if (tool.holdBegan && !tool.grip.held.empty())
+    return {tool.device.position, (tool.device.position - tool.holdBegan->position) / frameDuration};
   const Vector3d velocity = (tool.device.position - tool.deviceAtFrameStart.position) / (tool.ticks * tickDuration);
   return {tool.deviceSum / tool.ticks + 0.5 * (frameDuration - tickDuration) * velocity, velocity};
 }

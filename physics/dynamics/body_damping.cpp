@@ -2,6 +2,7 @@
 #include <limits>
 
 #include "physics/dynamics/stages.h"
+#include "physics/dynamics/whole_motion.h"
 
 // The mass-proportional part of Rayleigh's damping: it slows low modes, which the links' part reaches only at the price
 // of the step. Textbooks let it act against the world; here it acts against the body's own rigid motion, as far as what
@@ -84,26 +85,18 @@ RigidLanes freeMotion(const WorldData& d, const BodyRange& r) {
 
 // The rotation about a point, or about a line through two, with the spheres' angular momentum there, seen from the
 // point's own motion.
-RigidLanes supportedMotion(const WorldData& d, const BodyRange& r) {
-  const Spheres& s = d.spheres;
-  const auto placeOf = [&](const SupportPoint& p) {
-    return p.sphere >= 0 ? load(s.position[r.firstSphere + p.sphere])
-                         : lanesOf(vectorAt(d.nodes.position, r.node[p.node]));
-  };
-  const SupportPoint& point = r.support.point;
-  const Lanes zero = splat(0);
-  RigidLanes motion{placeOf(point), zero, zero};
-  if (point.sphere >= 0) motion.linear = load(s.velocity[r.firstSphere + point.sphere]);
-  if (r.support.freedom == RigidFreedom::none) return motion;
+RigidLanes supportedMotion(const WorldData& d, int body) {
+  const BodyRange& r = d.ranges[body];
+  const Pivot pivot = pivotOf(d, body);
+  RigidLanes motion{lanesOf(pivot.point), lanesOf(pivot.velocity), splat(0)};
+  if (!canTurn(r)) return motion;
   const Moments m = momentsAbout(motion.centre, d, r);
   const Matrix3d inertia = inertiaOf(m.squares, m.products, m.spinMoment);
   const Vector3d momentum = vectorOf(m.angularMomentum - crossProduct(m.first, motion.linear));
-  if (r.support.freedom == RigidFreedom::aboutPoint) {
-    motion.angular = lanesOf(inertia.ldlt().solve(momentum));
-  } else {
-    const Vector3d line = vectorOf(placeOf(r.support.second) - motion.centre);
-    motion.angular = lanesOf(line.dot(momentum) / line.dot(inertia * line) * line);
-  }
+  const Vector3d& line = pivot.line;
+  motion.angular = lanesOf(pivot.freedom == RigidFreedom::aboutPoint
+                               ? Vector3d(inertia.ldlt().solve(momentum))
+                               : Vector3d(line.dot(momentum) / line.dot(inertia * line) * line));
   return motion;
 }
 
@@ -134,7 +127,7 @@ void dampBodies(WorldData& d, const Batch& batch) {
     if (damping == 0) continue;
     const double lost = 1 - 1 / (1 + d.substep * damping);
     const bool turns = canTurn(r);
-    const RigidLanes rigid = isFree(r) ? freeMotion(d, r) : supportedMotion(d, r);
+    const RigidLanes rigid = isFree(r) ? freeMotion(d, r) : supportedMotion(d, b);
     turns ? dampAgainst<true>(rigid, lost, r, d) : dampAgainst<false>(rigid, lost, r, d);
   }
 }

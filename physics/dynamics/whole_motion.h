@@ -27,7 +27,7 @@ struct Pivot {
   Eigen::Vector3d point = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();  // m, m/s; but for `all`
   Eigen::Vector3d line = Eigen::Vector3d::Zero();                                       // m, of `aboutLine`
 };
-// Of such a body, as it stands.
+// As the body stands; of one that cannot turn, what it is carried by.
 Pivot pivotOf(const WorldData& d, int body);
 
 struct RigidMotion {
