@@ -58,8 +58,9 @@ void drawDepth(const Viewpoint& view, VisibleTriangles& out) {
 
 // Is there something nearer wherever the triangle or a texel beside it could show?
 bool isHidden(const VisibleTriangles& seen, const std::uint32_t* t) {
-  constexpr float kMargin = 2.5f;   // texels: the map knows its texels' centres only
-  constexpr float kBias = 0.0001f;  // 0.8 mm at 0.2 m: a fine surface must not hide itself
+  constexpr float kMargin = 2.5f;  // texels: the map knows its texels' centres only
+  // .8 mm of .2 m, if the camera looks at what is as far away: a fine surface must not hide itself.
+  constexpr float kBias = 0.000012f;
   const glm::vec3 a = seen.texel[t[0]], b = seen.texel[t[1]], c = seen.texel[t[2]];
   const float right = float(seen.nearest.width - 1), bottom = float(seen.nearest.height - 1);
   const float z = std::min({a.z, b.z, c.z}) - kBias;

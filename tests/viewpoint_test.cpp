@@ -2,20 +2,28 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "render/haze.h"
 
 namespace medulla {
 
-// What a camera looks at from a few millimetres is drawn; farther away the near plane stays, and with it every depth.
-TEST(Viewpoint, NothingBetweenTheLensAndWhatItLooksAtIsCutAway) {
-  Camera camera;
-  camera.target = {0, 0, 0};
-  camera.position = {0, 0, 0.0025f};
-  EXPECT_FLOAT_EQ(makeViewpoint(camera, 1, false).nearPlane, 0.00025f);
-  const glm::vec4 clip = makeViewpoint(camera, 1, false).clipFromWorld * glm::vec4(0, 0, 0.002f, 1);
-  EXPECT_GT(clip.z, -clip.w) << "half a millimetre before the lens";
-  camera.position = {0, 0, 0.2f};
-  EXPECT_FLOAT_EQ(makeViewpoint(camera, 1, false).nearPlane, 0.005f);
+// A shaft that passes the lens is drawn whole; what is looked at from far away does not show through what is before it.
+TEST(Viewpoint, DepthsReachFromTheLensToFarBeyondTheTargetAtAnyDistance) {
+  for (const float distance : {0.01f, 0.2f, 5.f, 160.f, 900.f}) {
+    SCOPED_TRACE(distance);
+    Camera camera;
+    camera.position = {0, 0, 0};
+    camera.target = {0, 0, -distance};
+    const Viewpoint view = makeViewpoint(camera, 1, false);
+    const auto depth = [&](float d) {
+      const glm::vec4 clip = view.clipFromWorld * glm::vec4(0, 0, -d, 1);
+      return clip.z / clip.w;  // -1 at the near plane, 1 at the far one
+    };
+    EXPECT_GT(depth(std::max(0.004f * distance, 0.00021f)), -1) << "at a share of the way";
+    EXPECT_LT(depth(distance), depth(1.0002f * distance));
+    EXPECT_LT(depth(2 * distance), depth(2.001f * distance));
+  }
 }
 
 // Its lamp stands beside the lens: of the narrow cone of a camera that zooms in, what is nearer would see nothing.
