@@ -30,6 +30,17 @@ void lookFromLamp(LightView& l, glm::vec3 up) {
                     glm::lookAt(l.position, l.position + l.direction, up);
 }
 
+// What a view is fitted to moves from picture to picture. Rounded, the view stays but for rare jumps: texels that shifted a
+// little each time would make the edges of resting bodies' shadows crawl.
+float roundUp(float x) {
+  return std::exp2(std::ceil(4 * std::log2(x)) / 4);
+}
+
+glm::vec3 roundedMiddle(glm::vec3 low, glm::vec3 high) {
+  const float step = roundUp(std::max(glm::length(high - low), 1e-6f)) / 8;
+  return step * glm::round(0.5f / step * (low + high));
+}
+
 // Everything that casts a shadow lies inside, everything that receives one no farther than the far plane.
 LightView makeLampView(glm::vec3 position, const SceneMesh& mesh) {
   constexpr float kMargin = 1.05f, kWidest = 3;
@@ -41,7 +52,7 @@ LightView makeLampView(glm::vec3 position, const SceneMesh& mesh) {
     }
   LightView l;
   l.position = position;
-  l.direction = low.x <= high.x ? direction(position, 0.5f * (low + high)) : glm::vec3(0, -1, 0);
+  l.direction = low.x <= high.x ? direction(position, roundedMiddle(low, high)) : glm::vec3(0, -1, 0);
   float nearest = 1e30f, farthest = 0, tangent = 0;
   for (const MeshPart& part : mesh.parts)
     for (std::uint32_t i = 0; i < part.vertexCount; ++i) {
@@ -52,10 +63,10 @@ LightView makeLampView(glm::vec3 position, const SceneMesh& mesh) {
       nearest = std::min(nearest, along);
       tangent = std::max(tangent, glm::length(d - along * l.direction) / along);
     }
-  l.tangent = std::clamp(kMargin * tangent, 1e-3f, kWidest);
-  l.farDistance = std::max(kMargin * farthest, 1e-3f);
+  l.tangent = std::min(roundUp(std::max(kMargin * tangent, 1e-3f)), kWidest);
+  l.farDistance = roundUp(std::max(kMargin * farthest, 1e-3f));
   // Not all of the depth for thin scenes: the biases of the shadow map are shares of it.
-  l.nearDistance = std::clamp(nearest / kMargin, 1e-3f * l.farDistance, 0.5f * l.farDistance);
+  l.nearDistance = std::clamp(1 / roundUp(kMargin / nearest), 1e-3f * l.farDistance, 0.5f * l.farDistance);
   lookFromLamp(l, anyPerpendicular(l.direction));
   return l;
 }

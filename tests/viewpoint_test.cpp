@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "render/haze.h"
 
@@ -38,6 +39,33 @@ TEST(Viewpoint, ZoomingInDoesNotNarrowTheLampsCone) {
   };
   EXPECT_GT(tangentAt(60), tangentAt(42));
   EXPECT_NEAR(tangentAt(10), tangentAt(42), 0.02f * tangentAt(42));
+}
+
+// A lamp in the world sees all that casts a shadow; but where one of many bodies moves a little from picture to picture,
+// the texels of its view stay where they are, or the edges of all resting shadows would crawl.
+TEST(Viewpoint, ALampsViewHoldsAllCastersAndRarelyFollowsThem) {
+  const Look look;
+  SceneMesh mesh;
+  mesh.position = {{-0.2f, 0, -0.2f}, {0.25f, 0, 0.2f}, {0, 0.3f, 0}};
+  mesh.parts.resize(1);
+  mesh.parts[0].vertexCount = 3;
+  mesh.parts[0].look = &look;
+  Light light;
+  light.position = glm::vec3(-0.6f, 1.2f, 0.6f);
+  Camera camera;
+  glm::mat4 last(0);
+  int changes = 0;
+  for (int i = 0; i < 100; ++i) {
+    mesh.position[2].y = 0.3f - 0.001f * float(i);
+    const LightView view = makeLightView(light, makeViewpoint(camera, 1, false), camera, mesh);
+    if (view.clipFromWorld != last) ++changes;
+    last = view.clipFromWorld;
+    for (const glm::vec3 p : mesh.position) {
+      const glm::vec4 clip = last * glm::vec4(p, 1);
+      for (int k = 0; k < 3; ++k) EXPECT_LT(std::abs(clip[k]), clip.w) << i;
+    }
+  }
+  EXPECT_LE(changes, 6);
 }
 
 // As one that is tilted there from the horizontal: a film does not turn by a right angle in the picture in between.
