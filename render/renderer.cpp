@@ -125,7 +125,9 @@ struct Renderer::Data {
   SceneMesh rest;  // surfaces at rest, baked
   BallShade ballShade;
   std::vector<std::vector<ShadeBall>> restBalls;  // per surface
-  SceneMesh finer;                                // `mesh` for a picture that is too large or too near for it
+  SceneMesh toolsAlone;                           // of the model view, which has no surfaces
+  SceneMesh* shown = &mesh;                       // or toolsAlone
+  SceneMesh finer;                                // `shown` for a picture that is too large or too near for it
   bool isFiner = false;
   bool baked = true;
   std::optional<HazeField> haze;
@@ -156,7 +158,7 @@ struct Renderer::Data {
   }
   ~Data() { context->makeCurrent(); }
 
-  const SceneMesh& drawn() const { return isFiner ? finer : mesh; }
+  const SceneMesh& drawn() const { return isFiner ? finer : *shown; }
   const ShadowMap* shadowIfOn() const { return settings.shadows ? &shadow : nullptr; }
 
   void bake();
@@ -188,7 +190,9 @@ void Renderer::Data::bake() {
 }
 
 void Renderer::Data::placeSurfaces(const Picture& picture) {
-  removeInstruments(mesh);
+  shown = picture.view == ViewKind::model ? &toolsAlone : &mesh;
+  removeInstruments(*shown);
+  if (shown == &toolsAlone) return;
   std::fill(mesh.blanch.begin(), mesh.blanch.end(), 0.f);
   std::copy(rest.openness.begin(), rest.openness.end(), mesh.openness.begin());
   BallShade::Balls balls;
@@ -217,9 +221,9 @@ void Renderer::Data::placeSurfaces(const Picture& picture) {
 
 void Renderer::Data::placeInstruments(const Picture& picture, const Viewpoint& view) {
   for (const Instrument& i : picture.instruments)
-    if (i.touching) applyTouch(i, mesh);
-  for (const Instrument& i : picture.instruments) shadeAround(i, mesh);
-  for (const Instrument& i : picture.instruments) appendInstrument(i, view, fineHeight, mesh);
+    if (i.touching) applyTouch(i, *shown);
+  for (const Instrument& i : picture.instruments) shadeAround(i, *shown);
+  for (const Instrument& i : picture.instruments) appendInstrument(i, view, fineHeight, *shown);
 }
 
 void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view) {
@@ -227,7 +231,7 @@ void Renderer::Data::lightAndSort(const Picture& picture, const Viewpoint& view)
   haze.reset();
   if (picture.light.haze && picture.view != ViewKind::model) haze.emplace(picture.light, picture.camera, picture.time);
   const Halved halved = fineHeight >= kLinesOfMeshes ? Halved::outlines : Halved::largest;
-  isFiner = tessellate(mesh, view, settings.height, halved, finer);
+  isFiner = tessellate(*shown, view, settings.height, halved, finer);
   lightView = makeLightView(picture.light, view, picture.camera, drawn());
   if (settings.shadows) renderShadowMap(drawn(), lightView, shadow);
   findVisibleTriangles(drawn(), view, picture.view == ViewKind::tissue, seen);
@@ -249,12 +253,11 @@ void Renderer::Data::draw(const Picture& picture, const Viewpoint& view) {
   if (view.round) tissue.drawMask(view);
   tissue.upload(lit, lists, shadowIfOn());
 
-  std::vector<char> opaque(mesh.parts.size()), seenThrough(mesh.parts.size());
-  for (std::size_t p = 0; p < mesh.parts.size(); ++p) {
-    const MeshPart& part = mesh.parts[p];
-    const bool skin = part.moving && picture.view == ViewKind::both;
-    opaque[p] = part.instrument || (picture.view != ViewKind::model && !skin);
-    seenThrough[p] = skin;
+  const std::size_t parts = drawn().parts.size();
+  std::vector<char> opaque(parts), seenThrough(parts);
+  for (std::size_t p = 0; p < parts; ++p) {
+    seenThrough[p] = picture.view == ViewKind::both && drawn().parts[p].moving;
+    opaque[p] = !seenThrough[p];
   }
   tissue.draw(drawn(), lists, opaque, view, lightView, 1);
   if (haze) background.draw(view, *haze);
