@@ -81,7 +81,8 @@ struct BodyDescription {
   LinkModel links = LinkModel::beam;
   Eigen::Isometry3d worldFromModel = Eigen::Isometry3d::Identity();
   std::vector<FixedSphere> fixed;
-  std::vector<int> fixedNodes;  // of the full surface; without effect on a skin, which follows its spheres
+  // Held in place; not on a skin, which follows its spheres. They clamp the sections of links beside held spheres.
+  std::vector<int> fixedNodes;
   std::vector<DrivenSphere> driven;
   std::optional<std::vector<int>> neighbours;  // bodies that it may touch; absent: all that do not choose others
   std::vector<DeadLoad> deadLoads;             // several on one node add up
