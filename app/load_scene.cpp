@@ -127,7 +127,7 @@ static void resolveFixes(const Scene& scene, SceneBody& body) {
   if (body.links == LinkModel::identified) {
     resolvePatches(scene, body);
     if (!model.identified->usesFormulas) {
-      for (const int sphere : spheresBehindPatches(*model.identified)) body.fixed.push_back({sphere});
+      for (const int sphere : model.identified->heldFrames) body.fixed.push_back({sphere});
       return;
     }
     body.links = LinkModel::beam;
@@ -224,7 +224,7 @@ static void loadModels(Scene& scene) {
 static void requireLook(const Scene& scene, int line, const std::string& look) {
   const std::vector<std::string> known = lookNames();
   if (isOneOf(look, known)) return;
-  throw valueError(scene, line, {"look"}, fmt::format("unknown look \"{}\": expected {}", look, joined(known, ", ")));
+  throw valueError(scene, line, {"look"}, fmt::format("unknown look \"{}\": {}", look, hintOfNames(look, known)));
 }
 
 static Trajectory loadTrajectory(const Scene& scene, SceneTool& tool) {

@@ -127,7 +127,7 @@ BodyDescription bodyOf(const StaticCase& c, const Result& result) {
   body.links = LinkModel::identified;
   body.fixedNodes = body.model->identified->patches[0].nodes;
   body.fixed.clear();  // what is held is a frame of its own
-  for (const int sphere : spheresBehindPatches(*body.model->identified)) body.fixed.push_back({sphere});
+  for (const int sphere : body.model->identified->heldFrames) body.fixed.push_back({sphere});
   return body;
 }
 

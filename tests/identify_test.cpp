@@ -173,6 +173,29 @@ TEST(VoxelSolid, ACantileverBendsAsABeam) {
   EXPECT_LT(errors[1], 0.025);
 }
 
+// A run holds nodes: what lies between nodes of two regions is held as if one spanned both.
+TEST(HeldRegion, TrianglesBetweenRegionsAreHeld) {
+  const TriangleMesh mesh = cylinder();
+  const auto region = [&](const std::string& text, double from, double to) {
+    HeldRegion out{text, {}, false};
+    for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
+      if (mesh.vertices[n].x() >= from && mesh.vertices[n].x() < to) out.nodes.push_back(static_cast<int>(n));
+    return out;
+  };
+  const std::vector<int> whole = heldTriangles(mesh, {region("whole", -1, 0.0301)})[0];
+  std::vector<int> parts;
+  for (const std::vector<int>& of :
+       heldTriangles(mesh, {region("near", -1, 0.0151), region("far", 0.0151, 0.0301)}))
+    parts.insert(parts.end(), of.begin(), of.end());
+  std::sort(parts.begin(), parts.end());
+  EXPECT_EQ(parts, whole);
+  const auto refusalOf = [&](const std::vector<HeldRegion>& regions) {
+    return complaintOf([&] { heldTriangles(mesh, regions); });
+  };
+  EXPECT_EQ(refusalOf({region("all", -1, 1)}), "all holds the whole surface");
+  EXPECT_EQ(refusalOf({region("half", -1, 0.05), region("rest", 0.05, 1)}), "half and others hold the whole surface");
+}
+
 // What lies behind the fan over the held triangles' rim is gone: the rest answers as a body that ends there.
 TEST(VoxelSolid, MaterialBehindHeldTrianglesHoldsAsAFaceThereWould) {
   const TriangleMesh whole = cylinder();
@@ -397,9 +420,16 @@ TEST(IdentifiedNetwork, SpheresBehindAPatchAreHeld) {
   for (std::size_t k = 0; k < network.frames.size(); ++k)
     if (network.frames[k].restPosition.x() < 0.035) behind.push_back(static_cast<int>(k));
   ASSERT_GE(behind.size(), 1u);
-  EXPECT_EQ(spheresBehindPatches(network), behind);
-  EXPECT_TRUE(spheresBehindPatches(heldCylinder().network).empty());
-  EXPECT_TRUE(spheresBehindPatches(freeCylinder().network).empty());
+  EXPECT_EQ(network.heldFrames, behind);
+  EXPECT_TRUE(heldCylinder().network.heldFrames.empty());
+  EXPECT_TRUE(freeCylinder().network.heldFrames.empty());
+  // Two regions that overlap share the stiffness of what lies behind both; together they hold as much.
+  HeldRegion beyond{"box=0.01,-1,-1,0.0451,1,1", {}, true}, before{"plane=1,0,0,0.0301", {}, true};
+  for (const int n : region.nodes) {
+    if (mesh.vertices[n].x() >= 0.01) beyond.nodes.push_back(n);
+    if (mesh.vertices[n].x() <= 0.0301) before.nodes.push_back(n);
+  }
+  EXPECT_EQ(identifyNetwork(cylinderModel(), {before, beyond}, {}).network.heldFrames, behind);
 
   BodyDescription body;
   body.model = [&] {

@@ -212,6 +212,7 @@ SoftBodyModel identifiedModel() {
   network->voxel = 0.01;
   for (const FillingSphere& s : m.spheres) network->frames.push_back({s.restFrame, s.volume, s.secondMoment});
   network->patches = {{"box=0,0,0,1,1,\"<1", {0, 3}}};
+  network->heldFrames = {1};
   IdentifiedLink link;
   link.frame1 = 1;
   link.restPoint0 = m.spheres[0].restFrame;
@@ -250,6 +251,7 @@ TEST_F(ModelFile, WhatWasIdentifiedIsReadToTheBit) {
   EXPECT_EQ(a.lengthScale, b.lengthScale);
   EXPECT_EQ(a.patches[0].region, b.patches[0].region);
   EXPECT_EQ(a.patches[0].nodes, b.patches[0].nodes);
+  EXPECT_EQ(a.heldFrames, b.heldFrames);
   ASSERT_EQ(b.links.size(), 2u);
   for (int k = 0; k < 2; ++k) {
     EXPECT_EQ(a.links[k].frame1, b.links[k].frame1);
@@ -295,6 +297,8 @@ TEST_F(ModelFile, MistakesInWhatWasIdentified) {
       {" formulas=\"no\"", " formulas=\"yes\"", "<identified_skin>: no skin expected where formulas are used"},
       {"layer=\"33", "layer=\"-33", "<identified> layer="},
       {"<identified_frames rows=\"2\"", "<identified_frames rows=\"1\"", "<identified_frames>: more numbers than"},
+      {"<identified_held rows=\"1\">\n1\n", "<identified_held rows=\"1\">\n2\n",
+       "<identified_held>: an index out of range"},
       {"0 1 0.1 0.2 0.5 0", "0 0 0.1 0.2 0.5 0", "<identified_links>: the same index twice"},
       {"0 1 0.1 0.2 0.5 0", "0 3 0.1 0.2 0.5 0", "<identified_links>: an index out of range"},
       {"0 1 0.1 0.2 0.5 0", "0 1 0.1 0.2 0.6 0", "<identified_links>: a second end that is not its frame's"},

@@ -24,6 +24,7 @@
 #include "physics/dynamics/rest_modes.h"
 #include "physics/model/ball_choice.h"
 #include "physics/model/identify/check_loads.h"
+#include "physics/model/identify/held_region.h"
 #include "physics/model/identify/slits.h"
 #include "physics/model/identify/thin_parts.h"
 #include "physics/model/node_volumes.h"
@@ -141,7 +142,7 @@ void warnOfErrors(const BuildJob& job) {
         "is held?\n",
         job.meshPath, links, n.ofFiniteElements.rms, job.report.longEdges ? "does a finer mesh" : "do more spheres");
   constexpr double kPokes = 15, kAtMost = 100;  // %, RMS and of the farthest node
-  if (n.poke.rms > kPokes || n.poke.maximum > kAtMost)
+  if (!n.usesFormulas && (n.poke.rms > kPokes || n.poke.maximum > kAtMost))
     tell("{}: note: dents where something pokes are off by {:.2g} % RMS, {:.2g} at most, by the builder's own loads\n",
          job.meshPath, n.poke.rms, n.poke.maximum);
 }
@@ -207,6 +208,23 @@ void readMeshes(const BuildOptions& options, std::vector<BuildJob>& jobs) {
   }
 }
 
+// A run holds every node, finite elements what lies between three of them.
+void noteStrayNodes(const BuildJob& job, const std::vector<std::vector<int>>& triangles) {
+  constexpr double kFew = 0.1;  // of those held: some at the rim of a box do no harm
+  std::vector<bool> isHeld(job.mesh.mesh.vertices.size(), false), isStray;
+  for (const HeldRegion& region : job.held)
+    for (const int n : region.nodes) isHeld[n] = true;
+  isStray = isHeld;
+  for (const std::vector<int>& of : triangles)
+    for (const int t : of)
+      for (const int n : job.mesh.mesh.triangles[t]) isStray[n] = false;
+  const auto held = std::count(isHeld.begin(), isHeld.end(), true),
+             stray = std::count(isStray.begin(), isStray.end(), true);
+  if (static_cast<double>(stray) > kFew * static_cast<double>(held))
+    tell("{}: note: {} of {} nodes that are held are no corners of a held triangle: finite elements let them go\n",
+         job.meshPath, stray, held);
+}
+
 // Of the repaired mesh, whose vertices a model's nodes are: a mistake in what is to be held shows before any work.
 void readHeldRegions(const BuildOptions& options, BuildJob& job) {
   SoftBodyModel surface;
@@ -214,6 +232,7 @@ void readHeldRegions(const BuildOptions& options, BuildJob& job) {
   surface.nodeOfInputVertex = job.mesh.vertexOfInput;
   naming(job.meshPath, [&] {
     for (const std::string& text : options.fix) job.held.push_back(parseHeldRegion(text, surface));
+    noteStrayNodes(job, heldTriangles(job.mesh.mesh, job.held));
   });
 }
 

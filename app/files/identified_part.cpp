@@ -55,6 +55,13 @@ void readPatches(const std::string& path, const XmlElement& element, std::size_t
   }
 }
 
+void readHeldFrames(const std::string& path, const XmlElement& element, IdentifiedNetwork& network) {
+  if (childrenOf(element, "identified_held").empty()) return;
+  Rows rows(path, element, "identified_held");
+  rows.forEach([&] { network.heldFrames.push_back(rows.index(network.frames.size())); });
+  rows.requireAscending(network.heldFrames, "frames that are not ascending");
+}
+
 void readLinks(const std::string& path, const XmlElement& element, IdentifiedNetwork& network) {
   Rows rows(path, element, "identified_links");
   rows.forEach([&] {
@@ -133,11 +140,13 @@ XmlRules identifiedRules() {
        {},
        {{"identified_frames", 1, 1},
         {"identified_patch"},
+        {"identified_held", 0, 1},
         {"identified_links", 1, 1},
         {"identified_strains", 0, 1},
         {"identified_skin", 1, 1}}},
       {"identified_frames", {"rows"}, {}, {}, true},
       {"identified_patch", {"rows", "region"}, {}, {}, true},
+      {"identified_held", {"rows"}, {}, {}, true},
       {"identified_links", {"rows"}, {}, {}, true},
       {"identified_strains", {"rows"}, {}, {}, true},
       {"identified_skin", {"rows"}, {}, {}, true}};
@@ -160,6 +169,8 @@ void putIdentified(std::string& out, const IdentifiedNetwork& network) {
         out, "identified_patch", patch.nodes.size(), [&](std::size_t k) { put(out, patch.nodes[k]); },
         " region=\"" + escapedXml(patch.region) + '"');
   }
+  if (!network.heldFrames.empty())
+    putRows(out, "identified_held", network.heldFrames.size(), [&](std::size_t k) { put(out, network.heldFrames[k]); });
   putRows(out, "identified_links", network.links.size(), [&](std::size_t k) {
     const IdentifiedLink& l = network.links[k];
     put(out, l.frame0, l.frame1, l.restPoint1, l.axes);
@@ -191,6 +202,7 @@ std::shared_ptr<const IdentifiedNetwork> readIdentified(const std::string& path,
   network->ofFiniteElements = readError(element, "error_finite_elements");
   readFrames(path, element, model.spheres.size(), *network);
   readPatches(path, element, model.restNodes.size(), *network);
+  readHeldFrames(path, element, *network);
   readLinks(path, element, *network);
   readStrains(path, element, *network);
   readSkin(path, element, model.restNodes.size(), *network);

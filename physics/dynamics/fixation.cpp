@@ -1,9 +1,6 @@
 #include "physics/dynamics/fixation.h"
 
-#include <cmath>
-
 #include "physics/model/attachment.h"
-#include "physics/model/identify/voxel_solid.h"
 #include "physics/sort_unique.h"
 
 namespace medulla {
@@ -35,25 +32,6 @@ std::vector<int> spheresHeldBy(const SoftBodyModel& model, const std::vector<int
         fixed[s].ownNodes >= 3 && fixed[s].own >= 0.5 * all[s].own && all[s].own >= kLeastOwn * all[s].shared;
     if (ofAll || ofOwn) out.push_back(static_cast<int>(s));
   }
-  return out;
-}
-
-std::vector<int> spheresBehindPatches(const IdentifiedNetwork& network) {
-  // 1/m2, of translation: a cell wholly behind has its volume times this, to a thousandth. Others may have more from
-  // the fit: one of a gallbladder, with a third of its surface behind, had 1.7 times as much, and, held, took the error
-  // of its bending from 4 to 10 %.
-  const double penalty = kHeldPenalty / (network.voxel * network.voxel);
-  constexpr double tolerance = 0.01;
-  std::vector<int> out;
-  const int frames = static_cast<int>(network.frames.size());
-  for (const IdentifiedLink& link : network.links) {
-    if (link.frame1 < frames) continue;
-    const double translation =
-        (link.stiffness.topLeftCorner<3, 3>().trace() + link.strain0.head<3>().squaredNorm()) / 3;
-    const double whole = penalty * network.frames[link.frame0].volume;
-    if (std::abs(translation - whole) < tolerance * whole) out.push_back(link.frame0);
-  }
-  sortUnique(out);
   return out;
 }
 

@@ -10,8 +10,4 @@ namespace medulla {
 // through the attachments of their nodes.
 std::vector<int> spheresHeldBy(const SoftBodyModel& model, const std::vector<int>& fixedNodes);
 
-// Spheres whose cells lie almost wholly behind a patch. Finite elements have no cells there, so such a frame is held by
-// the patch's penalty alone, and its link would dictate the whole body's step without moving anything visible.
-std::vector<int> spheresBehindPatches(const IdentifiedNetwork& network);
-
 }  // namespace medulla

@@ -226,7 +226,7 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
     throw std::runtime_error(
         fmt::format("the stable substep is {:.3g} s: expected at least {:.0e} s; lower Young's "
                     "modulus or raise the density",
-                    limits.stable, kLeastSubstep));
+                    limits.safe, kLeastSubstep));
   data_->substeps = settings.substeps > 0 ? settings.substeps : chosenSubsteps(settings, data_->bodies, limits.safe);
   data_->substep = settings.frameDuration / data_->substeps;
   for (BodyRange& r : data_->ranges) r.settlingDamping = std::min(r.settlingDamping, 1 / data_->substep);

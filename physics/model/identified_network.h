@@ -86,6 +86,8 @@ struct IdentifiedNetwork {
   double voxel = 0;        // m, of the finite elements
   std::vector<IdentifiedFrame> frames;
   std::vector<FixedPatch> patches;
+  // Ascending: frames whose cells lie behind the patches, but for a twentieth at most. They stand still.
+  std::vector<int> heldFrames;
   std::vector<IdentifiedLink> links;
   std::vector<std::vector<SkinFrame>> skin;  // per node
   IdentifiedLayer layer;

@@ -102,6 +102,7 @@ CellFrames makeCellFrames(const TriangleMesh& mesh, const std::vector<Ball>& bal
   for (std::size_t i = 0; i < count; ++i) {
     const double perVolume = kHeldPenalty / (solid.grid.size * solid.grid.size);
     out.heldGive.push_back(giveOf(raw[i], held[i], perVolume, out.lengthScale));
+    out.heldShare.push_back(held[i].volume / raw[i].volume);
   }
   std::vector<Eigen::Triplet<double>> entries;
   std::vector<Matrix3d> inverseInertia;

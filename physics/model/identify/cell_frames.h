@@ -18,6 +18,7 @@ struct CellFrames {
   // m/N per Pa, in the same six: what held material lets go, by itself, under loads spread over the whole cell. As
   // stiff as held triangles are, it only matters where a cell has nothing else.
   std::vector<Matrix6d> heldGive;
+  std::vector<double> heldShare;  // 0..1, of the cell's volume: what lies behind held triangles
   PowerSites sites;
   std::map<std::pair<int, int>, double> contactArea;  // m2, as of PowerCells
 };

@@ -14,20 +14,50 @@ namespace medulla {
 
 using Eigen::Vector3d;
 
-std::vector<int> wholeTriangles(const TriangleMesh& mesh, const HeldRegion& region) {
-  if (region.nodes.empty()) throw std::runtime_error(fmt::format("{} holds no node of the surface", region.text));
-  std::vector<bool> held(mesh.vertices.size(), false);
-  for (const int n : region.nodes) held[n] = true;
-  std::vector<int> out;
+namespace {
+
+// Per region and node: whether it is held.
+std::vector<std::vector<bool>> nodesHeld(const TriangleMesh& mesh, const std::vector<HeldRegion>& regions) {
+  std::vector<std::vector<bool>> out;
+  for (const HeldRegion& region : regions) {
+    if (region.nodes.empty()) throw std::runtime_error(region.text + " holds no node of the surface");
+    out.emplace_back(mesh.vertices.size(), false);
+    for (const int n : region.nodes) out.back()[n] = true;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::vector<int>> heldTriangles(const TriangleMesh& mesh, const std::vector<HeldRegion>& regions) {
+  const std::vector<std::vector<bool>> held = nodesHeld(mesh, regions);
+  std::vector<std::vector<int>> out(regions.size());
+  std::size_t count = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    if (held[a] && held[b] && held[c]) out.push_back(static_cast<int>(t));
+    const auto& corners = mesh.triangles[t];
+    const auto isHeld = [&](int n) {
+      return std::any_of(held.begin(), held.end(), [n](const std::vector<bool>& of) { return of[n]; });
+    };
+    if (!std::all_of(corners.begin(), corners.end(), isHeld)) continue;
+    ++count;
+    const auto cornersIn = [&](std::size_t r) {
+      return std::count_if(corners.begin(), corners.end(), [&](int n) { return held[r][n]; });
+    };
+    std::size_t most = 0;
+    for (std::size_t r = 0; r < regions.size(); ++r) {
+      if (cornersIn(r) == 3) out[r].push_back(static_cast<int>(t));
+      if (cornersIn(r) > cornersIn(most)) most = r;
+    }
+    if (cornersIn(most) < 3) out[most].push_back(static_cast<int>(t));
   }
-  if (out.empty()) {
-    throw std::runtime_error(
-        fmt::format("{} holds {} nodes but no whole triangle of the surface; expected one at least", region.text,
-                    region.nodes.size()));
-  }
+  for (std::size_t r = 0; r < regions.size(); ++r)
+    if (out[r].empty())
+      throw std::runtime_error(
+          fmt::format("{} holds {} nodes but no whole triangle of the surface; expected one at least", regions[r].text,
+                      regions[r].nodes.size()));
+  if (!regions.empty() && count == mesh.triangles.size())
+    throw std::runtime_error(regions[0].text + (regions.size() > 1 ? " and others hold" : " holds") +
+                             " the whole surface");
   return out;
 }
 
@@ -93,8 +123,6 @@ std::vector<HeldSpace> heldSpaces(const TriangleMesh& mesh, const std::vector<He
   std::vector<HeldSpace> out;
   for (std::size_t r = 0; r < regions.size(); ++r) {
     if (!regions[r].isSpace) continue;
-    if (triangles[r].size() == mesh.triangles.size())
-      throw std::runtime_error(regions[r].text + " holds the whole surface");
     out.push_back(spaceBehind(mesh, triangles[r]));
   }
   return out;

@@ -17,8 +17,10 @@ struct HeldRegion {
   bool isSpace = false;    // holds what lies behind its triangles, too
 };
 
-// Triangles with all corners in the region, ascending. Throws std::runtime_error where there is none.
-std::vector<int> wholeTriangles(const TriangleMesh& mesh, const HeldRegion& region);
+// Of each region its triangles, ascending: those with all corners in it and, since a run holds nodes, those with all
+// corners in several regions together, which count to the one with most of them. Throws std::runtime_error where a region
+// has none, or where they are the whole surface.
+std::vector<std::vector<int>> heldTriangles(const TriangleMesh& mesh, const std::vector<HeldRegion>& regions);
 
 // Of each node of the mesh, whether it is a corner of one of the triangles.
 std::vector<bool> nodesOfTriangles(const TriangleMesh& mesh, const std::vector<int>& triangles);
@@ -32,8 +34,7 @@ struct HeldSpace {
   int firstFan = 0;      // of `surface.triangles`
 };
 
-// Of every region that is a part of space. `triangles`: of each region. Throws std::runtime_error where such a region
-// holds the whole surface.
+// Of every region that is a part of space. `triangles`: of each region.
 std::vector<HeldSpace> heldSpaces(const TriangleMesh& mesh, const std::vector<HeldRegion>& regions,
                                   const std::vector<std::vector<int>>& triangles);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <vector>
@@ -26,36 +27,23 @@ constexpr double kVoxelsAcross = 7;  // of the widest neck
 
 class VoxelGraph {
  public:
-  VoxelGraph(const TriangleMesh& mesh, double volume, double widest)
-      : body_(voxelise(mesh, volume, static_cast<int>(volume / std::pow(widest / kVoxelsAcross, 3)))) {
-    const std::array<int, 3>& n = body_.count;
-    step_ = {n[1] * n[2], n[2], 1};
-    flow_.resize(body_.pieceAt.size());
-    core_.assign(body_.pieceAt.size(), -1);
-    findCores(mesh, widest);
-  }
+  VoxelGraph(const TriangleMesh& mesh, double volume, double widest);
 
   int cores() const { return cores_; }
-  std::optional<Neck> around(int core, double widest, double leastPart);
+  std::optional<Neck> around(int core, double widest, double leastPart, const std::function<void()>& goOn);
 
  private:
-  int size() const { return static_cast<int>(body_.pieceAt.size()); }
-  bool isIn(int v) const { return body_.pieceAt[v] >= 0; }
-  Vector3d middleOf(int v) const { return body_.pieces[body_.pieceAt[v]].centre; }
-  double faceArea() const { return body_.size * body_.size; }
+  int size() const { return static_cast<int>(middle_.size()); }
+  double faceArea() const { return edge_ * edge_; }
 
   // `visit(voxel, direction)` of the neighbours in the body: twice the axis, and one more upwards.
   template <class Visit>
   void visitNeighbours(int v, const Visit& visit) const {
-    int rest = v;
-    for (int a = 0; a < 3; ++a) {
-      const int place = rest / step_[a];
-      rest %= step_[a];
-      if (place > 0 && isIn(v - step_[a])) visit(v - step_[a], 2 * a);
-      if (place + 1 < body_.count[a] && isIn(v + step_[a])) visit(v + step_[a], 2 * a + 1);
-    }
+    for (int direction = 0; direction < 6; ++direction)
+      if (const int next = beside_[v][direction]; next >= 0) visit(next, direction);
   }
 
+  void joinVoxels(const VoxelBody& body);
   void findCores(const TriangleMesh& mesh, double widest);
   // What is reached from a core through faces that can take more flow, or, turned round, can reach the other cores.
   // `from_` tells how; the first voxel of the aim that is found, or -1.
@@ -65,23 +53,55 @@ class VoxelGraph {
   std::pair<Vector3d, double> cut() const;  // middle and area of the faces that bound what was reached
   Vector3d gapBetween(const std::vector<int>& part0, const std::vector<int>& part1) const;
 
-  VoxelBody body_;
-  std::array<int, 3> step_{};
+  double edge_ = 0;                               // m, of a voxel
+  std::vector<Vector3d> middle_;                  // m, of each voxel in the body
+  std::vector<std::array<int, 6>> beside_;        // its neighbours by direction, -1 outside the body
   std::vector<std::array<signed char, 3>> flow_;  // to the next voxel along each axis: -1, 0 or 1
   std::vector<int> core_;                         // of each voxel: -1 of none
   std::vector<signed char> from_;                 // the direction that a search came by; kStart, kUnseen
   std::vector<int> queue_;
   int cores_ = 0;
+  std::size_t pieces_ = 0;
 
   static constexpr signed char kUnseen = -1, kStart = 6;
 };
+
+VoxelGraph::VoxelGraph(const TriangleMesh& mesh, double volume, double widest) {
+  joinVoxels(voxelise(mesh, volume, static_cast<int>(volume / std::pow(widest / kVoxelsAcross, 3))));
+  flow_.resize(middle_.size());
+  core_.assign(middle_.size(), -1);
+  findCores(mesh, widest);
+}
+
+// Of the body's voxels alone: a ring that lies aslant fills a thousandth of its box.
+void VoxelGraph::joinVoxels(const VoxelBody& body) {
+  edge_ = body.size;
+  pieces_ = body.pieces.size();
+  const std::array<int, 3>& n = body.count;
+  const std::array<int, 3> step = {n[1] * n[2], n[2], 1};
+  std::vector<int> numberAt(body.pieceAt.size(), -1);
+  for (std::size_t v = 0; v < body.pieceAt.size(); ++v) {
+    if (body.pieceAt[v] < 0) continue;
+    const int number = numberAt[v] = static_cast<int>(middle_.size());
+    middle_.push_back(body.pieces[body.pieceAt[v]].centre);
+    beside_.push_back({-1, -1, -1, -1, -1, -1});
+    int rest = static_cast<int>(v);
+    for (int a = 0; a < 3; ++a) {
+      const int before = rest / step[a] > 0 ? numberAt[v - step[a]] : -1;
+      rest %= step[a];
+      if (before < 0) continue;
+      beside_[number][2 * a] = before;
+      beside_[before][2 * a + 1] = number;
+    }
+  }
+}
 
 // Connected parts of what lies deeper than half the widest neck.
 void VoxelGraph::findCores(const TriangleMesh& mesh, double widest) {
   const SurfaceTree tree = makeSurfaceTree(mesh);
   std::vector<bool> deep(size());
   for (int v = 0; v < size(); ++v)
-    deep[v] = isIn(v) && std::isinf(closestPoint(tree, middleOf(v), 0.5 * widest).distance);
+    deep[v] = std::isinf(closestPoint(tree, middle_[v], 0.5 * widest).distance);
   for (int first = 0; first < size(); ++first) {
     if (!deep[first] || core_[first] >= 0) continue;
     queue_.assign(1, first);
@@ -130,11 +150,11 @@ bool VoxelGraph::augment(int core) {
   while (from_[v] != kStart) {
     const int axis = from_[v] / 2;
     if (from_[v] % 2 == 1) {
-      v -= step_[axis];
+      v = beside_[v][2 * axis];
       ++flow_[v][axis];
     } else {
       --flow_[v][axis];
-      v += step_[axis];
+      v = beside_[v][2 * axis + 1];
     }
   }
   return true;
@@ -146,7 +166,7 @@ std::pair<Vector3d, double> VoxelGraph::cut() const {
   for (const int v : queue_) {
     visitNeighbours(v, [&](int next, int) {
       if (from_[next] != kUnseen) return;
-      sum += 0.5 * (middleOf(v) + middleOf(next));
+      sum += 0.5 * (middle_[v] + middle_[next]);
       ++faces;
     });
   }
@@ -158,34 +178,34 @@ Vector3d VoxelGraph::gapBetween(const std::vector<int>& part0, const std::vector
   Vector3d out = Vector3d::Zero();
   double least = std::numeric_limits<double>::infinity();
   const auto isInner = [&](int v) {
-    int neighbours = 0;
-    visitNeighbours(v, [&](int, int) { ++neighbours; });
-    return neighbours == 6;
+    return std::all_of(beside_[v].begin(), beside_[v].end(), [](int next) { return next >= 0; });
   };
   for (const int a : part0) {
     if (isInner(a)) continue;
     for (const int b : part1) {
-      const double squared = (middleOf(a) - middleOf(b)).squaredNorm();
+      const double squared = (middle_[a] - middle_[b]).squaredNorm();
       if (squared >= least || isInner(b)) continue;
       least = squared;
-      out = 0.5 * (middleOf(a) + middleOf(b));
+      out = 0.5 * (middle_[a] + middle_[b]);
     }
   }
   return out;
 }
 
 // Between the core and all others. The flow leaves a neck's two ends: its place is midway.
-std::optional<Neck> VoxelGraph::around(int core, double widest, double leastPart) {
+std::optional<Neck> VoxelGraph::around(int core, double widest, double leastPart, const std::function<void()>& goOn) {
   const int most = static_cast<int>(pi / 4 * widest * widest / faceArea());
   std::fill(flow_.begin(), flow_.end(), std::array<signed char, 3>{});
-  for (int paths = 0; augment(core); ++paths)
+  for (int paths = 0; augment(core); ++paths) {
     if (paths >= most) return std::nullopt;
+    goOn();
+  }
   const auto [end0, area] = cut();
   const std::vector<int> part0 = queue_;
   search([&](int v) { return core_[v] >= 0 && core_[v] != core; }, [](int) { return false; }, true);
-  const auto least = static_cast<std::size_t>(leastPart * static_cast<double>(body_.pieces.size()));
+  const auto least = static_cast<std::size_t>(leastPart * static_cast<double>(pieces_));
   if (std::min(part0.size(), queue_.size()) < least) return std::nullopt;
-  if (area == 0) return Neck{body_.size, gapBetween(part0, queue_)};
+  if (area == 0) return Neck{edge_, gapBetween(part0, queue_)};
   return Neck{2 * std::sqrt(area / pi), 0.5 * (end0 + cut().first)};
 }
 
@@ -205,11 +225,12 @@ double sectionWidth(const TriangleMesh& mesh, const Neck& neck) {
 
 }  // namespace
 
-std::optional<Neck> narrowestNeck(const TriangleMesh& mesh, double widest, double leastPart) {
+std::optional<Neck> narrowestNeck(const TriangleMesh& mesh, double widest, double leastPart,
+                                  const std::function<void()>& goOn) {
   VoxelGraph graph(mesh, enclosedVolume(mesh), widest);
   std::optional<Neck> out;
   for (int core = 0; graph.cores() > 1 && core < graph.cores(); ++core) {
-    std::optional<Neck> found = graph.around(core, widest, leastPart);
+    std::optional<Neck> found = graph.around(core, widest, leastPart, goOn);
     if (!found) continue;
     found->width = sectionWidth(mesh, *found);
     if (!out || found->width < out->width) out = found;

@@ -55,7 +55,14 @@ MatrixXd Trials::ofFrames(const RowMatrix& forces) const {
   const RowSparse skin = skinMatrix(network_.skin, frames);
   MatrixXd stiffness = networkStiffness(network_.links, network_.lengthScale, frames);
   if (grounding_.size() > 0) stiffness += grounding_;
-  return deformation(skin * solvePositive(stiffness, skin.transpose() * forces));
+  MatrixXd onFrames = skin.transpose() * forces;
+  for (const Index held : network_.heldFrames) {  // as in a run
+    stiffness.middleRows<6>(6 * held).setZero();
+    stiffness.middleCols<6>(6 * held).setZero();
+    stiffness.block<6, 6>(6 * held, 6 * held).setIdentity();
+    onFrames.middleRows<6>(6 * held).setZero();
+  }
+  return deformation(skin * solvePositive(stiffness, onFrames));
 }
 
 SurfaceLayer Trials::layer() const {

@@ -220,6 +220,8 @@ int voxelsInCells(double volume, double cellSize) {
   return static_cast<int>(volume / (voxel * voxel * voxel));
 }
 
+}  // namespace
+
 // A slender body that lies aslant fills next to nothing of its box, in which every voxel has a place.
 void requireRoom(const TriangleMesh& mesh, double cellSize, double memoryMax) {
   constexpr double kPerVoxel = 8;  // bytes, with the columns' tables
@@ -230,8 +232,6 @@ void requireRoom(const TriangleMesh& mesh, double cellSize, double memoryMax) {
                     "at most {:.2g} GB: of a slender body that lies aslant it is smaller when turned along an axis",
                     1e3 * cellSize, 1e-9 * bytes, 1e-9 * memoryMax));
 }
-
-}  // namespace
 
 double metCellSize(const TriangleMesh& mesh, double cellSize) {
   const double volume = massProperties(mesh).volume;
@@ -244,7 +244,9 @@ VoxelSolid makeVoxelSolid(const TriangleMesh& mesh, double cellSize, const Solid
   const double volume = massProperties(mesh).volume;
   const int voxels = voxelsInCells(volume, cellSize);
   requireRoom(mesh, cellSize, settings.memoryMax);
+  progress(0);
   solid.voxels = voxeliseEvenly(mesh, volume, voxels);
+  progress(0);
   const std::function<bool(const Vector3d&)> behind = behindHeld(settings.heldSpaces);
   for (const VoxelPiece& piece : solid.voxels.pieces) solid.isBehind.push_back(behind(piece.centre));
   solid.grid = makeHexGrid(solid.voxels, solid.isBehind);

@@ -48,6 +48,9 @@ struct OverBudget : std::runtime_error {
 // The size of the cells that makeVoxelSolid makes when asked for `cellSize`: within a percent of it.
 double metCellSize(const TriangleMesh& mesh, double cellSize);
 
+// Throws OverBudget where the voxels of cells of that size would, all over the body's box.
+void requireRoom(const TriangleMesh& mesh, double cellSize, double memoryMax);
+
 // Throws OverBudget, and std::runtime_error where the body is so thin that its cells do not hang together.
 VoxelSolid makeVoxelSolid(
     const TriangleMesh& mesh, double cellSize, const SolidSettings& settings,
