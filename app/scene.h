@@ -104,7 +104,7 @@ struct Scene {
   bool endoscope = true;                         // the picture is round
   int width = 1280, height = 720;                // 16 to 8192, even
   double fps = 30;                               // 1 to 240
-  std::vector<double> goldenTimes;               // s, strictly increasing, within 0 to duration
+  std::vector<double> goldenTimes;               // s, strictly increasing, within 0 to duration, a picture each
   std::vector<SceneCaption> captions;            // in the order of their times, none over another
   // Of what the file and its overrides say, however it is laid out; files that they name are not looked into.
   std::uint64_t contentHash = 0;  // of everything
@@ -121,6 +121,10 @@ struct SceneOverride {
 
 // Whether an override says how long the scene is: a run cut short from the command line, say.
 bool durationOverridden(const Scene& scene);
+
+// How many pictures a scene has at its own rate, and which of them its golden moments are.
+int pictureCount(const Scene& scene);
+std::vector<int> goldenPictures(const Scene& scene);
 
 // Throws std::runtime_error "FILE:LINE: what is wrong, what was expected", with "--set PATH" in the place of FILE:LINE
 // where an override is at fault. Files that the scene names are not opened.

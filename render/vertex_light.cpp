@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "render/noise.h"
 
@@ -124,7 +125,7 @@ void lightTissue(const Shading& v, const Look& look, const Surroundings& s, LitV
 // the gaps between organs are, and the lamp's wide reflector, seen beside the lens. What is mirrored lies in the lamp's
 // cone even where the shaft itself leaves it. In haze it mirrors that, and half as much of dark things in it; beside
 // the model the grey of a studio, before whose light ground jaws that shine white are lost.
-void lightMetal(const Shading& v, vec3 tangent, const Surroundings& s, LitVertex& out) {
+void lightMetal(const Shading& v, std::optional<vec3> tangent, const Surroundings& s, LitVertex& out) {
   const float visible = v.exposure * (1 - v.veil), facing = glm::dot(v.normal, v.toEye);
   // The outline's vertices look away by up to an edge; as they are, they would mirror what is behind them, black.
   const vec3 bent = v.normal - facing * v.toEye;
@@ -139,8 +140,10 @@ void lightMetal(const Shading& v, vec3 tangent, const Surroundings& s, LitVertex
   const vec3 around = s.haze     ? s.haze->toward(mirrored) * (0.5f * gap / kExposure)
                       : s.studio ? studio * lit
                                  : cavity * lit;
-  // Brushed or drawn along its length, it shows the lamp as a streak (Kajiya and Kay 1989).
-  const vec3 along = glm::cross(v.normal, tangent), halfway = glm::normalize(v.toLight + v.toEye);
+  // Brushed or drawn along its length, it shows the lamp as a streak (Kajiya and Kay 1989). A texture's directions are
+  // no brush's: where they meet, as at a ball's poles, a streak would end in rags.
+  const vec3 halfway = glm::normalize(v.toLight + v.toEye);
+  const vec3 along = tangent ? glm::cross(v.normal, *tangent) : vec3(0);
   const vec3 across = halfway - along * glm::dot(halfway, along);
   const float streak = smoothStep(0.955f, 1.0f, glm::dot(normal, across) / std::max(glm::length(across), 1e-3f));
   const float edge = facing < 0 ? 0.f : fresnelEdge(v);
@@ -254,14 +257,15 @@ Surroundings makeSurroundings(const Viewpoint& view, const Picture& picture, con
 }
 
 // i: of the mesh. Returns what is left to do for shadow: how the light falls.
-Shading lightVertex(const SceneMesh& mesh, const Look& look, std::size_t i, vec3 picture, const Surroundings& s,
+Shading lightVertex(const SceneMesh& mesh, const MeshPart& part, std::size_t i, vec3 picture, const Surroundings& s,
                     LitVertex& o) {
+  const Look& look = *part.look;
   o.position = mesh.position[i];
   o.uv = mesh.uv[i];
   o.detail = mesh.detail[i] * (1 - look.blood * mesh.blanch[i] * std::max(mesh.blanch[i], 0.f));
   const Shading v = shadingOf(mesh, look, i, picture, s);
   if (look.metal)
-    lightMetal(v, mesh.tangent[i], s, o);
+    lightMetal(v, part.instrument ? std::optional(mesh.tangent[i]) : std::nullopt, s, o);
   else
     lightTissue(v, look, s, o);
   o.ambient += v.veilColour * (v.veil * v.veilLight * look.ambient);
@@ -297,7 +301,7 @@ void lightVertices(const SceneMesh& mesh, const VisibleTriangles& seen, const Vi
     for (std::size_t k = visible.firstVertex; k < visible.endVertex(); ++k) {
       const std::size_t i = seen.vertices[k];
       LitVertex& o = out.vertices[k];
-      const Shading v = lightVertex(mesh, *part.look, i, seen.picture[i], s, o);
+      const Shading v = lightVertex(mesh, part, i, seen.picture[i], s, o);
       out.glinting[k] = canGlint(o.gloss, o.halfway.z, *part.look, lobes);
       // Instruments take no shadow: the light sits beside the lens, and a thin jaw only shadows itself in stripes.
       if (shadow && !part.instrument)

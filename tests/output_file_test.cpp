@@ -111,6 +111,8 @@ TEST(OutputFile, TargetsThatCannotBeWrittenAreRefusedAtOnce) {
   EXPECT_EQ(complaint(folder / "file/a.csv"), folder / "file: cannot be made: Not a directory");
   EXPECT_EQ(complaint(folder.path()), folder.path() + ": is a folder, expected the name of a file to write");
   EXPECT_EQ(complaint(folder / "new/"), folder / "new/: expected the name of a file to write");
+  const std::string endless = folder / std::string(256, 'x');  // what is written first has a shorter name
+  EXPECT_EQ(complaint(endless), endless + ": cannot be written: File name too long");
   EXPECT_EQ(complaint(""), ": expected the name of a file to write");
   // Renaming onto a device would replace it for the whole machine.
   EXPECT_EQ(complaint("/dev/null"), "/dev/null: is not a regular file");

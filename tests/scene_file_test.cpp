@@ -392,6 +392,7 @@ TEST_F(SceneFile, WrongValuesOfThePictureLikewise) {
       {"640 480", "640 8", R"(x.xml:25: <output> size="640 8": expected 2 integers >= 16 and <= 8192)"},
       {"let go", "放す", R"(x.xml:25: <caption> text="放す": expected Latin letters, digits and signs, not '放')"},
       {"0.5 3 7", "0.5 13", R"(x.xml:25: <output> golden="0.5 13": a time beyond the scene's duration)"},
+      {"0.5 3 7", "0.5 0.501", R"(x.xml:25: <output> golden="0.5 0.501": two golden moments are picture 13 at 25 Hz)"},
       {"0.5 3 7", "3 0.5", R"(x.xml:25: <output> golden="3 0.5": expected increasing times)"},
   });
 }
@@ -403,6 +404,8 @@ TEST_F(SceneFile, FilesThatAreNoScenes) {
   EXPECT_EQ(complaint("\n<scene name='a'>\n<clock duration=1/></scene>"),
             "x.xml:3: broken XML: an attribute is not of the form name=\"value\", or stands twice");
   EXPECT_EQ(complaint(std::string("<scene\0/>", 9)), "x.xml: holds a zero byte, expected XML text");
+  EXPECT_EQ(complaint("<scene>\n<!-- gr\xf6\xdf -->"), "x.xml:2: holds the byte 0xF6, expected UTF-8 or ASCII");
+  EXPECT_EQ(complaint("<scene/>\n<!--\xc3"), "x.xml:2: ends within a letter, expected UTF-8 or ASCII");
   const auto reading = [](const std::string& path) { return complaintOf([&] { readScene(path); }); };
   EXPECT_EQ(reading(folder + "/none.xml"), folder + "/none.xml: cannot be opened: No such file or directory");
   EXPECT_EQ(reading(folder), folder + ": is a folder, expected a file");

@@ -9,7 +9,6 @@ namespace medulla {
 // Everything that a run does before its first step: reading, looking up, laying out. Not settling, which takes long.
 int runCheck(const RunOptions& options) {
   const LoadedScene loaded = loadRun(options);
-  goldenPictures(loaded.scene);
   const World world = makeWorld(loaded);
   printWarnings(loaded, options, world);
   // A run that diverges says so itself.

@@ -18,6 +18,20 @@ static std::vector<Result> liveResults(const LiveReport& live) {
           {"surface_stood", fmt::format("{}", live.standingTicks), "ticks"}};
 }
 
+static void tellLive(const LiveReport& report, const RunTotals& totals) {
+  if (report.lateTicks > 0 || report.standingTicks > 0)
+    tell(
+        "medulla: {} of {} ticks woke more than a tick late, up to {:.3g} ms; in {} the surface stood still "
+        "because the dynamics was late: these are in no log, recording or total\n",
+        report.lateTicks, report.ticks, 1e3 * report.latest, report.standingTicks);
+  constexpr double kApart = 50;  // %; below, short touches
+  if (totals.impulseMismatch() > kApart)
+    tell(
+        "note: the impulses that hand and tissue got differ by {:.3g} %: what a body does is felt two and a half "
+        "dynamics frames later here, and one that is light and free may flutter; <clock dynamics> sets their rate\n",
+        totals.impulseMismatch());
+}
+
 int runReplay(const RunOptions& options) {
   const LoadedScene loaded = loadRun(options);
   requireDistinctOutputs(loaded, options);
@@ -45,11 +59,7 @@ int runReplay(const RunOptions& options) {
   if (live) {
     const std::vector<Result> more = liveResults(report);
     results.insert(results.end(), more.begin(), more.end());
-    if (report.lateTicks > 0 || report.standingTicks > 0)
-      tell(
-          "medulla: {} of {} ticks woke more than a tick late, up to {:.3g} ms; in {} the surface stood still "
-          "because the dynamics was late: these are in no log, recording or total\n",
-          report.lateTicks, report.ticks, 1e3 * report.latest, report.standingTicks);
+    tellLive(report, simulation.totals());
   }
   printResults(results);
   return 0;

@@ -60,22 +60,6 @@ LoadedScene loadRun(const RunOptions& options) {
   return loadScene(std::move(scene), trajectories);
 }
 
-int pictureCount(const Scene& scene) {
-  return std::max(1, static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9)));
-}
-
-std::vector<int> goldenPictures(const Scene& scene) {
-  std::vector<int> pictures;
-  for (const double time : scene.goldenTimes) {
-    const int picture = std::min(static_cast<int>(std::lround(time * scene.fps)), pictureCount(scene) - 1);
-    if (!pictures.empty() && pictures.back() == picture)
-      throw std::runtime_error(
-          fmt::format("{}: two golden moments are picture {} at {:.6g} Hz", scene.path, picture, scene.fps));
-    pictures.push_back(picture);
-  }
-  return pictures;
-}
-
 std::vector<double> pictureTimes(const Scene& scene, int first, int last) {
   std::vector<double> times;
   times.reserve(std::max(0, last - first));

@@ -68,11 +68,8 @@ class PictureTimes {
   PictureState state_;
 };
 
-// Pictures [first, last) of a scene at its own rate; how many it has in all.
+// Pictures [first, last) of a scene at its own rate.
 std::vector<double> pictureTimes(const Scene& scene, int first, int last);
-int pictureCount(const Scene& scene);
-// Numbers of the pictures of the scene's golden moments, increasing. Throws std::runtime_error where two are one.
-std::vector<int> goldenPictures(const Scene& scene);
 
 // What tells one run from another: everything that its motion follows from, this program's version and the sources of
 // its physics included; or everything that its pictures do, but for options of the drawing.

@@ -251,7 +251,8 @@ Trajectory parseRecording(std::string_view text, const std::string& name, const 
   }
   if (trajectory.samples.empty())
     throw inputError(map.path, map.line,
-                     fmt::format("no row lies from {} to {} s: the recording is {} s long", map.from, map.to,
+                     fmt::format("no row lies from {} s{}: the recording is {} s long", map.from,
+                                 std::isinf(map.to) ? " on" : fmt::format(" to {} s", map.to),
                                  whole.samples.back().time));
   return trajectory;
 }

@@ -398,6 +398,10 @@ void readOutput(const XmlElement& output, Scene& scene) {
   if (durationOverridden(scene)) std::erase_if(scene.goldenTimes, [&](double t) { return t > scene.duration; });
   if (!scene.goldenTimes.empty() && scene.goldenTimes.back() > scene.duration)
     refuse(output, "golden", "a time beyond the scene's duration");
+  const std::vector<int> pictures = goldenPictures(scene);
+  const auto twice = std::adjacent_find(pictures.begin(), pictures.end());
+  if (twice != pictures.end() && !durationOverridden(scene))
+    refuse(output, "golden", fmt::format("two golden moments are picture {} at {:.6g} Hz", *twice, scene.fps));
   readCaptions(output, scene);
 }
 
@@ -433,6 +437,17 @@ std::uint64_t hashOf(const XmlElement& e, bool motionOnly, std::uint64_t hash) {
 bool durationOverridden(const Scene& scene) {
   return std::any_of(scene.overridden.begin(), scene.overridden.end(),
                      [](const OverriddenAttribute& o) { return o.path == "clock.duration"; });
+}
+
+int pictureCount(const Scene& scene) {
+  return std::max(1, static_cast<int>(std::ceil(scene.duration * scene.fps - 1e-9)));
+}
+
+std::vector<int> goldenPictures(const Scene& scene) {
+  std::vector<int> pictures;
+  for (const double time : scene.goldenTimes)
+    pictures.push_back(std::min(static_cast<int>(std::lround(time * scene.fps)), pictureCount(scene) - 1));
+  return pictures;
 }
 
 Scene readScene(const std::string& path, const std::vector<SceneOverride>& overrides) {

@@ -82,10 +82,30 @@ XmlElement copyElement(const std::string& path, const tinyxml2::XMLElement& elem
   return out;
 }
 
+// What editors save as Latin-1 declares itself so, or says nothing.
+void requireUtf8(const std::string& path, const std::string& text) {
+  std::size_t more = 0;  // bytes that the letter still has
+  unsigned char first = 0;
+  int line = 1;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool goesOn = (byte & 0xC0U) == 0x80;
+    const std::size_t rest = byte < 0x80 ? 0 : byte >= 0xF0 ? 3 : byte >= 0xE0 ? 2 : 1;
+    if (goesOn != (more > 0) || byte >= 0xF8)
+      throw inputError(path, line,
+                       fmt::format("holds the byte 0x{:X}, expected UTF-8 or ASCII", more > 0 ? first : byte));
+    if (!goesOn) first = byte;
+    more = goesOn ? more - 1 : rest;
+    line += c == '\n';
+  }
+  if (more > 0) throw inputError(path, line, "ends within a letter, expected UTF-8 or ASCII");
+}
+
 XmlElement parseXml(const std::string& path) {
   const std::string text = readTextFile(path);
   // The XML library would take a zero byte for the end of the file.
   if (text.find('\0') != std::string::npos) throw inputError(path, 0, "holds a zero byte, expected XML text");
+  requireUtf8(path, text);
   if (!beginsAsXml(text)) throw inputError(path, 0, "is no XML: expected a file that begins with <");
   tinyxml2::XMLDocument document;
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
