@@ -51,7 +51,7 @@ static std::string resolveTarget(const std::string& path) {
     if (isStandardStream(status)) throw std::runtime_error(path + ": is where results or notes go");
     if (::access(target.c_str(), W_OK) != 0) throw unwritable(path);
   } else if (errno == ENAMETOOLONG) {
-    throw unwritable(path);  // now: the file beside it has a shorter name, and would be found unnameable when it is done
+    throw unwritable(path);  // only what is written first, beside it, has a shorter name
   }
   return target;
 }

@@ -11,8 +11,8 @@ namespace {
 
 constexpr float kOverscan = 6;  // see Viewpoint::overscan: a floor seen from near has triangles larger than a picture
 constexpr float kFarPlane = 2500;  // m, beyond what scenes may hold; the depth buffer is floating point
-// The near plane, as a share of the way to what the camera looks at, within two distances (m). A shaft passes close to the
-// lens; and at d the depth buffer tells apart 6e-8 d^2 / near: 4 um of .2 m, 3 mm of 160 m.
+// The near plane, as a share of the way to what the camera looks at, within two distances (m). A shaft passes close to
+// the lens; and at d the depth buffer tells apart 6e-8 d^2 / near: 4 um of .2 m, 3 mm of 160 m.
 constexpr float kNearShare = 0.003f, kNearest = 0.0002f, kFarthestNear = 1;
 
 glm::vec3 anyPerpendicular(glm::vec3 v) {
@@ -30,8 +30,8 @@ void lookFromLamp(LightView& l, glm::vec3 up) {
                     glm::lookAt(l.position, l.position + l.direction, up);
 }
 
-// What a view is fitted to moves from picture to picture. Rounded, the view stays but for rare jumps: texels that shifted a
-// little each time would make the edges of resting bodies' shadows crawl.
+// What a view is fitted to moves from picture to picture. Rounded, the view stays but for rare jumps: texels that
+// shifted a little each time would make the edges of resting bodies' shadows crawl.
 float roundUp(float x) {
   return std::exp2(std::ceil(4 * std::log2(x)) / 4);
 }

@@ -25,7 +25,7 @@ struct Viewpoint {
   // Clip space reaches this many picture widths and heights. Mesa 22 spoils noperspective values where it clips a
   // triangle against two sides at once: beyond the picture nobody sees it, nor behind the round picture's mask.
   float overscan = 1;
-  float nearPlane = 0.0006f;  // m
+  float nearPlane = 0.0006f;   // m
   glm::mat4 clipFromWorld{1};  // y points down, so that the first row read back is the top one
 };
 

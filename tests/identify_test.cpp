@@ -184,8 +184,7 @@ TEST(HeldRegion, TrianglesBetweenRegionsAreHeld) {
   };
   const std::vector<int> whole = heldTriangles(mesh, {region("whole", -1, 0.0301)})[0];
   std::vector<int> parts;
-  for (const std::vector<int>& of :
-       heldTriangles(mesh, {region("near", -1, 0.0151), region("far", 0.0151, 0.0301)}))
+  for (const std::vector<int>& of : heldTriangles(mesh, {region("near", -1, 0.0151), region("far", 0.0151, 0.0301)}))
     parts.insert(parts.end(), of.begin(), of.end());
   std::sort(parts.begin(), parts.end());
   EXPECT_EQ(parts, whole);

@@ -239,7 +239,8 @@ TEST(Check, NamesFileAndLineOfWhatCannotRun) {
   const ProgramResult wrong = runProgram({"check", scene, "--set", "body.gallbladder.look=livr"});
   EXPECT_EQ(wrong.exitCode, 1);
   EXPECT_EQ(wrong.out, "");
-  EXPECT_EQ(wrong.err.find("medulla: --set body.gallbladder.look: unknown look \"livr\": did you mean \"liver\"?"), 0) << wrong.err;
+  EXPECT_EQ(wrong.err.find("medulla: --set body.gallbladder.look: unknown look \"livr\": did you mean \"liver\"?"), 0)
+      << wrong.err;
   const ProgramResult none = runProgram({"check", scene, "--set", "body.gallbladder.model=none.xml"});
   EXPECT_EQ(none.err, "medulla: --set body.gallbladder.model: model of body \"gallbladder\" \"" + folder.path() +
                           "/mine/none.xml\" does not exist\n");

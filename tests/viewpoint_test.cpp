@@ -41,8 +41,8 @@ TEST(Viewpoint, ZoomingInDoesNotNarrowTheLampsCone) {
   EXPECT_NEAR(tangentAt(10), tangentAt(42), 0.02f * tangentAt(42));
 }
 
-// A lamp in the world sees all that casts a shadow; but where one of many bodies moves a little from picture to picture,
-// the texels of its view stay where they are, or the edges of all resting shadows would crawl.
+// A lamp in the world sees all that casts a shadow; but where one of many bodies moves a little from picture to
+// picture, the texels of its view stay where they are, or the edges of all resting shadows would crawl.
 TEST(Viewpoint, ALampsViewHoldsAllCastersAndRarelyFollowsThem) {
   const Look look;
   SceneMesh mesh;

@@ -250,10 +250,10 @@ Trajectory parseRecording(std::string_view text, const std::string& name, const 
                        rows[k].line);
   }
   if (trajectory.samples.empty())
-    throw inputError(map.path, map.line,
-                     fmt::format("no row lies from {} s{}: the recording is {} s long", map.from,
-                                 std::isinf(map.to) ? " on" : fmt::format(" to {} s", map.to),
-                                 whole.samples.back().time));
+    throw inputError(
+        map.path, map.line,
+        fmt::format("no row lies from {} s{}: the recording is {} s long", map.from,
+                    std::isinf(map.to) ? " on" : fmt::format(" to {} s", map.to), whole.samples.back().time));
   return trajectory;
 }
 

@@ -18,8 +18,8 @@ struct HeldRegion {
 };
 
 // Of each region its triangles, ascending: those with all corners in it and, since a run holds nodes, those with all
-// corners in several regions together, which count to the one with most of them. Throws std::runtime_error where a region
-// has none, or where they are the whole surface.
+// corners in several regions together, which count to the one with most of them. Throws std::runtime_error where a
+// region has none, or where they are the whole surface.
 std::vector<std::vector<int>> heldTriangles(const TriangleMesh& mesh, const std::vector<HeldRegion>& regions);
 
 // Of each node of the mesh, whether it is a corner of one of the triangles.

@@ -232,10 +232,10 @@ void chooseSkin(const Solved& solved, const Trials& trials, const Lessons& lesso
   out.skin = skin;
 }
 
-// Cells that lie behind what is held but for a twentieth of their volume. Their links, as stiff as the penalty that holds
-// them, would dictate the whole body's step without moving anything visible: of a gallbladder of 25 spheres held by its
-// neck, one of 96 % asks for 216 substeps in 20 ms, and for 32 where it stands still, which costs .04 % of error. At 93 %
-// that costs .1, at 90 % .4, and what is held by its half 2 %.
+// Cells that lie behind what is held but for a twentieth of their volume. Their links, as stiff as the penalty that
+// holds them, would dictate the whole body's step without moving anything visible: of a gallbladder of 25 spheres held
+// by its neck, one of 96 % asks for 216 substeps in 20 ms, and for 32 where it stands still, which costs .04 % of
+// error. At 93 % that costs .1, at 90 % .4, and what is held by its half 2 %.
 std::vector<int> framesBehindHeld(const CellFrames& cells) {
   constexpr double kWhole = 0.95;
   std::vector<int> out;
@@ -326,8 +326,7 @@ Identification identifyNetwork(const SoftBodyModel& model, const std::vector<Hel
   Alongside<VoxelSolid> largerCells([&](const Progress& goOn) {
     return makeVoxelSolid(mesh, kLargerCells * metCellSize(mesh, cell.size), solidSettings, goOn);
   });
-  VoxelSolid solid =
-      withRemedy(cell, [&] { return makeVoxelSolid(mesh, cell.size, solidSettings, stage(0, 0.2)); });
+  VoxelSolid solid = withRemedy(cell, [&] { return makeVoxelSolid(mesh, cell.size, solidSettings, stage(0, 0.2)); });
   requireWithinReach(solid.grid, mesh, solidSettings.heldTriangles);
   const CellFrames cells = makeCellFrames(mesh, ballsOf(model), solid);
   out.voxel = solid.grid.size;

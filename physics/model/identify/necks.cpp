@@ -100,8 +100,7 @@ void VoxelGraph::joinVoxels(const VoxelBody& body) {
 void VoxelGraph::findCores(const TriangleMesh& mesh, double widest) {
   const SurfaceTree tree = makeSurfaceTree(mesh);
   std::vector<bool> deep(size());
-  for (int v = 0; v < size(); ++v)
-    deep[v] = std::isinf(closestPoint(tree, middle_[v], 0.5 * widest).distance);
+  for (int v = 0; v < size(); ++v) deep[v] = std::isinf(closestPoint(tree, middle_[v], 0.5 * widest).distance);
   for (int first = 0; first < size(); ++first) {
     if (!deep[first] || core_[first] >= 0) continue;
     queue_.assign(1, first);
