@@ -34,6 +34,30 @@ TEST_F(RunNotes, AToolThatClosedBesideTheBodyHeldNothing) {
   EXPECT_EQ(notesOfGrips({0, 1, 0, 0}, 0.3), Notes{});  // it may hold something later
 }
 
+TEST_F(RunNotes, AHandThatJumps) {
+  const auto notesOf = [&](double seconds) {
+    folder.write("own/organ.csv", fmt::format("t[s],x[m],y[m],z[m],qw,qx,qy,qz\n"
+                                              "0,0,0,0.1,1,0,0,0\n"
+                                              "0.2,0,0,0.1,1,0,0,0\n"
+                                              "{},0,0,0.13,1,0,0,0\n"
+                                              "0.9,0,0,0.13,1,0,0,0\n",
+                                              0.2 + seconds));
+    return complaints(run({"check", "own/organ.xml"}));
+  };
+  EXPECT_EQ(notesOf(0.005), Notes{"note: tool 'probe' moves by 30 mm in 5 ms at 0.2 s: is its motion all there?"});
+  EXPECT_EQ(notesOf(0.1), Notes{});
+}
+
+TEST_F(RunNotes, CaptionsThatNobodySees) {
+  std::string text = read("own/organ.xml");
+  text.replace(text.find("/></scene>"), 10, "><caption from=\"50\" to=\"51\" text=\"too late\"/></output></scene>");
+  folder.write("own/organ.xml", text);
+  const Notes notes = complaints(run({"check", "own/organ.xml"}));
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_TRUE(notes[0].starts_with("note: the caption \"too late\" begins at 50 s, and the scene ends at "))
+      << notes[0];
+}
+
 TEST_F(RunNotes, JawsThatComeToWhereTheyCloseAndNoFurther) {
   EXPECT_EQ(notesOfGrips({0, 0.2, 0.5, 0}, 0.6),
             Notes{"note: the jaws of tool 'probe' come to where they close and no further: it grips nothing"});

@@ -37,6 +37,29 @@ static void printUnplayed(const LoadedScene& loaded, bool isExcerpt) {
   }
 }
 
+static void printUnseenCaptions(const Scene& scene, bool isExcerpt) {
+  for (const SceneCaption& caption : scene.captions)
+    if (caption.from >= scene.duration && !isShortened(scene, isExcerpt))
+      tell("note: the caption {} begins at {:.6g} s, and the scene ends at {:.6g} s\n", inQuotes(caption.text, '"'),
+           caption.from, scene.duration);
+}
+
+// No hand is as fast: a clutch, or a tracker that lost it. What lies between is played as a straight motion.
+static void printJumps(const LoadedScene& loaded) {
+  constexpr double kFastest = 5;  // m/s
+  for (std::size_t k = 0; k < loaded.trajectories.size(); ++k) {
+    const std::vector<ToolSample>& samples = loaded.trajectories[k].samples;
+    for (std::size_t i = 1; i < samples.size(); ++i) {
+      const double way = (samples[i].position - samples[i - 1].position).norm();
+      const double time = samples[i].time - samples[i - 1].time;
+      if (way <= kFastest * time) continue;
+      tell("note: tool '{}' moves by {:.3g} mm in {:.3g} ms at {:.6g} s: is its motion all there?\n",
+           loaded.scene.tools[k].name, 1e3 * way, 1e3 * time, samples[i - 1].time);
+      break;
+    }
+  }
+}
+
 // As of a recording whose `closes` is the very least that its jaws come to.
 static void printAlmostClosed(const LoadedScene& loaded) {
   constexpr double kRounding = 1e-6;
@@ -175,6 +198,8 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
   printUnits(loaded);
   printPassedThrough(scene);
   printUnplayed(loaded, options.isExcerpt);
+  printUnseenCaptions(scene, options.isExcerpt);
+  printJumps(loaded);
   printAlmostClosed(loaded);
   for (const BodyOverlap& o : world.startOverlaps()) {
     const std::string& name = scene.bodies[o.body0].name;
