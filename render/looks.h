@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-// What organs look like, as data: adding a look adds a row to the table in looks.cpp and no code.
+// What organs look like, as data: adding a look adds its values and a row of the table to looks.cpp, and no code.
 namespace medulla {
 
 // A colour painted over parts of a surface at rest where

@@ -11,7 +11,7 @@
 
 // The arrays of contact. A collider is a round cone between the balls of two spheres, or a ball: a cone whose two ends
 // are the same. Lists of near pairs outlive many substeps (Verlet lists): they hold every pair nearer than a margin and
-// are made anew once a ball has moved half of it.
+// are made anew once a ball has moved half of what the margin is beyond a substep's reach.
 namespace medulla {
 
 struct Collider {

@@ -21,7 +21,7 @@ struct Tissue {
   double young = 5e3;     // Pa, > 0; more is stiffer and needs smaller substeps
   double poisson = 0.45;  // 0 <= nu < 0.5
   double density = 1040;  // kg/m3, > 0
-  double damping = 0.1;   // ratio to critical of the body's lowest bending mode, >= 0; 0 swings for ever
+  double damping = 0.1;   // ratio to critical of the lowest mode that deforms the body, >= 0; 0 swings for ever
   double friction = 0.2;  // Coulomb's, >= 0, sticking and sliding; a pair has the geometric mean of its two sides
   bool operator==(const Tissue&) const = default;
 };
@@ -98,8 +98,8 @@ struct WorldSettings {
   double frameDuration = 0.02;           // s, one dynamics frame
   Integrator integrator = Integrator::explicitEuler;
   int order = 1;  // of the implicit integrator, 1 or 2
-  // Per dynamics frame; 0: as many as the stability estimate asks for, implicit: of 5 ms at most; 16 or more per swing
-  // of what drives a sphere.
+  // Per dynamics frame; 0: as many as the stability estimate asks for, explicit of 10 ms at most, implicit of 5; 16 or
+  // more per swing of what drives a sphere.
   int substeps = 0;
   ContactMode contact = ContactMode::none;
   // Dynamics frames before time 0, in which bodies come to rest under weight and contact: dead loads wait, driven
