@@ -137,6 +137,18 @@ TEST_F(ModelFile, WritingWhatWasReadGivesTheSameBytes) {
   EXPECT_EQ(textOf(read(text)), text);
 }
 
+// Closed as it may be, finer checks and every measure rely on what a surface encloses.
+TEST_F(ModelFile, SurfacesThatEncloseNothingAreRefused) {
+  const auto refusalOf = [&](const SoftBodyModel& model) { return complaintOf([&] { read(textOf(model)); }); };
+  SoftBodyModel turned = smallModel(), flat = turned, far = turned;
+  for (auto& t : turned.triangles) std::swap(t[0], t[1]);
+  for (Eigen::Vector3d& node : flat.restNodes) node.z() = 0;
+  far.restNodes[0].x() = 2e6;
+  EXPECT_NE(refusalOf(turned).find("<triangles>: the surface is flat or inside out"), std::string::npos);
+  EXPECT_NE(refusalOf(flat).find("<triangles>: the surface is flat or inside out"), std::string::npos);
+  EXPECT_NE(refusalOf(far).find("<nodes>: a place beyond 1e6 m"), std::string::npos);
+}
+
 TEST_F(ModelFile, MistakesNameTheLineAndWhatIsWrong) {
   const std::string text = textOf(smallModel());
   const struct {

@@ -195,6 +195,10 @@ TEST(Program, IdentifiesTheSameNetworkEachTime) {
   for (const char* name : {"identified_voxel", "identified_error_max", "identified_error_rms",
                            "identified_poke_error_max", "finite_elements_error_max", "formulas_error_rms"})
     EXPECT_NE(r.out.find(name), std::string::npos) << name;
+  // Its frames are those of the file.
+  const ProgramResult info = runProgram({"info", folder / "a.xml"});
+  for (const char* name : {"attachment_max", "attachments_crossing", "centre_error"})
+    EXPECT_EQ(valueOf(r.out, name), valueOf(info.out, name)) << name;
   EXPECT_EQ(build("b.xml", {"--identify", "--fix", "plane=1,0,0,0.001"}).exitCode, 0);
   const std::string model = readFile(folder / "a.xml");
   EXPECT_EQ(model, readFile(folder / "b.xml"));

@@ -36,11 +36,11 @@ TEST_F(RunNotes, AToolThatClosedBesideTheBodyHeldNothing) {
 
 TEST_F(RunNotes, AHandThatJumps) {
   const auto notesOf = [&](double seconds) {
-    folder.write("own/organ.csv", fmt::format("t[s],x[m],y[m],z[m],qw,qx,qy,qz\n"
-                                              "0,0,0,0.1,1,0,0,0\n"
-                                              "0.2,0,0,0.1,1,0,0,0\n"
-                                              "{},0,0,0.13,1,0,0,0\n"
-                                              "0.9,0,0,0.13,1,0,0,0\n",
+    folder.write("own/organ.csv", fmt::format("t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n"
+                                              "0,0,0,0.1,1,0,0,0,0\n"
+                                              "0.2,0,0,0.1,1,0,0,0,0\n"
+                                              "{},0,0,0.13,1,0,0,0,0\n"
+                                              "0.9,0,0,0.13,1,0,0,0,0\n",
                                               0.2 + seconds));
     return complaints(run({"check", "own/organ.xml"}));
   };

@@ -71,7 +71,8 @@ TEST(StlReader, ReadsTextAndBinaryWithCornersJoined) {
   expectTetrahedron(parseStl(binary("solid though it is binary"), "a.stl"));
   std::string shouted = replaced(text(), "solid", "SOLID");
   expectTetrahedron(parseStl(replaced(shouted, "facet normal nan nan nan", "FACET NORMAL 0 0 -1"), "a.stl"));
-  EXPECT_EQ(parseStl(text() + "\n" + text(), "a.stl").triangles.size(), 8u);  // two solids
+  expectTetrahedron(parseStl("solid C:\\parts\\" + text().substr(text().find('\n')), "a.stl"));  // no line goes on
+  EXPECT_EQ(parseStl(text() + "\n" + text(), "a.stl").triangles.size(), 8u);                     // two solids
 }
 
 TEST(StlReader, KeepsAllDigitsOfText) {

@@ -23,6 +23,7 @@
 #include "physics/dynamics/fixation.h"
 #include "physics/dynamics/rest_modes.h"
 #include "physics/model/ball_choice.h"
+#include "physics/model/build_report.h"
 #include "physics/model/identify/check_loads.h"
 #include "physics/model/identify/held_region.h"
 #include "physics/model/identify/slits.h"
@@ -154,7 +155,7 @@ void warnOfSlits(const BuildJob& job) {
   if (const auto slit = narrowestSlit({job.model.restNodes, job.model.triangles}, voxel))
     tell(
         "{}: note: gaps down to {:.2g} mm, as near {} m, are bridged by finite elements of {:.2g} mm, which tie "
-        "their walls together: more spheres make smaller ones, links=\"beam\" of a scene knows of the gap\n",
+        "their walls together: more spheres make smaller ones\n",
         job.meshPath, 1e3 * slit->width, placeText(slit->place), 1e3 * voxel);
 }
 
@@ -310,7 +311,13 @@ void identifyModel(const BuildOptions& options, BuildJob& job) {
     progress.end();
     auto network = std::make_shared<IdentifiedNetwork>(found.network);
     chooseFormulasIfBetter(job, *network, found);
-    if (!network->usesFormulas) shareOutMassByLayer(network->layer, job.settings.surfaceMassFraction, job.model);
+    if (network->usesFormulas) return network;
+    shareOutMassByLayer(network->layer, job.settings.surfaceMassFraction, job.model);
+    const BuildReport before = job.report;  // of frames that have moved since
+    job.report = measureModel(job.model);
+    job.report.hollowLinks = before.hollowLinks;
+    job.report.longEdges = before.longEdges;
+    job.report.seconds = before.seconds;
     return network;
   });
   job.report.seconds += wallSeconds() - start;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 #include "app/files/identified_part.h"
 #include "app/files/model_rows.h"
@@ -92,9 +93,15 @@ bool isClosed(const std::vector<std::array<int, 3>>& triangles) {
   return once && !triangles.empty() && forward == backward;
 }
 
+constexpr double kLargestCoordinate = 1e6;  // m, as of meshes
+constexpr double kLeastVolume = 1e-12;      // of the cube of its diagonal: a wire of a micron per metre has as much
+
 void readSurface(const std::string& path, const XmlElement& root, SoftBodyModel& model) {
   Rows nodes(path, root, "nodes");
-  nodes.forEach([&] { nodes.get(model.restNodes.emplace_back()); });
+  nodes.forEach([&] {
+    nodes.get(model.restNodes.emplace_back());
+    nodes.require(model.restNodes.back().cwiseAbs().maxCoeff() <= kLargestCoordinate, "a place beyond 1e6 m");
+  });
   const std::size_t count = model.restNodes.size();
   Rows inputs(path, root, "input_vertices");
   inputs.forEach([&] { model.nodeOfInputVertex.push_back(inputs.index(count, -1)); });
@@ -104,6 +111,9 @@ void readSurface(const std::string& path, const XmlElement& root, SoftBodyModel&
   Rows triangles(path, root, "triangles");
   triangles.forEach([&] { model.triangles.push_back(triangles.indices<3>(count)); });
   triangles.require(isClosed(model.triangles), "the surface is not closed and wound one way");
+  const TriangleMesh surface{model.restNodes, model.triangles};
+  triangles.require(enclosedVolume(surface) > kLeastVolume * std::pow(boundsDiagonal(surface), 3),
+                    "the surface is flat or inside out");
   std::vector<char> isUsed(count, 0);
   for (const std::array<int, 3>& t : model.triangles)
     for (const int node : t) isUsed[node] = 1;

@@ -39,7 +39,7 @@ int corner(const TextLines& lines, std::string_view word, std::size_t vertices) 
 TriangleMesh parseObj(std::string_view text, const std::string& name) {
   TriangleMesh mesh;
   int largest = -1, largestLine = 0;
-  TextLines lines(text, name);
+  TextLines lines(text, name, true);
   std::vector<int> polygon;
   Polygons polygons;
   while (lines.next()) {

@@ -21,7 +21,7 @@ bool TextLines::splitLine() {
   ++line_;
   const std::size_t comment = text.find('#');
   text = trimmed(text.substr(0, comment));
-  const bool continued = comment == std::string_view::npos && text.ends_with('\\');
+  const bool continued = joined_ && comment == std::string_view::npos && text.ends_with('\\');
   if (continued) text.remove_suffix(1);
   for (std::string_view word = takeWord(text); !word.empty(); word = takeWord(text)) words_.push_back(word);
   return continued;

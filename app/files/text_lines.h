@@ -10,11 +10,13 @@ namespace medulla {
 std::string_view takeLine(std::string_view& rest);
 
 // Walks a text line by line and splits it into words, for formats whose errors must name the line. Lines end in LF or
-// CRLF; # starts a comment; a backslash at the end of a line joins the next one (OBJ).
+// CRLF; # starts a comment.
 class TextLines {
  public:
-  // `text` must outlive this object; `name` is the path that errors begin with.
-  TextLines(std::string_view text, std::string name) : rest_(text), name_(std::move(name)) {}
+  // `text` must outlive this object; `name` is the path that errors begin with. `joined`: a backslash at the end of a
+  // line joins the next one.
+  TextLines(std::string_view text, std::string name, bool joined = false)
+      : rest_(text), name_(std::move(name)), joined_(joined) {}
 
   // Moves to the next line that holds a word. False at the end.
   bool next();
@@ -34,6 +36,7 @@ class TextLines {
 
   std::string_view rest_;
   std::string name_;
+  bool joined_;
   int line_ = 0;
   std::vector<std::string_view> words_;
 };

@@ -111,13 +111,9 @@ std::vector<std::array<int, 3>> triangulate(const TriangleMesh& mesh, const std:
   return triangles;
 }
 
-// A lone triangle's outline could only be closed by its own back.
-bool hasTriangle(const TriangleMesh& mesh, std::array<int, 3> corners) {
+std::array<int, 3> sorted(std::array<int, 3> corners) {
   std::sort(corners.begin(), corners.end());
-  return std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&corners](std::array<int, 3> t) {
-    std::sort(t.begin(), t.end());
-    return t == corners;
-  });
+  return corners;
 }
 
 }  // namespace
@@ -136,16 +132,20 @@ void fillSmallHoles(MeshUnderRepair& repair) {
   }
   const auto list = uniqueEdges(repair.mesh);
   std::set<Edge> edges(list.begin(), list.end());
+  std::set<std::array<int, 3>> known;
+  for (const std::array<int, 3>& t : repair.mesh.triangles) known.insert(sorted(t));
   for (const Loop& loop : loops) {
     const bool tooMany = loop.vertices.size() > kMostEdges;
     const auto triangles = tooMany ? decltype(repair.mesh.triangles)() : triangulate(repair.mesh, loop.vertices, edges);
-    if (triangles.empty() || (triangles.size() == 1 && hasTriangle(repair.mesh, triangles[0]))) {
+    // A lone triangle's outline could only be closed by its own back.
+    if (triangles.empty() || (triangles.size() == 1 && known.contains(sorted(triangles[0])))) {
       throw std::runtime_error(
           fmt::format("a hole of {} ({} edges) near vertex {} cannot be filled, expected a closed surface",
                       millimetres(loop.length), loop.vertices.size(), repair.inputOfVertex[loop.vertices[0]]));
     }
     for (const auto& t : triangles) {
       repair.mesh.triangles.push_back(t);
+      known.insert(sorted(t));
       for (int k = 0; k < 3; ++k) edges.insert(edgeOf(t[k], t[(k + 1) % 3]));
     }
   }

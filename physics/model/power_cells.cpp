@@ -1,11 +1,14 @@
 #include "physics/model/power_cells.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 namespace medulla {
 
@@ -90,6 +93,11 @@ Columns layOutVoxels(const TriangleMesh& mesh, double volume, int target, VoxelB
   Eigen::AlignedBox3d box;
   for (const std::array<int, 3>& t : mesh.triangles)
     for (const int corner : t) box.extend(mesh.vertices[corner]);
+  // 4 GB: a body that fills so little of its box is a spike, a unit or a surface gone wrong.
+  constexpr double kMostVoxels = 1e9;
+  if (!((box.sizes() / body.size).prod() < kMostVoxels))
+    throw std::runtime_error(fmt::format(
+        "the body fills a part in {:.2g} of its box: too little to divide it into cells", box.volume() / volume));
   for (int a = 0; a < 3; ++a) body.count[a] = static_cast<int>(box.sizes()[a] / body.size) + 2;
   Columns columns{
       box.min() - Vector3d(0.31, 0.27, 0.5) * body.size, body.size, body.count[0] + 1, body.count[1] + 1, {}};
