@@ -299,6 +299,7 @@ void chooseFormulasIfBetter(BuildJob& job, IdentifiedNetwork& network, const Ide
   tell("{}: note: beams' formulas are nearer to finite elements ({:.2g} against {:.2g} % RMS): kept\n", job.meshPath,
        job.formulas->rms, network.bulk.rms);
   network.usesFormulas = true;
+  network.heldFrames.clear();
   network.links.clear();
   network.skin.clear();
 }
