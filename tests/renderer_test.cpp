@@ -462,19 +462,6 @@ TEST(Renderer, OrganBesideAnotherIsDarkerInTheCrease) {
   EXPECT_LT(red(together, nearContact, 64), red(alone, nearContact, 64) - 8);
 }
 
-// A brush's streak is an instrument's: a ball shows the lamp as a spot.
-TEST(Renderer, ABallOfSteelShinesAllAround) {
-  Renderer renderer(settingsOf(128, 128));
-  renderer.addSurface(sphere("steel", {0, 0, 0}, 0.04f, 24));
-  Image image;
-  renderer.render(viewFromFront(0.2f), image);
-  const int away = int(0.6 * 0.04 / 0.2 / std::tan(glm::radians(20.0)) * 64);
-  const int beside = red(image, 64 - away, 64);
-  EXPECT_LT(beside, red(image, 64, 64) - 60);
-  EXPECT_NEAR(red(image, 64, 64 - away), beside, 50);
-  EXPECT_NEAR(red(image, 64, 64 + away), beside, 50);
-}
-
 TEST(Renderer, EveryLookDraws) {
   Renderer renderer(settingsOf(64, 64));
   const std::vector<std::string> names = lookNames();
