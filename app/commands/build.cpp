@@ -212,18 +212,15 @@ void readMeshes(const BuildOptions& options, std::vector<BuildJob>& jobs) {
 // A run holds every node, finite elements what lies between three of them.
 void noteStrayNodes(const BuildJob& job, const std::vector<std::vector<int>>& triangles) {
   constexpr double kFew = 0.1;  // of those held: some at the rim of a box do no harm
-  std::vector<bool> isHeld(job.mesh.mesh.vertices.size(), false), isStray;
-  for (const HeldRegion& region : job.held)
-    for (const int n : region.nodes) isHeld[n] = true;
-  isStray = isHeld;
-  for (const std::vector<int>& of : triangles)
-    for (const int t : of)
-      for (const int n : job.mesh.mesh.triangles[t]) isStray[n] = false;
-  const auto held = std::count(isHeld.begin(), isHeld.end(), true),
-             stray = std::count(isStray.begin(), isStray.end(), true);
-  if (static_cast<double>(stray) > kFew * static_cast<double>(held))
+  std::vector<int> nodes, whole;
+  for (const HeldRegion& region : job.held) nodes.insert(nodes.end(), region.nodes.begin(), region.nodes.end());
+  for (const std::vector<int>& of : triangles) whole.insert(whole.end(), of.begin(), of.end());
+  sortUnique(nodes);
+  const std::vector<bool> isCorner = nodesOfTriangles(job.mesh.mesh, whole);
+  const auto stray = std::count_if(nodes.begin(), nodes.end(), [&](int n) { return !isCorner[n]; });
+  if (static_cast<double>(stray) > kFew * static_cast<double>(nodes.size()))
     tell("{}: note: {} of {} nodes that are held are no corners of a held triangle: finite elements let them go\n",
-         job.meshPath, stray, held);
+         job.meshPath, stray, nodes.size());
 }
 
 // Of the repaired mesh, whose vertices a model's nodes are: a mistake in what is to be held shows before any work.

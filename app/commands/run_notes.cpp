@@ -44,7 +44,7 @@ static void printUnseenCaptions(const Scene& scene, bool isExcerpt) {
            caption.from, scene.duration);
 }
 
-// No hand is as fast: a clutch, or a tracker that lost it. What lies between is played as a straight motion.
+// No hand is as fast: a clutch, or a tracker that lost it. What lies between is played all the same.
 static void printJumps(const LoadedScene& loaded) {
   constexpr double kFastest = 5;  // m/s
   for (std::size_t k = 0; k < loaded.trajectories.size(); ++k) {
