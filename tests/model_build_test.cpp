@@ -32,21 +32,6 @@ TEST(MassProperties, BoxFarFromTheOrigin) {
   EXPECT_LT((m.secondMoment - Eigen::Matrix3d(expected.asDiagonal())).norm(), 1e-9);
 }
 
-TEST(PowerCells, SumToTheBodyAndVoxelsAloneAreClose) {
-  const TriangleMesh mesh = ellipsoidMesh(3, {0.05, 0.03, 0.02});
-  const MassProperties exact = massProperties(mesh);
-  const VoxelBody voxels = voxelise(mesh, exact.volume, 60000);
-  double volume = 0;
-  for (const VoxelPiece& piece : voxels.pieces) volume += piece.volume;
-  EXPECT_NEAR(volume / exact.volume, 1, 1e-3);
-  const PowerCells cells = divideByPower(voxels, {{{-0.02, 0, 0}, 0.015}, {{0.015, 0, 0}, 0.018}}, exact);
-  const MassProperties sum = combined(cells.cells);
-  EXPECT_NEAR(sum.volume / exact.volume, 1, 1e-12);
-  EXPECT_LT((sum.centroid - exact.centroid).norm(), 1e-12);
-  EXPECT_LT((sum.secondMoment - exact.secondMoment).norm(), 1e-10 * exact.secondMoment.norm());
-  ASSERT_EQ(cells.contactArea.size(), 1u);
-}
-
 TEST(LinkSections, StraightTubeGivesItsBeam) {
   const double radius = 0.01, pi = std::numbers::pi;
   BuildSettings settings;

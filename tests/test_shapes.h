@@ -58,13 +58,25 @@ inline TriangleMesh boxMesh(const Eigen::Vector3d& size) {
   return mesh;
 }
 
-// The outer surface with the inner one, turned inside out, as a cavity.
-inline TriangleMesh hollowed(const TriangleMesh& outer, const TriangleMesh& inner) {
-  TriangleMesh mesh = outer;
-  const int first = static_cast<int>(outer.vertices.size());
-  mesh.vertices.insert(mesh.vertices.end(), inner.vertices.begin(), inner.vertices.end());
-  for (const auto& [a, b, c] : inner.triangles) mesh.triangles.push_back({first + a, first + c, first + b});
+inline TriangleMesh together(const TriangleMesh& one, const TriangleMesh& other) {
+  TriangleMesh mesh = one;
+  const int first = static_cast<int>(one.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (const auto& [a, b, c] : other.triangles) mesh.triangles.push_back({first + a, first + b, first + c});
   return mesh;
+}
+
+// The outer surface with the inner one, turned inside out, as a cavity.
+inline TriangleMesh hollowed(const TriangleMesh& outer, TriangleMesh inner) {
+  for (auto& [a, b, c] : inner.triangles) std::swap(b, c);
+  return together(outer, inner);
+}
+
+// Two blocks side by side, so far apart (m).
+inline TriangleMesh blocksMesh(double gap) {
+  TriangleMesh one = boxMesh({0.05, 0.01, 0.02}), other = one;
+  for (Eigen::Vector3d& x : other.vertices) x.y() += 0.01 + gap;
+  return together(one, other);
 }
 
 // A straight round tube along +x from 0 to `length` with flat ends.

@@ -117,16 +117,6 @@ TEST(ThinMesh, PlacesAreSaidWithoutNegativeZeros) {
   EXPECT_EQ(placeText({-1e-7, 0.05994, -0.12}), "(0.0000, 0.0599, -0.1200)");
 }
 
-// Two blocks side by side, so far apart (m).
-TriangleMesh blocks(double gap) {
-  TriangleMesh both = boxMesh({0.05, 0.01, 0.02});
-  const TriangleMesh one = both;
-  const int first = int(one.vertices.size());
-  for (const Vector3d& x : one.vertices) both.vertices.push_back(x + (0.01 + gap) * Vector3d::UnitY());
-  for (const auto& [a, b, c] : one.triangles) both.triangles.push_back({a + first, b + first, c + first});
-  return both;
-}
-
 std::vector<double> evenly(double from, double to, int parts) {
   std::vector<double> out;
   for (int k = 0; k <= parts; ++k) out.push_back(std::lerp(from, to, double(k) / parts));
@@ -204,10 +194,10 @@ TEST(ThinMesh, ARodThatLiesAslantIsRefusedBeforeItsBoxFillsTheMemory) {
 }
 
 TEST(ThinMesh, SlitsThinnerThanACellAreFoundAndCreasesAreNone) {
-  const std::optional<Slit> slit = narrowestSlit(blocks(0.001), 0.004);
+  const std::optional<Slit> slit = narrowestSlit(blocksMesh(0.001), 0.004);
   ASSERT_TRUE(slit);
   EXPECT_NEAR(slit->width, 0.001, 1e-6);
-  EXPECT_FALSE(narrowestSlit(blocks(0.005), 0.004));
+  EXPECT_FALSE(narrowestSlit(blocksMesh(0.005), 0.004));
   for (const char* organ : {"liver/liver.obj", "stomach/stomach.obj"})
     EXPECT_FALSE(narrowestSlit(assetMesh(organ), 0.008)) << organ;
 }

@@ -86,16 +86,17 @@ void dropEmptyCells(const VoxelBody& voxels, const MassProperties& exact, Sphere
 }
 
 // Columns are whole or empty along x and y, and a fin that stands between them has no voxel: where a cell stays empty
-// even voxels are asked, which are many times the work.
-void fillCells(const BodyShape& shape, SpheresAndLinks& s) {
+// even voxels are asked, which are many times the work. Returns the voxels that were.
+VoxelBody fillCells(const BodyShape& shape, SpheresAndLinks& s) {
   const int target = voxelsFor(static_cast<int>(s.balls.size()));
   const auto divide = [&](const VoxelBody& voxels) { s.cells = divideByPower(voxels, s.balls, shape.exact); };
-  const VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, target);
+  VoxelBody voxels = voxelise(shape.mesh, shape.exact.volume, target);
   divide(voxels);
-  if (std::none_of(s.cells.cells.begin(), s.cells.cells.end(), isEmpty)) return;
-  const VoxelBody even = voxeliseEvenly(shape.mesh, shape.exact.volume, target);
-  divide(even);
-  dropEmptyCells(even, shape.exact, s);
+  if (std::none_of(s.cells.cells.begin(), s.cells.cells.end(), isEmpty)) return voxels;
+  voxels = voxeliseEvenly(shape.mesh, shape.exact.volume, target);
+  divide(voxels);
+  dropEmptyCells(voxels, shape.exact, s);
+  return voxels;
 }
 
 // The paper's raw result: skeleton nodes are spheres of inscribed radius, skeleton edges are links.
@@ -119,8 +120,8 @@ SpheresAndLinks spheresOfSkeleton(const BodyShape& shape, const Skeleton& skelet
 SpheresAndLinks spheresByCover(const BodyShape& shape, std::vector<Ball> balls) {
   SpheresAndLinks s;
   s.balls = std::move(balls);
-  fillCells(shape, s);
-  s.links = linkCells(shape.tree, s.cells, s.balls);
+  const VoxelBody voxels = fillCells(shape, s);
+  s.links = linkCells(shape.tree, s.cells.cells, contactAreasWithin(shape.tree, voxels, s.cells.cellOfPiece), s.balls);
   return s;
 }
 

@@ -20,10 +20,11 @@ bool staysInside(const SurfaceTree& tree, const Eigen::Vector3d& a, const Eigen:
   return isInside(tree, 0.5 * (a + b)) && !segmentCrosses(tree, a, b, kNoVertex);
 }
 
-std::vector<Candidate> candidatesOf(const SurfaceTree& tree, const PowerCells& cells) {
+std::vector<Candidate> candidatesOf(const SurfaceTree& tree, const std::vector<MassProperties>& cells,
+                                    const ContactAreas& contacts) {
   std::vector<Candidate> candidates;
-  for (const auto& [pair, area] : cells.contactArea) {
-    const MassProperties &a = cells.cells[pair.first], &b = cells.cells[pair.second];
+  for (const auto& [pair, area] : contacts) {
+    const MassProperties &a = cells[pair.first], &b = cells[pair.second];
     const double side = std::cbrt(std::min(a.volume, b.volume));
     const double ratio = area / (side * side), last = staysInside(tree, a.centroid, b.centroid) ? 1 : 1e-3;
     candidates.push_back({ratio, last * ratio, {pair.first, pair.second}});
@@ -35,10 +36,11 @@ std::vector<Candidate> candidatesOf(const SurfaceTree& tree, const PowerCells& c
 
 }  // namespace
 
-SphereLinks linkCells(const SurfaceTree& tree, const PowerCells& cells, const std::vector<Ball>& balls) {
+SphereLinks linkCells(const SurfaceTree& tree, const std::vector<MassProperties>& cells, const ContactAreas& contacts,
+                      const std::vector<Ball>& balls) {
   constexpr int degreeMax = 12;
   constexpr double contactRatioMin = 0.15;  // cells that only share a corner or an edge fall below
-  const std::vector<Candidate> candidates = candidatesOf(tree, cells);
+  const std::vector<Candidate> candidates = candidatesOf(tree, cells, contacts);
   SphereLinks links;
   std::vector<Candidate> further;
   DisjointSets sets(balls.size());

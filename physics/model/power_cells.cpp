@@ -10,6 +10,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "physics/model/disjoint_sets.h"
+
 namespace medulla {
 
 using Eigen::Vector3d;
@@ -311,24 +313,6 @@ static void matchExact(const MassProperties& exact, std::vector<MassProperties>&
   }
 }
 
-static std::map<std::pair<int, int>, double> contactAreas(const VoxelBody& body, const std::vector<int>& cellOfPiece) {
-  std::map<std::pair<int, int>, double> areas;
-  const std::array<std::size_t, 3> stride = {static_cast<std::size_t>(body.count[1]) * body.count[2],
-                                             static_cast<std::size_t>(body.count[2]), 1};
-  for (std::size_t p = 0; p < body.pieces.size(); ++p) {
-    const VoxelPiece& piece = body.pieces[p];
-    const std::size_t at = piece.index[0] * stride[0] + piece.index[1] * stride[1] + piece.index[2];
-    if (body.pieceAt[at] != static_cast<int>(p)) continue;
-    for (int a = 0; a < 3; ++a) {
-      if (piece.index[a] + 1 >= body.count[a]) continue;
-      const int neighbour = body.pieceAt[at + stride[a]];
-      if (neighbour < 0 || cellOfPiece[neighbour] == cellOfPiece[p]) continue;
-      areas[std::minmax(cellOfPiece[p], cellOfPiece[neighbour])] += body.size * body.size;
-    }
-  }
-  return areas;
-}
-
 PowerCells divideByPower(const VoxelBody& body, const std::vector<Ball>& balls, const MassProperties& exact) {
   PowerCells result;
   const double smallest = 8 * body.size * body.size * body.size;  // below, a cell is no more than noise of the voxels
@@ -346,8 +330,60 @@ PowerCells divideByPower(const VoxelBody& body, const std::vector<Ball>& balls, 
   }
   result.sites.reaches = reachesOf(body, result.sites, result.cellOfPiece);
   matchExact(exact, result.cells);
-  result.contactArea = contactAreas(body, result.cellOfPiece);
   return result;
+}
+
+// Pairs of pieces in neighbouring voxels.
+template <typename Visit>
+static void visitFaces(const VoxelBody& body, const Visit& visit) {
+  const std::array<std::size_t, 3> stride = {static_cast<std::size_t>(body.count[1]) * body.count[2],
+                                             static_cast<std::size_t>(body.count[2]), 1};
+  for (std::size_t p = 0; p < body.pieces.size(); ++p) {
+    const VoxelPiece& piece = body.pieces[p];
+    const std::size_t at = piece.index[0] * stride[0] + piece.index[1] * stride[1] + piece.index[2];
+    if (body.pieceAt[at] != static_cast<int>(p)) continue;
+    for (int a = 0; a < 3; ++a) {
+      if (piece.index[a] + 1 >= body.count[a]) continue;
+      const int neighbour = body.pieceAt[at + stride[a]];
+      if (neighbour >= 0) visit(static_cast<int>(p), neighbour);
+    }
+  }
+}
+
+ContactAreas contactAreas(const VoxelBody& body, const std::vector<int>& cellOfPiece) {
+  ContactAreas areas;
+  visitFaces(body, [&](int p, int q) {
+    if (cellOfPiece[p] != cellOfPiece[q]) areas[std::minmax(cellOfPiece[p], cellOfPiece[q])] += body.size * body.size;
+  });
+  return areas;
+}
+
+ContactAreas contactAreasWithin(const SurfaceTree& surface, const VoxelBody& body,
+                                const std::vector<int>& cellOfPiece) {
+  DisjointSets parts(body.pieces.size());
+  std::vector<std::array<int, 2>> between;
+  visitFaces(body, [&](int p, int q) {
+    constexpr int kNoVertex = -1;
+    if (segmentCrosses(surface, body.pieces[p].centre, body.pieces[q].centre, kNoVertex)) return;
+    if (cellOfPiece[p] == cellOfPiece[q])
+      parts.join(p, q);
+    else
+      between.push_back({p, q});
+  });
+  const int pieces = static_cast<int>(body.pieces.size());
+  std::vector<double> volumes(body.pieces.size(), 0);
+  for (int p = 0; p < pieces; ++p) volumes[parts.of(p)] += body.pieces[p].volume;
+  std::map<int, int> largest;  // part of every cell
+  for (int p = 0; p < pieces; ++p) {
+    int& part = largest.try_emplace(cellOfPiece[p], p).first->second;
+    if (volumes[p] > volumes[part]) part = p;
+  }
+  ContactAreas areas;
+  for (const auto& [p, q] : between) {
+    const int a = cellOfPiece[p], b = cellOfPiece[q];
+    if (parts.of(p) == largest[a] && parts.of(q) == largest[b]) areas[std::minmax(a, b)] += body.size * body.size;
+  }
+  return areas;
 }
 
 }  // namespace medulla

@@ -8,6 +8,7 @@
 
 #include "physics/model/mass_properties.h"
 #include "physics/model/medial_balls.h"
+#include "physics/model/surface_queries.h"
 
 namespace medulla {
 
@@ -62,13 +63,21 @@ PowerSites sitesAround(const PowerSites& sites, std::pair<int, int> pair);
 struct PowerCells {
   PowerSites sites;
   std::vector<int> cellOfPiece;
-  std::vector<MassProperties> cells;                  // together exactly the mesh's
-  std::map<std::pair<int, int>, double> contactArea;  // m2, lower cell first; voxel faces between the two
+  std::vector<MassProperties> cells;  // together exactly the mesh's
 };
 
 // Cells of the balls within the body. Balls whose cell would be empty shrink their neighbours' weights for all: from
 // the power diagram towards the Voronoi diagram, in which every inner centre owns its surroundings. A cell can stay
 // empty (volume 0) where two centres share a voxel or one lies outside.
 PowerCells divideByPower(const VoxelBody& body, const std::vector<Ball>& balls, const MassProperties& exact);
+
+using ContactAreas = std::map<std::pair<int, int>, double>;  // m2, of two cells, the lower one first
+
+// Faces of voxels between cells, as elements of the voxels have them: two walls closer than a voxel are in touch.
+ContactAreas contactAreas(const VoxelBody& body, const std::vector<int>& cellOfPiece);
+
+// The same without faces that the surface runs between, and for the largest part of every cell that hangs together so:
+// a cell whose rim lies in the opposite wall does not touch that wall's cells.
+ContactAreas contactAreasWithin(const SurfaceTree& surface, const VoxelBody& body, const std::vector<int>& cellOfPiece);
 
 }  // namespace medulla

@@ -130,7 +130,7 @@ CellFrames makeCellFrames(const TriangleMesh& mesh, const std::vector<Ball>& bal
   out.motion.resize(6 * static_cast<Index>(count), 3 * static_cast<Index>(solid.grid.nodes.size()));
   out.motion.setFromTriplets(entries.begin(), entries.end());
   out.sites = std::move(cells.sites);
-  out.contactArea = std::move(cells.contactArea);
+  out.contactArea = contactAreas(solid.voxels, cells.cellOfPiece);
   return out;
 }
 

@@ -20,7 +20,7 @@ struct CellFrames {
   std::vector<Matrix6d> heldGive;
   std::vector<double> heldShare;  // 0..1, of the cell's volume: what lies behind held triangles
   PowerSites sites;
-  std::map<std::pair<int, int>, double> contactArea;  // m2, as of PowerCells
+  ContactAreas contactArea;
 };
 
 CellFrames makeCellFrames(const TriangleMesh& mesh, const std::vector<Ball>& balls, const VoxelSolid& solid);
