@@ -126,6 +126,7 @@ void LiveServo::Data::run() {
       record.start = time - simulation.tickDuration();
       record.inputs[0] = inputs;
       record.tools[0] = servo.tools();
+      record.seconds = 0;
     }
     if (!stands) ++within;
     simulation.sampleInputs(time, inputs);
@@ -135,7 +136,9 @@ void LiveServo::Data::run() {
       record.tools[within] = servo.tools();
       if (within == ticksPerFrame) servo.handOver(record.duration, record.loads);
     }
-    cpu.add(threadCpuSeconds() - before);
+    const double taken = threadCpuSeconds() - before;
+    record.seconds += taken;
+    cpu.add(taken);
     ++ticks;
   }
 }

@@ -76,7 +76,7 @@ void Simulation::sampleInputs(double time, std::vector<ToolSample>& out) const {
 void Simulation::advanceFrame() {
   const double start = wallSeconds();
   runTicks();
-  times_.servo = wallSeconds() - start;
+  record_.seconds = wallSeconds() - start;
   advanceDynamics();
   servo_->beginFrame();
 }
@@ -103,6 +103,7 @@ void Simulation::runTicks() {
 }
 
 void Simulation::advanceDynamics() {
+  times_.servo = record_.seconds;
   // Ahead of what may throw: a frame that fails counts as tried.
   totals_.ticks += ticksPerFrame_;
   totals_.substeps += world_.substepsPerFrame();

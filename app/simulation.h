@@ -40,11 +40,12 @@ struct ServoRecord {
   std::vector<std::vector<ToolSample>> inputs;
   std::vector<std::vector<ToolState>> tools;
   Loads loads;
+  double seconds = 0;  // what its ticks took
 };
 
 // s by the clock: what the last dynamics frame took, and nothing that a run depends on.
 struct FrameTimes {
-  double servo = 0;     // its ticks; 0 where it runs elsewhere
+  double servo = 0;     // its ticks; of a servo that runs elsewhere, processor time
   double dynamics = 0;  // its substeps
   double surface = 0;   // the moved surface made ready for the next ticks
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <numeric>
 
@@ -419,7 +420,7 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
       const double now = energy();
       out.largestEnergy = std::max(out.largestEnergy, now);
       if (t <= handTime) out.startEnergy = out.largestEnergy;
-      if (!(farthestFromRest(world.data(), body) <= 0.01 * diagonal))
+      if (t <= handTime || !(farthestFromRest(world.data(), body) <= 0.01 * diagonal))
         out.recoveredAt.reset();
       else if (!out.recoveredAt)
         out.recoveredAt = world.time();
@@ -429,6 +430,8 @@ TortureOutcome torture(const BodyDescription& whole, const TortureMethod& method
     out.survived = true;
   } catch (const NotFinite&) {
     out.recoveredAt.reset();
+    // What a hand gave is no measure of what came of it in one step.
+    if (out.largestEnergy == out.startEnergy) out.largestEnergy = std::numeric_limits<double>::infinity();
   }
   return out;
 }

@@ -12,6 +12,7 @@
 #include "app/files/chart_labels.h"
 #include "app/files/chart_picture.h"
 #include "app/files/mesh_file.h"
+#include "app/files/output_file.h"
 #include "tests/program_run.h"
 #include "tests/temporary_folder.h"
 
@@ -260,6 +261,41 @@ TEST_F(ChartCommand, ReferenceOfTheSceneIsWhatErrorsAreAgainst) {
       chart({"--steps", "0.5", "--methods", "full", "--set", "body.pear.reference=" + (folder / "twice.txt")}).exitCode,
       0);
   EXPECT_NEAR(std::stod(rowsOf(folder / "out/chart.csv")[1][4]), 50, 1.5);
+}
+
+// gnuplot ends with 0 though its output had no room, and no picture of an earlier run stands for this one's.
+TEST_F(ChartCommand, APictureThatEndsEarlyIsNone) {
+  const std::vector<std::string> words{"--steps", "0.5", "--methods", "skin"};
+  std::filesystem::create_directories(folder / "bin");
+  folder.write("bin/gnuplot", "#!/bin/sh\nprintf '<?xml half of a picture'\n");
+  std::filesystem::permissions(folder / "bin/gnuplot", std::filesystem::perms::owner_all);
+  folder.write("out/chart.svg", "of an earlier run");
+  ProgramOptions cut;
+  cut.path = folder / "bin";
+  const ProgramResult r = chart(words, cut);
+  EXPECT_EQ(r.exitCode, 1);
+  EXPECT_NE(r.err.find("gnuplot failed: its picture ends early"), std::string::npos) << r.err;
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/chart.svg"));
+}
+
+TEST_F(ChartCommand, OneRunAtATimeDrawsInAFolder) {
+  std::filesystem::create_directories(folder / "out");
+  const FolderLock other(folder / "out", "out", "taken");
+  const ProgramResult r = chart({"--steps", "0.5", "--methods", "skin"});
+  EXPECT_EQ(r.exitCode, 1);
+  EXPECT_NE(r.err.find("another run is drawing a chart there"), std::string::npos) << r.err;
+}
+
+// Of 20 ms at 50 Hz: 14 ms lies nearer to a half of it than to the whole.
+TEST_F(ChartCommand, StepsAreTheNearestSharesOfAFrame) {
+  const ProgramResult r = chart({"--steps", "14,10.5", "--methods", "implicit", "--set", "clock.dynamics=50"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_NE(r.err.find("steps of 14 and 10.5 ms are one: the nearest whole share of a dynamics frame is 10 ms"),
+            std::string::npos)
+      << r.err;
+  const auto rows = rowsOf(folder / "out/chart.csv");
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[1][2], "0.01");
 }
 
 TEST_F(ChartCommand, GnuplotDrawsIt) {

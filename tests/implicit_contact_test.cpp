@@ -289,6 +289,21 @@ TEST(ImplicitContact, FastBodiesDoNotPassEachOther) {
   }
 }
 
+// What has left the picture does not halve the steps of those that stay, or these would be damped otherwise, and a run
+// take tens of times as long. What still comes near does.
+TEST(ImplicitContact, WhatFliesAwayHalvesNoStepOfOthers) {
+  const auto lengthsOfSteps = [](const Vector3d& place, const Vector3d& velocity) {
+    World world(contactSettings(1),
+                {raft("r", {0, 0.05, 0}, 0.3), ballBody("b", ballModel({{{0, 0, 0}, kRadius}}), place)},
+                {floorOf(0.3)});
+    throwBody(world, 1, velocity);
+    runUntil(world, 0.2);
+    return world.data().implicit.size();
+  };
+  EXPECT_EQ(lengthsOfSteps({3, 5, 0}, {20, 20, 0}), 1);
+  EXPECT_GT(lengthsOfSteps({1, 1.05, 0.1}, {-20, -20, 0}), 1);
+}
+
 TEST(ImplicitContact, NorDoesADrivenOnePassWhatLiesInItsWay) {
   for (int k = 0; k < 8; ++k) {
     const double speed = 8;

@@ -119,6 +119,21 @@ TEST(ImplicitEnergy, WhatFoldsGainsNoMoreThanOrderTwoSwings) {
 }
 
 // What a contact hands over is in the other's account when they part: nobody is held back for what he was given.
+// They are placed on their links. What each attempt's correction of momenta left in them made them "not finite" while
+// nothing moved.
+TEST(ImplicitEnergy, SkinsHaveNoVelocityOfTheirOwn) {
+  BodyDescription b = tube(LinkModel::beam);
+  b.surface = SurfaceMode::skin;
+  WorldSettings settings = settingsOf({LinkModel::beam, 1, 0.005, 0});
+  settings.gravity.setZero();
+  World world(settings, {b});
+  WorldData& d = world.data();
+  for (const int i : spheresOf(d.ranges[0]))
+    d.spheres.velocity[i] = quadOf(Vector3d(10, 12, 12).cross(vectorOf(d.spheres.position[i])));
+  while (world.time() < 0.5) world.advance({});
+  for (const int i : d.ranges[0].node) EXPECT_EQ(vectorAt(d.nodes.velocity, i).norm(), 0) << i;
+}
+
 TEST(ImplicitEnergy, BallsThatHaveMetAndPartedTakeWholeSteps) {
   for (const double lightness : {1.0, 0.3}) {
     WorldSettings settings = settingsOf({LinkModel::beam, 2, 0.005, 0});

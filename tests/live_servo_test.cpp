@@ -110,15 +110,23 @@ TEST(RealtimeCommand, AlsoOfASceneWithoutTools) {
 // The rest that the servo hands over before the motion begins is no part of it.
 TEST(RealtimeCommand, WhatItRecordsAndLogsBeginsWithTheMotion) {
   const TemporaryFolder folder;
-  const std::string hand = folder / "hand.csv", log = folder / "run.csv";
-  const ProgramResult run = runProgram({"replay", kScenes + "gallbladder.xml", "--set", "clock.duration=0.3",
-                                        "--realtime", "--record", hand, "--log", log, "--log-rate", "tick"});
+  const std::string hand = folder / "hand.csv", log = folder / "run.csv", times = folder / "times.csv";
+  const ProgramResult run =
+      runProgram({"replay", kScenes + "gallbladder.xml", "--set", "clock.duration=0.3", "--realtime", "--record", hand,
+                  "--log", log, "--log-rate", "tick", "--frame-times", times});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const Trajectory recorded = readTrajectory(hand);
   EXPECT_EQ(recorded.samples.front().time, 0);
   EXPECT_NEAR(recorded.samples[1].time, 1 / 1200.0, 1e-9);
   const std::string rows = readFile(log), first = rows.substr(rows.find('\n') + 1, 20);
   EXPECT_GT(std::stod(first), 0) << first;
+  std::istringstream frames(readFile(times));
+  std::string frame;
+  for (int k = 0; k < 2; ++k) std::getline(frames, frame);  // names, and the rest handed over before the first tick
+  for (int k = 0; k < 14; ++k) {
+    std::getline(frames, frame);
+    EXPECT_GT(std::stod(frame.substr(frame.find(',') + 1)), 0) << frame;  // what the servo took, elsewhere
+  }
 }
 
 // ---- Embree ----------------------------------------------------------------------------------------------

@@ -87,6 +87,19 @@ TEST(TortureOfExplicitSteps, FailsBeyondTheLimitAndSaysSo) {
   EXPECT_GT(failed.largestEnergy, failed.startEnergy);
 }
 
+// A hand gives energy as long as it acts: nothing is measured, or at rest, before it has let go.
+TEST(TortureOfExplicitSteps, HandsCountFromWhereTheyLetGo) {
+  const BodyDescription body = heldTube();
+  const TortureOutcome failed = torture(body, tortureMethods()[0], "hand_step", 4 * tortureLimit(body));
+  EXPECT_FALSE(failed.survived);
+  EXPECT_GT(failed.largestEnergy, failed.startEnergy);
+  BodyDescription hard = body;
+  hard.tissue.young *= 1e4;
+  const TortureOutcome stiff = torture(hard, tortureMethods()[1], "hand_step", 0.01);
+  ASSERT_TRUE(stiff.recoveredAt);
+  EXPECT_GE(*stiff.recoveredAt, 1);
+}
+
 TEST(TortureOfExplicitSteps, OfAModelThatKeepsTheFormulasLikewise) {
   for (const char* trial : {"shuffled", "scale_0.1", "scale_10"})
     EXPECT_TRUE(torture(tubeThatKeepsFormulas(), tortureMethods()[0], trial, 1e-4).survived) << trial;
@@ -189,7 +202,15 @@ TEST(TrialJournal, KeepsRowsOfTheSameRunAlone) {
   p.recoveredAt.reset();
   EXPECT_TRUE(TrialJournal(folder / "trials.part", 1).find(p));
   EXPECT_EQ(p.recoveredAt, 1.25);
-  EXPECT_FALSE(TrialJournal(folder / "trials.part", 2).find(p));
+  // Hours of trials are not thrown away for a slip of the command line.
+  const std::string kept = readFile(folder / "trials.part");
+  EXPECT_NE(complaintOf([&] { TrialJournal(folder / "trials.part", 2); }).find("holds trials of another run"),
+            std::string::npos);
+  EXPECT_EQ(readFile(folder / "trials.part"), kept);
+  {
+    TrialJournal journal(folder / "trials.part", 1);
+    journal.forget({p});
+  }
   EXPECT_FALSE(std::filesystem::exists(folder / "trials.part"));  // nothing is left to keep
 }
 

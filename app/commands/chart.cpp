@@ -121,6 +121,14 @@ std::optional<LoadedScene> loadMethod(const ChartRun& run, const ChartOptions& o
   }
 }
 
+// Of steps that are whole shares of a dynamics frame, the one that is nearest: how many it has.
+int nearestSubsteps(double step, double rate) {
+  const double share = 1 / (step * rate);
+  const int fewer = std::max(1, static_cast<int>(share)), more = fewer + 1;
+  const auto off = [&](int substeps) { return std::abs(1 / (rate * substeps) - step); };
+  return off(fewer) <= off(more) ? fewer : more;
+}
+
 // `substeps`: per dynamics frame.
 void addRun(const LoadedScene& base, ChartRun run, int substeps, std::vector<ChartRun>& runs) {
   if (substeps > kMostSubsteps)
@@ -149,9 +157,18 @@ void nameCurveApart(const std::vector<ChartRun>& runs, const ChartOptions& optio
 std::set<int> substepsOf(const ChartOptions& options, const LoadedScene& loaded) {
   std::set<int> out;
   for (const double step : options.steps)
-    out.insert(step > 0 ? std::max(1, static_cast<int>(std::lround(1 / (step * loaded.scene.dynamicsRate))))
-                        : chosenSubsteps(loaded));
+    out.insert(step > 0 ? nearestSubsteps(step, loaded.scene.dynamicsRate) : chosenSubsteps(loaded));
   return out;
+}
+
+void noteMergedSteps(const std::vector<double>& steps, double rate) {
+  std::map<int, std::vector<std::string>> asked;  // by substeps
+  for (const double step : steps)
+    if (step > 0) asked[nearestSubsteps(step, rate)].push_back(fmt::format("{:.6g}", 1e3 * step));
+  for (const auto& [substeps, of] : asked)
+    if (of.size() > 1)
+      tell("chart: note: steps of {} ms are one: the nearest whole share of a dynamics frame is {:.6g} ms\n",
+           joined(of, " and "), 1e3 / (rate * substeps));
 }
 
 // Every run of the chart. Where the scene names no reference there is one more, the reference, last: the first method
@@ -383,6 +400,8 @@ int runChart(const ChartOptions& options) {
   const std::string chart = (fs::path(options.folder) / "chart").string(),
                     spheres = (fs::path(options.folder) / "spheres").string();
   const OutputFolder folder(options.folder);
+  const FolderLock lock(options.folder, options.folder, "another run is drawing a chart there");
+  noteMergedSteps(options.steps, base.scene.dynamicsRate);
   std::vector<std::string> outputs;
   for (const std::string& stem : options.models.size() > 1 ? std::vector{chart, spheres} : std::vector{chart})
     for (const char* ending : {".csv", ".gnuplot", ".svg"}) outputs.push_back(stem + ending);

@@ -246,7 +246,13 @@ int updateImages(const std::vector<std::string>& scenes, const GoldenOptions& op
   const std::string renderedWith = drawnWith(options);
   std::vector<Update> updates;
   updates.reserve(chosen.size());
-  for (const std::string& path : chosen) updates.push_back(updateOf(path, options, renderedWith));
+  for (const std::string& path : chosen) {
+    try {
+      updates.push_back(updateOf(path, options, renderedWith));
+    } catch (const NotFinite& e) {
+      throw std::runtime_error((chosen.size() > 1 ? path + ": " : "") + e.what());
+    }
+  }
   apply(updates);
   return 0;
 }

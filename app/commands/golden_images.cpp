@@ -57,14 +57,18 @@ std::vector<std::string> updatedScenes(const GoldenOptions& options) {
   return paths;
 }
 
-// One that cannot be read says nothing here: it is told where it is compared.
+// One that cannot be read is told where the others are compared; it is all there is to tell where it is alone.
 std::vector<std::string> scenesNamedIn(const std::string& folder) {
   std::set<std::string> known;
-  for (const StrayImage& image : strayImages(folder, {}))
+  std::string fault;
+  for (const StrayImage& image : strayImages(folder, {})) {
     if (!image.scene.empty()) known.insert(image.scene);
+    if (fault.empty()) fault = image.fault;
+  }
   std::error_code failure;
   const fs::directory_iterator readable(folder, failure);
   if (failure) throw std::runtime_error(fmt::format("{}: {}", folder, failure.message()));
+  if (known.empty() && !fault.empty()) throw std::runtime_error(fault);
   if (known.empty())
     throw std::runtime_error(
         folder + ": no golden image here names its scene: expected a SCENE, or --update SCENE to make them");

@@ -66,8 +66,13 @@ Frame frameOf(const std::vector<ChartPoint>& points, const std::vector<Curve>& c
     f.high = std::max(f.high, p.cpu);
     if (!atRim(p)) f.least = std::min(f.least, std::max(kLeastShown, p.errorMax));
   }
+  // As wide as two numbers on the axis take wherever it lies.
+  constexpr double kLeastRatio = 5;
   f.low *= 0.7;
   f.high *= 1.5;
+  const double widen = std::sqrt(std::max(1., kLeastRatio * f.low / f.high));
+  f.low /= widen;
+  f.high *= widen;
   f.least = std::min(0.6 * f.least, 0.2 * kChartRim);
   const auto rows = std::count_if(curves.begin(), curves.end(), [](const Curve& c) { return c.row >= 0; });
   const double rim = 2 * kFirstRow + kRowHeight * static_cast<double>(std::max<std::ptrdiff_t>(rows, 1) - 1);
@@ -173,7 +178,9 @@ std::string chartScript(const std::string& title, const std::vector<ChartPoint>&
   std::stable_sort(sorted.begin(), sorted.end(),
                    [](const ChartPoint& a, const ChartPoint& b) { return a.cpu < b.cpu; });
   out += block("front", sorted, {}, frame, [](const ChartPoint& p) { return p.onFront; });
-  plot += "$front using 1:2 with steps lw 9 lc '#e8e2c8' title 'Pareto front'";
+  plot +=
+      "$front using 1:2 with steps lw 9 lc '#e8e2c8' title 'Pareto front', \\\n"
+      "  $front using 1:2 with points pt 7 ps 1.6 lc '#e8e2c8' notitle";  // of one run there is no step
   for (std::size_t k = 0; k < curves.size(); ++k) {
     const std::string name = fmt::format("c{}", k);
     const auto blockOf = [&](const std::string& called, bool failed) {

@@ -5,10 +5,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
+#include <string_view>
 
 #include "app/files/text.h"
 #include "app/interrupt.h"
@@ -36,6 +38,12 @@ std::string contentOf(const Descriptor& file) {
   return out;
 }
 
+// gnuplot ignores what its output cannot take, and ends with 0.
+bool isWhole(std::string_view picture) {
+  const std::string_view end = picture.starts_with("\x89PNG") ? "IEND" : "</svg>";
+  return picture.substr(picture.size() - std::min<std::size_t>(picture.size(), 16)).find(end) != picture.npos;
+}
+
 }  // namespace
 
 std::optional<std::string> runGnuplot(const std::string& script) {
@@ -60,7 +68,9 @@ std::optional<std::string> runGnuplot(const std::string& script) {
   while (ended < 0 && errno == EINTR);
   checkInterrupt();  // which ends both where it comes from the keyboard
   if (ended != child) throw std::runtime_error(std::string("gnuplot's end cannot be seen: ") + std::strerror(errno));
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return contentOf(picture);
+  const bool ok = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+  if (std::string drawn = ok ? contentOf(picture) : ""; isWhole(drawn)) return drawn;
+  if (ok) throw std::runtime_error("gnuplot failed: its picture ends early");
   std::string complaint = contentOf(complaints);
   while (!complaint.empty() && (complaint.back() == '\n' || complaint.back() == ' ')) complaint.pop_back();
   complaint.erase(0, complaint.rfind('\n') + 1);
@@ -69,6 +79,7 @@ std::optional<std::string> runGnuplot(const std::string& script) {
 
 void drawByGnuplot(const std::string& stem, const std::string& script) {
   const std::string source = stem + ".gnuplot", picture = stem + ".svg";
+  std::filesystem::remove(picture);  // whatever comes, no earlier run's stands beside this one's script
   writeFile(source, script);
   if (const std::optional<std::string> svg = runGnuplot(script)) {
     writeFile(picture, *svg);

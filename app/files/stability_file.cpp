@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "app/files/chart_file.h"
 #include "app/files/chart_style.h"
 #include "app/files/output_file.h"
 
@@ -49,8 +50,17 @@ std::string plotOf(const std::string& name, double size) {
   return out;
 }
 
+// An axis of few decades may show none of them.
+bool isNarrow(double low, double high) {
+  return high < 100 * low;
+}
+
+std::string ticks(double low, double high) {
+  return isNarrow(low, high) ? fmt::format("({})", logTicks(low, high)) : "auto";
+}
+
 // By hand: a key of gnuplot's has room in one panel only.
-std::string keyLabels() {
+std::string keyLabels(bool oneLimit) {
   std::string out;
   double x = 0.2;
   for (const Grade& g : kGrades) {
@@ -58,7 +68,8 @@ std::string keyLabels() {
                        g.meaning, x, g.points, g.colour);
     x += 0.22;
   }
-  return out + "set label 'dashed: explicit limit' at screen 0.72, 0.012 left\n";
+  return out +
+         fmt::format("set label '{}: explicit limit' at screen 0.72, 0.012 left\n", oneLimit ? "cross" : "dashed");
 }
 
 }  // namespace
@@ -100,18 +111,21 @@ std::string stabilityScript(const std::string& title, const std::vector<Stabilit
     }
   const auto [softest, stiffest] = std::minmax_element(
       map.begin(), map.end(), [](const StabilityPoint& a, const StabilityPoint& b) { return a.young < b.young; });
-  out += fmt::format("set xrange [{:.6g}:{:.6g}]\nset multiplot title '{}'\n", 500 * low, 2000 * high, title);
+  out += fmt::format("set xrange [{:.6g}:{:.6g}]\nset xtics {}\nset multiplot title '{}'\n", 500 * low, 2000 * high,
+                     ticks(500 * low, 2000 * high), title);
+  const double least = 0.4 * softest->young, most = 2.5 * stiffest->young;
   const double width = 0.84 / static_cast<double>(methods.size());
   for (std::size_t m = 0; m < methods.size(); ++m) {
     const double left = 0.15 + width * static_cast<double>(m);
-    const char* y =
-        m == 0 ? "set ylabel \"Young's modulus, Pa\"\nset format y '1e%T'\n" : "unset ylabel\nset format y ''\n";
+    const std::string y = m == 0 ? fmt::format("set ylabel \"Young's modulus, Pa\"\nset format y '{}'\n",
+                                               isNarrow(least, most) ? "%g" : "1e%T")
+                                 : "unset ylabel\nset format y ''\n";
     out += fmt::format(
         "set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\nset tmargin at screen 0.92\nset bmargin at screen "
-        "0.57\nset logscale y\nset yrange [{:.6g}:{:.6g}]\nset ytics auto\nset title '{}'\n{}",
-        left, left + 0.9 * width, 0.4 * softest->young, 2.5 * stiffest->young, spaced(methods[m]), y);
-    out += fmt::format("plot $limit using 1:2 with lines lw 2 dt 2 lc '{}' notitle, \\\n  {}\n", kGrey,
-                       plotOf(fmt::format("map{}_", m), 1.1));
+        "0.57\nset logscale y\nset yrange [{:.6g}:{:.6g}]\nset ytics {}\nset title '{}'\n{}",
+        left, left + 0.9 * width, least, most, ticks(least, most), spaced(methods[m]), y);
+    out += fmt::format("plot $limit using 1:2 with {} lw 2 lc '{}' notitle, \\\n  {}\n",
+                       limit.size() == 1 ? "points pt 1" : "lines dt 2", kGrey, plotOf(fmt::format("map{}_", m), 1.1));
   }
   for (std::size_t m = 0; m < methods.size(); ++m) {
     const double left = 0.15 + width * static_cast<double>(m);
@@ -123,7 +137,7 @@ std::string stabilityScript(const std::string& title, const std::vector<Stabilit
     for (std::size_t k = 0; k < names.size(); ++k)
       out += fmt::format("{}'{}' {}", k == 0 ? "" : ", ", m == 0 ? spaced(names[k]) : "", k);
     out += ")\n";
-    if (m + 1 == methods.size()) out += keyLabels();
+    if (m + 1 == methods.size()) out += keyLabels(limit.size() == 1);
     out += fmt::format("plot {}\n", plotOf(fmt::format("trial{}_", m), 0.9));
   }
   return out + "unset multiplot\n";

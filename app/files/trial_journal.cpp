@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <limits>
+#include <stdexcept>
 
 #include "app/files/csv_rows.h"
 #include "app/files/text_file.h"
@@ -39,7 +40,7 @@ TrialJournal::TrialJournal(std::string path, std::uint64_t run)
       head_(fmt::format("# medulla stability {:016x}\n", run)),
       lock_(std::filesystem::absolute(path_).parent_path().string(), path_, "another run is filling it") {
   if (fileExists(path_)) read();
-  writeAnew();  // without a row's beginning, and without trials of another run
+  writeAnew();  // without a row's beginning
 }
 
 TrialJournal::~TrialJournal() {
@@ -48,8 +49,11 @@ TrialJournal::~TrialJournal() {
 
 void TrialJournal::read() {
   std::string text = readTextFile(path_);
-  text.erase(text.rfind('\n') + 1);  // all of it where there is none
-  if (!text.starts_with(head_)) return;
+  text.erase(text.rfind('\n') + 1);                // all of it where there is none
+  if (text.find('\n') + 1 == text.size()) return;  // no more than a head, whoever's
+  if (!text.starts_with(head_))
+    throw std::runtime_error(
+        fmt::format("{}: holds trials of another run: the command that began them goes on there; or remove it", path_));
   CsvRows rows(text, path_);
   while (rows.next()) {
     const StabilityPoint point = pointOf(rows);

@@ -15,8 +15,8 @@ namespace medulla {
 // file when add() returns; one that a killed run left half written is dropped.
 class TrialJournal {
  public:
-  // `run` is all that the trials' outcomes follow from; rows of another run are dropped. Throws std::runtime_error
-  // where the file cannot be read or written, or another run keeps one in the same folder.
+  // `run` is all that the trials' outcomes follow from. Throws std::runtime_error where the file cannot be read or
+  // written, holds trials of another run, or another run keeps one in the same folder.
   TrialJournal(std::string path, std::uint64_t run);
   ~TrialJournal();  // without trials there is no file
 

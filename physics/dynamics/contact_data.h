@@ -128,6 +128,7 @@ struct ContactData {
   // Of the current substep.
   std::vector<Quad> ball;  // m, per sphere: centre in the world, and radius
   std::vector<Quad> arm;   // m, per sphere: from its frame to the ball's centre; w = 0
+  std::vector<AxisBox> swept;  // per body: outrunsContact()
   std::vector<Contact> contacts;
   std::vector<ContactSphere> spheres;
   std::vector<double> blow;                // m/s, per body: the fastest that strikes it

@@ -130,20 +130,71 @@ void findContacts(WorldData& d) {
   findStaticContacts(d, moved);
 }
 
+static Lanes meanVelocity(const WorldData& d, const SphereNumbers& balls) {
+  Lanes sum = splat(0);
+  for (const int i : balls) sum = sum + velocityOfBall(d, i);
+  return splat(1.0 / std::max(balls.past - balls.first, 1)) * sum;
+}
+
 // Two balls that each move by half the reach are looked at before they touch; with half a radius more they overlap by
-// that at most before they are, which neither a centre nor the middle of what is thin passes. Where nothing stands
-// still, how fast all travel together does not count: a body that falls alone would be halved for it, and damped less.
-bool outrunsContact(const WorldData& d, double time) {
+// that at most before they are, which neither a centre nor the middle of what is thin passes.
+static bool isAnyFast(const WorldData& d, const BodyRange& body, const Lanes& common, double time) {
   const ContactData& c = d.contact;
-  if (c.mode == ContactMode::none) return false;
-  Lanes common = splat(0);
-  for (int i = 0; i < d.spheres.count && c.statics.empty(); ++i) common = common + velocityOfBall(d, i);
-  common = splat(1.0 / std::max(d.spheres.count, 1)) * common;
-  const double half = 0.5 * c.reach;
-  for (int i = 0; i < d.spheres.count; ++i) {
+  for (const int i : spheresOf(body)) {
     const Lanes v = velocityOfBall(d, i) - common;
-    const double farthest = half + 0.5 * c.ball[i].v[3];
+    const double farthest = 0.5 * c.reach + 0.5 * c.ball[i].v[3];
     if (time * time * dotProduct(v, v) > farthest * farthest) return true;
+  }
+  return false;
+}
+
+// Where the body's balls are now and in `time`, and what is looked at around them.
+static AxisBox sweptBox(const WorldData& d, const BodyRange& body, const Lanes& common, double time) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  const ContactData& c = d.contact;
+  Lanes low = splat(kFar), high = splat(-kFar);
+  for (const int i : spheresOf(body)) {
+    const Lanes from = withoutFourth(load(c.ball[i])), to = fma(splat(time), velocityOfBall(d, i) - common, from);
+    const Lanes around = splat(c.ball[i].v[3] + c.reach);
+    low = smaller(low, smaller(from, to) - around);
+    high = larger(high, larger(from, to) + around);
+  }
+  AxisBox box;
+  store(box.low, withoutFourth(low));
+  store(box.high, withoutFourth(high));
+  return box;
+}
+
+// Whether anything but itself may lie in a body's way.
+static bool mayMeet(const WorldData& d, std::size_t body) {
+  const ContactData& c = d.contact;
+  const AxisBox& own = c.swept[body];
+  for (std::size_t other = 0; other < c.swept.size(); ++other) {
+    if (other == body || !c.collides[body * c.swept.size() + other]) continue;
+    const AxisBox& box = c.swept[other];
+    bool overlaps = true;
+    for (int a = 0; a < 3; ++a) overlaps = overlaps && own.low.v[a] <= box.high.v[a] && box.low.v[a] <= own.high.v[a];
+    if (overlaps) return true;
+  }
+  const Eigen::Vector3d middle = 0.5 * (vectorOf(own.low) + vectorOf(own.high));
+  const double radius = 0.5 * (vectorOf(own.high) - vectorOf(own.low)).norm();
+  return std::any_of(c.statics.begin(), c.statics.end(),
+                     [&](const StaticContactShape& shape) { return isNear(shape, middle, radius); });
+}
+
+// Where nothing stands still, how fast all travel together does not count: a body that falls alone would be halved for
+// it, and damped less. Nor does how fast a body travels that meets nothing: what has fallen out of the picture would
+// halve the steps of all others for ever.
+bool outrunsContact(WorldData& d, double time) {
+  ContactData& c = d.contact;
+  if (c.mode == ContactMode::none) return false;
+  const Lanes common = c.statics.empty() ? meanVelocity(d, {0, d.spheres.count}) : splat(0);
+  const auto isFast = [&](const BodyRange& r) { return isAnyFast(d, r, common, time); };
+  if (std::none_of(d.ranges.begin(), d.ranges.end(), isFast)) return false;
+  for (std::size_t b = 0; b < d.ranges.size(); ++b) c.swept[b] = sweptBox(d, d.ranges[b], common, time);
+  for (std::size_t b = 0; b < d.ranges.size(); ++b) {
+    const BodyRange& r = d.ranges[b];
+    if (isFast(r) && (mayMeet(d, b) || isAnyFast(d, r, meanVelocity(d, spheresOf(r)), time))) return true;
   }
   return false;
 }

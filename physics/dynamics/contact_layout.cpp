@@ -52,6 +52,7 @@ void addBalls(WorldData& d) {
   c.ball = c.restBall;
   c.arm.resize(c.ball.size());
   c.spheres.resize(d.spheres.position.size());
+  c.swept.resize(d.ranges.size());
 }
 
 // Balls that are linked never meet.

@@ -57,6 +57,9 @@ Eigen::Vector3d ballVelocity(const WorldData& d, std::uint32_t sphere);
 
 // contact_find.cpp: whether a ball moves so far in `time` (s) at the present velocities that it might pass what it
 // touches before anything is looked for again.
-bool outrunsContact(const WorldData& d, double time);
+bool outrunsContact(WorldData& d, double time);
+
+// contact_static.cpp: whether the shape is within `distance` (m) of `p`, or `p` behind what is no mesh.
+bool isNear(const StaticContactShape& shape, const Eigen::Vector3d& p, double distance);
 
 }  // namespace medulla

@@ -189,6 +189,11 @@ std::array<int, 2> bodiesOf(const WorldData& d, std::uint64_t key) {
   return {colliders[key >> 32].body, colliders[key & 0xffffffff].body};
 }
 
+bool isNear(const StaticContactShape& shape, const Vector3d& p, double distance) {
+  if (shape.kind == StaticShape::Kind::mesh) return closestPoint(shape.tree, p, distance).distance < distance;
+  return nearestOn(shape, p).distance < distance;
+}
+
 Vector3d nearestPoint(const StaticContactShape& shape, const Vector3d& p) {
   if (shape.kind == StaticShape::Kind::mesh) return closestPoint(shape.tree, p).point;
   const Nearest at = nearestOn(shape, p);

@@ -93,8 +93,9 @@ void addMomenta(WorldData& d, int body, const WholeMotion& now, const Vector3d& 
     d.spheres.angularVelocity[i] = quadOf(vectorOf(d.spheres.angularVelocity[i]) + spin);
     d.spheres.angularMomentum[i] = quadOf(vectorOf(d.spheres.angularMomentum[i]) + inertiaOf(d, i) * spin);
   }
+  // Those of a skin have no velocity: nothing would take back what each attempt at a step left there.
   for (const int i : r.node)
-    if (d.nodes.inverseMass[i] > 0 || d.nodes.mass[i] == 0)
+    if (i < d.nodes.dynamicEnd && (d.nodes.inverseMass[i] > 0 || d.nodes.mass[i] == 0))
       setVector(d.nodes.velocity, i, vectorAt(d.nodes.velocity, i) + velocityAt(motion, vectorAt(d.nodes.position, i)));
 }
 
