@@ -283,8 +283,10 @@ void printNotes(const LoadedScene& loaded, const RunTotals& totals, const World&
   std::vector<std::string> names;
   for (std::size_t b = 0; b < creep.bodies.size(); ++b)
     if (creep.bodies[b]) names.push_back(fmt::format("'{}'", loaded.scene.bodies[b].name));
-  tell("note: {} crept on without speed where implicit steps failed, in {}: deformed beyond what they follow\n",
-       joined(names, ", "), creep.substeps == 1 ? "1 substep" : fmt::format("{} substeps", creep.substeps));
+  tell(
+      "note: {} crept on without speed where implicit steps failed, in {}: deformed beyond what they follow, or too "
+      "stiff for their length\n",
+      joined(names, ", "), creep.substeps == 1 ? "1 substep" : fmt::format("{} substeps", creep.substeps));
 }
 
 }  // namespace medulla

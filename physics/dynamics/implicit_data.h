@@ -142,6 +142,7 @@ struct ImplicitData {
   std::vector<EnergyBalance> bodies, islands;    // per body
   DisjointSets joined;                           // bodies that touch
   std::vector<int> island;                       // per body: the first one of its island
+  std::vector<char> isPushed;                    // per body: by anything at all
   std::vector<Verdict> verdicts;                 // per body: of its island
   std::vector<double> sums;                      // J, per body, while energies are summed up
   std::vector<WholeMotion> whole;                // per body, at the stage's start or end

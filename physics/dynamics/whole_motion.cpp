@@ -99,4 +99,51 @@ void addMomenta(WorldData& d, int body, const WholeMotion& now, const Vector3d& 
       setVector(d.nodes.velocity, i, vectorAt(d.nodes.velocity, i) + velocityAt(motion, vectorAt(d.nodes.position, i)));
 }
 
+void slowDown(WorldData& d, int body, const RigidMotion& against, double share) {
+  const auto slowed = [&](const Vector3d& now, const Vector3d& to) { return Vector3d(to + share * (now - to)); };
+  Spheres& s = d.spheres;
+  const BodyRange& r = d.ranges[body];
+  for (const int i : spheresOf(r)) {
+    s.velocity[i] = quadOf(slowed(vectorOf(s.velocity[i]), velocityAt(against, vectorOf(s.position[i]))));
+    s.angularVelocity[i] = quadOf(slowed(vectorOf(s.angularVelocity[i]), against.spin));
+    s.angularMomentum[i] = quadOf(slowed(vectorOf(s.angularMomentum[i]), inertiaOf(d, i) * against.spin));
+  }
+  for (const int i : r.node)
+    if (i < d.nodes.dynamicEnd)
+      setVector(d.nodes.velocity, i,
+                slowed(vectorAt(d.nodes.velocity, i), velocityAt(against, vectorAt(d.nodes.position, i))));
+}
+
+void turn(WorldData& d, int body, const WholeMotion& now, const Vector3d& angle) {
+  const Pivot pivot = pivotOf(d, body);
+  const RigidMotion motion = rigidMotionOf(now, pivot);
+  const Vector3d centre = motion.centre, velocity = motion.velocity;
+  const double size = angle.norm();
+  if (!(size > 0)) return;
+  const Eigen::AngleAxisd rotation(size, angle / size);
+  const Matrix3d by = rotation.toRotationMatrix();
+  const auto turned = [&](const Quad& q) { return quadOf(by * vectorOf(q)); };
+  Spheres& s = d.spheres;
+  const BodyRange& r = d.ranges[body];
+  for (const int i : spheresOf(r)) {
+    s.position[i] = quadOf(centre + by * (vectorOf(s.position[i]) - centre));
+    s.velocity[i] = quadOf(velocity + by * (vectorOf(s.velocity[i]) - velocity));
+    s.angularVelocity[i] = turned(s.angularVelocity[i]);
+    s.angularMomentum[i] = turned(s.angularMomentum[i]);
+    const Eigen::Quaterniond q = (Eigen::Quaterniond(rotation) * quaternionOf(s.orientation[i])).normalized();
+    s.orientation[i] = {{q.x(), q.y(), q.z(), q.w()}};
+  }
+  for (const int i : r.node) {
+    if (i >= d.nodes.dynamicEnd) continue;
+    setVector(d.nodes.position, i, centre + by * (vectorAt(d.nodes.position, i) - centre));
+    setVector(d.nodes.velocity, i, velocity + by * (vectorAt(d.nodes.velocity, i) - velocity));
+  }
+  const Vector3d spin = spinMomentum(now, pivot);
+  WholeMotion then = now;  // about the same centre
+  const Matrix3d own = now.inertia - now.mass * inertiaAt(now.moment / now.mass);
+  then.moment = now.mass * (centre + by * (now.moment / now.mass - centre));
+  then.inertia = by * own * by.transpose() + now.mass * inertiaAt(then.moment / now.mass);
+  addMomenta(d, body, then, Vector3d::Zero(), spin - by * spin);
+}
+
 }  // namespace medulla

@@ -49,4 +49,11 @@ void wholeMotions(const WorldData& d, std::vector<WholeMotion>& out);
 void addMomenta(WorldData& d, int body, const WholeMotion& now, const Eigen::Vector3d& linear,
                 const Eigen::Vector3d& angular);
 
+// Leaves `share` of what a body does against the rigid motion.
+void slowDown(WorldData& d, int body, const RigidMotion& against, double share);
+
+// Turns a body about its centre, or its pivot, by the rotation vector `angle` with all that it does, but for its
+// momenta, which stay.
+void turn(WorldData& d, int body, const WholeMotion& now, const Eigen::Vector3d& angle);
+
 }  // namespace medulla
