@@ -270,10 +270,19 @@ bool keepEnergy(WorldData& d, ImplicitData& s, bool twoStages) {
   return true;
 }
 
+// Of stiff bodies that strike, Newton's iteration may not settle in any step, without a strain that were to blame: it is
+// enough that they have no more energy than they should.
+static bool isUnstrained(const EnergyBalance& e) {
+  constexpr double kLeast = 1e-3;
+  return e.elastic <= kLeast * e.kinetic && allowedOf(e) >= 0;
+}
+
 // The last resort of a body so deformed that its forces are not the slope of its energy (links shorter than a
 // twentieth, or folded to 180 degrees): it moves without speed, as long as it has no more energy than it has ever had,
 // or stays; with it, what it pushes. Likewise frames that were a whole turn apart are so no longer.
 void creep(WorldData& d, ImplicitData& s) {
+  for (int b = 0; b < static_cast<int>(s.bodies.size()); ++b)
+    if (hasFailed(s, b) && isUnstrained(s.islands[s.island[b]])) s.verdicts[b] = Verdict::slows;
   visitBeyondMost(d, s, [&](int b) { restore(d, s.before, b); });
   for (int b = 0; b < static_cast<int>(s.bodies.size()); ++b) {
     keepEnergyOf(d, s, b);
