@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <string>
 #include <vector>
 
 #include "render/stroke_text.h"
@@ -30,13 +30,16 @@ std::size_t lettersThatFit(const std::string& word, float height, float width) {
   return end;
 }
 
-// Between words; within one that is wider than a line.
+// Between words, whose distances stay; within one that is wider than a line.
 std::vector<std::string> wrapped(const std::string& text, float height, float width) {
   std::vector<std::string> lines;
-  std::istringstream words(text);
-  for (std::string word; words >> word;) {
-    if (!lines.empty() && textWidth(lines.back() + " " + word, height) <= width) {
-      lines.back() += " " + word;
+  std::size_t end = 0;
+  for (std::size_t begin = 0; (begin = text.find_first_not_of(' ', end)) != std::string::npos;) {
+    const std::string gap = text.substr(end, begin - end);
+    end = std::min(text.find(' ', begin), text.size());
+    std::string word = text.substr(begin, end - begin);
+    if (!lines.empty() && textWidth(lines.back() + gap + word, height) <= width) {
+      lines.back() += gap + word;
       continue;
     }
     while (!word.empty()) {
@@ -50,20 +53,29 @@ std::vector<std::string> wrapped(const std::string& text, float height, float wi
 }  // namespace
 
 bool drawCaption(const std::string& text, int width, Image& image) {
-  constexpr float kHighest = 0.3f;  // of the picture
+  constexpr float kLowest = 0.15f, kHighest = 0.3f;  // of the picture: where letters end that could be smaller; a box
   constexpr glm::vec3 kLetters{0.85f, 0.86f, 0.88f};
   const float margin = std::round(0.03f * float(image.height));
   const float whole = std::max(kReadable, 0.032f * float(image.height));
   const float widest = float(width) - 2 * margin;
-  std::vector<std::string> lines{text};
-  float height = std::min(whole, whole * widest / (textWidth(text, whole) + 2 * kPad * whole));
-  if (height < kLegible) {
-    height = kReadable;
-    lines = wrapped(text, height, widest - 2 * kPad * height);
+  const glm::vec2 low(margin);
+  // As large as every other: what is too wide goes on in the next line, as long as there is room for one.
+  float height = whole;
+  std::vector<std::string> lines;
+  glm::vec2 high;
+  const auto layOut = [&] {
+    const float room = widest - 2 * kPad * height;
+    lines = textWidth(text, height) <= room ? std::vector{text} : wrapped(text, height, room);
+    high =
+        low + glm::vec2(widestOf(lines, height), height * (1 + kLeading * float(lines.size() - 1))) + 2 * kPad * height;
+    const float lowest = height > kReadable ? kLowest * float(image.height) + kPad * height
+                                            : std::max(kHighest * float(image.height), low.y + 3 * height);
+    return high.x <= float(width) && high.y <= lowest;
+  };
+  while (!layOut()) {
+    if (height <= kReadable) return false;
+    height = std::max(kReadable, 0.9f * height);
   }
-  const glm::vec2 size(widestOf(lines, height), height * (1 + kLeading * float(lines.size() - 1)));
-  const glm::vec2 low(margin), high = low + size + 2 * kPad * height;
-  if (high.x > float(width) || high.y > std::max(kHighest * float(image.height), low.y + 3 * height)) return false;
   Ink ink(image, low, high);
   ink.fill(low, high);
   ink.apply(kPaper, kPaperOpacity);

@@ -175,9 +175,9 @@ Look dolphin() {
   l.mottleFrequency = 2;
   l.patches[0] = {{0.30f, 0.325f, 0.34f}, 4, 7, 0.12f, {0, -1, 0}, -0.46f, -0.30f, 0.9f};  // grey flanks
   l.patches[1] = {{0.56f, 0.55f, 0.54f}, 3, 5, 0.10f, {0, -1, 0}, -0.26f, -0.16f, 0.9f};   // pale belly
-  // Fins and flukes are as dark as the back: they reach out farther to both sides than a body of their height.
-  l.patches[2] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {0, -0.6f, 1}, 0.565f, 0.615f, 1};
-  l.patches[3] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {0, -0.6f, -1}, -0.435f, -0.385f, 1};
+  // Fins and flukes are as dark as the back: they reach out farther to both sides than a body of their height (0.601).
+  l.patches[2] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {0, -0.6f, 1}, 0.605f, 0.655f, 1};
+  l.patches[3] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {0, -0.6f, -1}, -0.395f, -0.345f, 1};
   l.patches[4] = {{0.105f, 0.122f, 0.145f}, 0, 0, 0, {-1, 0, 0}, -0.20f, -0.14f, 1};  // flukes, between their tips
   l.spot = {{0.010f, 0.011f, 0.013f}, {0.863f, 0.425f}, 0.034f};                      // eyes
   l.wrap = {0.10f, 0.12f, 0.14f};

@@ -198,6 +198,22 @@ TEST(SplitView, PanelsAreThePicturesOfTheirSize) {
   EXPECT_NE(narrow.err.find("expected a width of 32 at least"), std::string::npos) << narrow.err;
 }
 
+// A film's captions come and go: what is longer goes on in the next line, in letters as large.
+TEST(Caption, LettersAreAsLargeHoweverLongItIs) {
+  Image brief = blackImage(640, 720), more = brief;
+  EXPECT_TRUE(drawCaption("gallbladder   4.00 s", brief.width, brief));
+  EXPECT_TRUE(drawCaption("gallbladder   4.00 s   slides along the body, still pressing", more.width, more));
+  const int margin = 22, letters = 23, beyondName = 200;
+  int lit = 0;
+  for (int y = margin + letters; y < margin + 2 * letters; ++y)
+    for (int x = margin + letters; x < beyondName; ++x) {
+      const std::size_t at = 4ul * (std::size_t(y) * 640 + x);
+      EXPECT_EQ(more.pixels[at], brief.pixels[at]) << x << " " << y;
+      lit += brief.pixels[at] > 150 ? 1 : 0;
+    }
+  EXPECT_GT(lit, 100);
+}
+
 TEST(Caption, FitsIntoPicturesOfAnySize) {
   for (const auto& [width, height] : {std::pair(320, 240), std::pair(1280, 720), std::pair(200, 400)}) {
     const Image before = blackImage(width, height);
