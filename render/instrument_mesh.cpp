@@ -26,7 +26,7 @@ constexpr vec3 kSteel(0.50f, 0.50f, 0.52f), kBite = 1.2f * kSteel, kSheath(0.020
 // same share of a pixel n grows with the root of the picture's height. Up to 720 lines it is as it was made for them:
 // of 18 sides the streak of light on the shaft, which is found at vertices, was a ridge with a wedge on one side.
 struct Cuts {
-  int around = 48, arc = 20;  // of the shaft; of a jaw's back
+  int around = 32, arc = 14;  // of the shaft; of a jaw's back
   int perTooth = 1;           // along half a tooth
 };
 Cuts cutsFor(int pictureHeight) {

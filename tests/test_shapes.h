@@ -67,9 +67,10 @@ inline TriangleMesh together(const TriangleMesh& one, const TriangleMesh& other)
 }
 
 // The outer surface with the inner one, turned inside out, as a cavity.
-inline TriangleMesh hollowed(const TriangleMesh& outer, TriangleMesh inner) {
-  for (auto& [a, b, c] : inner.triangles) std::swap(b, c);
-  return together(outer, inner);
+inline TriangleMesh hollowed(const TriangleMesh& outer, const TriangleMesh& inner) {
+  TriangleMesh turned = inner;
+  for (std::array<int, 3>& t : turned.triangles) std::swap(t[1], t[2]);
+  return together(outer, turned);
 }
 
 // Two blocks side by side, so far apart (m).
