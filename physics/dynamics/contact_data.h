@@ -126,8 +126,8 @@ struct ContactData {
   std::vector<AxisBox> boxes;
 
   // Of the current substep.
-  std::vector<Quad> ball;  // m, per sphere: centre in the world, and radius
-  std::vector<Quad> arm;   // m, per sphere: from its frame to the ball's centre; w = 0
+  std::vector<Quad> ball;      // m, per sphere: centre in the world, and radius
+  std::vector<Quad> arm;       // m, per sphere: from its frame to the ball's centre; w = 0
   std::vector<AxisBox> swept;  // per body: outrunsContact()
   std::vector<Contact> contacts;
   std::vector<ContactSphere> spheres;
