@@ -61,6 +61,16 @@ TEST(ObjReader, PolygonsBecomeFans) {
   EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
 }
 
+TEST(ObjReader, ConcavePolygonsBeyondWhatIsCutAreRefused) {
+  std::string obj, face = "f";
+  for (int k = 0; k < 1040; ++k) {  // a comb
+    obj += fmt::format("v {} {} 0\n", k < 1038 ? k : 2076 - k, k < 1038 ? k % 2 : -1);
+    face += fmt::format(" {}", k + 1);
+  }
+  EXPECT_NE(complaintOf([&] { parseObj(obj + face + "\n", "a.obj"); }).find("a concave face of 1040 corners"),
+            std::string::npos);
+}
+
 // Of stars, and of an L, whichever corner comes first: triangles that all face as the polygon does and make up its
 // area.
 TEST(ObjReader, ConcavePolygonsAreCutWithoutAFold) {

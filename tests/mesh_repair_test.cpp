@@ -115,6 +115,8 @@ TEST(MeshRepair, SizesOutsideTheRangeOfBodiesAreRefused) {
   EXPECT_CONTAINS(refusal(mesh), "is the unit right?");
   mesh = box({0, 0, 0}, {1e-8, 1e-8, 1e-8});
   EXPECT_CONTAINS(refusal(mesh), "is the unit right?");
+  mesh = box({9e4, 0, 0}, {9e4 + 1, 1, 1});
+  EXPECT_CONTAINS(refusal(mesh), "lies 9e+04 m from the origin");
 }
 
 TEST(MeshRepair, TriangleSoupIsWelded) {

@@ -199,6 +199,7 @@ TEST_F(Recording, EveryMistakeInTheFileIsNamedWithItsRow) {
   const Case cases[] = {
       {"", xyz, "", "r.txt: no rows"},
       {"", named, "t x y z\n", "r.txt: no rows after the header"},
+      {"", "<columns rate=\"30\" position=\"1 2 3\"/>", "nan nan nan\n0 0 0\n", "r.txt:1: column 1 is 'nan'"},
       {"", xyz, "1 2 3\n1 2\n", "r.txt:2: 2 columns in this row, expected 3 as in the first"},
       {"", xyz, "1 2\n", "r.txt:1: column 3 is wanted, but there are 2"},
       {"", xyz, "1 2 3\n1 nan 3\n", "r.txt:2: column 2 is 'nan', expected a finite number"},

@@ -60,8 +60,8 @@ const aiScene* import(Assimp::Importer& importer, const std::string& path) {
 // Of the seventy that assimp takes, those that meshes are exchanged in. Among the others are scenes and motions that
 // name meshes and are none: assimp 5.2 crashes on an empty .lws, does not end on a damaged .md5mesh, and takes any
 // bytes under .ase for a skeleton, for which it puts an octahedron.
-constexpr std::string_view kFormats[] = {".3ds", ".3mf",  ".ac",  ".amf", ".dae", ".dxf", ".fbx",
-                                         ".glb", ".gltf", ".lwo", ".wrl", ".x",   ".x3d"};
+constexpr std::string_view kFormats[] = {".3ds", ".3mf", ".ac",   ".amf", ".dae", ".dxf",
+                                         ".fbx", ".glb", ".gltf", ".lwo", ".x",   ".x3d"};
 
 bool assimpReads(const std::string& extension) {
   return isOneOf(extension, kFormats) && Assimp::Importer().IsExtensionSupported(extension);

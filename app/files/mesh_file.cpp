@@ -1,6 +1,7 @@
 #include "app/files/mesh_file.h"
 
 #include <filesystem>
+#include <string_view>
 #include <system_error>
 
 #include "app/files/assimp_reader.h"
@@ -61,7 +62,10 @@ TriangleMesh readMesh(const std::string& path, double metresPerFileUnit) {
   } else if (extension == ".ply") {
     mesh = parsePly(readTextFile(path), path);
   } else if (extension == ".stl") {
-    mesh = parseStl(readBytes(path), path);
+    std::string bytes = readBytes(path);
+    constexpr std::string_view kMark = "\xef\xbb\xbf";  // before text; binary files have names of their own there
+    if (bytes.starts_with(std::string(kMark) + "solid")) bytes.erase(0, kMark.size());
+    mesh = parseStl(bytes, path);
   } else if (assimpReads(extension)) {
     mesh = readWithAssimp(path);
   } else {

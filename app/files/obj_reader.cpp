@@ -62,7 +62,7 @@ TriangleMesh parseObj(std::string_view text, const std::string& name) {
                      "face refers to vertex " + std::to_string(largest + 1LL) + ", but the file has only " +
                          std::to_string(mesh.vertices.size()));
   }
-  polygons.cutConcave(mesh);
+  polygons.cutConcave(name, mesh);
   return mesh;
 }
 

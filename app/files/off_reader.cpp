@@ -94,7 +94,7 @@ TriangleMesh parseOff(std::string_view text, const std::string& name) {
   }
   if (lines.next()) lines.fail("expected the end of the file after the faces that the header counts");
   if (mesh.triangles.empty()) throw inputError(name, 0, "no triangles in this OFF file");
-  polygons.cutConcave(mesh);
+  polygons.cutConcave(name, mesh);
   return mesh;
 }
 

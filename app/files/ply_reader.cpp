@@ -320,7 +320,7 @@ TriangleMesh parsePly(std::string_view bytes, const std::string& name) {
   for (const Element& element : header.elements) readElements(values, element, vertex->count, mesh, polygons);
   values.requireEnd();
   if (mesh.triangles.empty()) throw inputError(name, 0, "no triangles in this PLY file");
-  polygons.cutConcave(mesh);
+  polygons.cutConcave(name, mesh);
   return mesh;
 }
 

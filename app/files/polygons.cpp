@@ -1,9 +1,12 @@
 #include "app/files/polygons.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
 
+#include "app/files/input_error.h"
 #include "physics/model/mesh_topology.h"
 
 namespace medulla {
@@ -55,10 +58,9 @@ void Polygons::add(const std::vector<int>& corners, TriangleMesh& mesh) {
   for (std::size_t k = 2; k < corners.size(); ++k) mesh.triangles.push_back({corners[0], corners[k - 1], corners[k]});
 }
 
-void Polygons::cutConcave(TriangleMesh& mesh) const {
+void Polygons::cutConcave(const std::string& file, TriangleMesh& mesh) const {
   constexpr int kMostCorners = 1000;  // the time goes with their cube
   for (const Fan& fan : fans_) {
-    if (fan.corners > kMostCorners) continue;
     const auto first = mesh.triangles.begin() + static_cast<std::ptrdiff_t>(fan.firstTriangle);
     const auto end = first + (fan.corners - 2);
     std::vector<int> polygon{(*first)[0], (*first)[1]};
@@ -67,6 +69,10 @@ void Polygons::cutConcave(TriangleMesh& mesh) const {
     const bool folds =
         std::any_of(first, end, [&](const std::array<int, 3>& t) { return areaVector(mesh, t).dot(normal) < 0; });
     if (!folds) continue;
+    if (fan.corners > kMostCorners)
+      throw inputError(
+          file, 0,
+          fmt::format("a concave face of {} corners, expected at most {}: cut it up", fan.corners, kMostCorners));
     const std::vector<std::array<int, 3>> ears = cutIntoEars(mesh, polygon, normal);
     std::copy(ears.begin(), ears.end(), first);
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "physics/model/triangle_mesh.h"
@@ -14,7 +15,8 @@ class Polygons {
   void add(const std::vector<int>& corners, TriangleMesh& mesh);
   // Of concave polygons a fan may fold over itself, and then a sound mesh would seem to cut through itself: these are
   // cut into ears instead (Meisters 1975), in the same triangles' places. Indices are valid.
-  void cutConcave(TriangleMesh& mesh) const;
+  // Throws std::runtime_error "FILE: ..." where such a polygon has more than a thousand corners.
+  void cutConcave(const std::string& file, TriangleMesh& mesh) const;
 
  private:
   struct Fan {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <numbers>
 
@@ -34,9 +35,17 @@ struct Layout {
   Cells time, position, quaternion, matrix, grip, force;
 };
 
+// What a tracker writes while it sees nothing is no name.
 bool isHeader(const CsvRows& rows) {
   const auto isNumber = [](std::string_view cell) { return parseNumber<double>(cell).has_value(); };
-  return std::none_of(rows.cells().begin(), rows.cells().end(), isNumber);
+  const auto isName = [](std::string_view cell) {
+    std::string lower(cell);
+    std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
+    constexpr std::string_view kNothing[] = {"nan", "-nan", "inf", "-inf", "null", "none", "na", "n/a"};
+    return !lower.empty() && !isOneOf(lower, kNothing);
+  };
+  return std::none_of(rows.cells().begin(), rows.cells().end(), isNumber) &&
+         std::any_of(rows.cells().begin(), rows.cells().end(), isName);
 }
 
 // "" where every column is found. `header`: names, empty where the file has none.

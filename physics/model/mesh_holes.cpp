@@ -34,6 +34,19 @@ double loopLength(const TriangleMesh& mesh, const std::vector<int>& loop) {
   return length;
 }
 
+// Of the ends of open edges that leave `v`, that of the edge which turns back most sharply from the one that came from
+// `before` (-1: none did): within the gap between a coarse edge and the two that meet its middle, not round all coarse
+// edges and then round all fine ones. Whatever the order of the triangles.
+std::vector<int>::iterator sharpestTurn(const TriangleMesh& mesh, int before, int v, std::vector<int>& ends) {
+  const auto turn = [&](int to) {
+    if (before < 0) return 0.;
+    const Eigen::Vector3d back = mesh.vertices[before] - mesh.vertices[v], on = mesh.vertices[to] - mesh.vertices[v];
+    return back.stableNormalized().dot(on.stableNormalized());
+  };
+  return std::min_element(ends.begin(), ends.end(),
+                          [&](int a, int b) { return turn(a) != turn(b) ? turn(a) > turn(b) : a < b; });
+}
+
 // Simple loops of open edges. Where two openings meet in a vertex, the walk cuts a loop off whenever it returns to a
 // vertex that it has passed.
 std::vector<Loop> openLoops(const TriangleMesh& mesh) {
@@ -59,9 +72,11 @@ std::vector<Loop> openLoops(const TriangleMesh& mesh) {
       }
       positionOnPath[v] = static_cast<int>(path.size());
       path.push_back(v);
-      const int to = next[v].back();  // as many edges leave a vertex as arrive
-      next[v].pop_back();
-      v = to;
+      const int before = path.size() > 1 ? path[path.size() - 2] : -1;
+      const auto to = sharpestTurn(mesh, before, v, next[v]);  // as many edges leave a vertex as arrive
+      const int end = *to;
+      next[v].erase(to);
+      v = end;
     }
   }
   return loops;

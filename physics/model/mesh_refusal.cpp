@@ -18,6 +18,8 @@ namespace {
 // m; beyond these a mesh is in another unit than the caller believes, and fourth powers leave the range of double.
 constexpr double kLargestCoordinate = 1e6;
 constexpr double kSmallestDiagonal = 1e-6;
+// Of the mesh's size, from the origin: beyond, places round to a share of it that the model shows.
+constexpr double kFarthestPlace = 1e4;
 
 // A far vertex lies further from the middle than this many times the distance that 90 % of the vertices keep ...
 constexpr double kFarFromMiddle = 5;
@@ -85,6 +87,13 @@ void requireUsableNumbers(const TriangleMesh& input) {
   if (diagonal < kSmallestDiagonal) {
     throw std::runtime_error(fmt::format("the mesh is {:.3g} m across, expected at least {:g} m: is the unit right?",
                                          diagonal, kSmallestDiagonal));
+  }
+  const double away = input.vertices[input.triangles[0][0]].norm();
+  if (away > kFarthestPlace * diagonal) {
+    throw std::runtime_error(
+        fmt::format("the mesh of {:.3g} m lies {:.3g} m from the origin, expected at most {:g} times its size: move it "
+                    "there, and the body in the scene",
+                    diagonal, away, kFarthestPlace));
   }
 }
 
