@@ -123,8 +123,7 @@ std::optional<LoadedScene> loadMethod(const ChartRun& run, const ChartOptions& o
 
 // Of steps that are whole shares of a dynamics frame, the one that is nearest: how many it has.
 int nearestSubsteps(double step, double rate) {
-  const double share = 1 / (step * rate);
-  const int fewer = std::max(1, static_cast<int>(share)), more = fewer + 1;
+  const int fewer = static_cast<int>(std::clamp(1 / (step * rate), 1., 1e9)), more = fewer + 1;
   const auto off = [&](int substeps) { return std::abs(1 / (rate * substeps) - step); };
   return off(fewer) <= off(more) ? fewer : more;
 }
