@@ -35,13 +35,14 @@ std::vector<std::string> wrapped(const std::string& text, float height, float wi
   std::vector<std::string> lines;
   std::size_t end = 0;
   for (std::size_t begin = 0; (begin = text.find_first_not_of(' ', end)) != std::string::npos;) {
-    const std::string gap = text.substr(end, begin - end);
+    const std::size_t from = end;
     end = std::min(text.find(' ', begin), text.size());
-    std::string word = text.substr(begin, end - begin);
-    if (!lines.empty() && textWidth(lines.back() + gap + word, height) <= width) {
-      lines.back() += gap + word;
+    const std::string longer = lines.empty() ? "" : lines.back() + text.substr(from, end - from);
+    if (!lines.empty() && textWidth(longer, height) <= width) {
+      lines.back() = longer;
       continue;
     }
+    std::string word = text.substr(begin, end - begin);
     while (!word.empty()) {
       lines.push_back(word.substr(0, lettersThatFit(word, height, width)));
       word.erase(0, lines.back().size());
