@@ -1,12 +1,5 @@
 #include "render/film_palette.h"
 
-extern "C" {
-#include <libavfilter/avfilter.h>
-#include <libavfilter/buffersink.h>
-#include <libavfilter/buffersrc.h>
-#include <libavutil/frame.h>
-}
-
 #include <unistd.h>
 
 #include <array>
@@ -18,14 +11,9 @@ extern "C" {
 #include <stdexcept>
 #include <vector>
 
-namespace medulla {
+#include "render/ffmpeg.h"
 
-int checkedAv(int code) {
-  if (code >= 0) return code;
-  char words[AV_ERROR_MAX_STRING_SIZE] = {};
-  av_strerror(code, words, sizeof words);
-  throw std::runtime_error(words);
-}
+namespace medulla {
 
 namespace {
 

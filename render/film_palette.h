@@ -24,7 +24,4 @@ class FilmPalette {
   std::unique_ptr<Data> data_;
 };
 
-// Throws std::runtime_error with FFmpeg's words for a negative code; else returns it.
-int checkedAv(int code);
-
 }  // namespace medulla

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "render/gl_context.h"
+#include "render/gl_functions.h"
 
 namespace medulla {
 namespace {
@@ -35,6 +36,7 @@ class EglContext : public GlContext {
   void makeCurrent() override {
     if (!eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_))
       throw std::runtime_error("EGL could not make its context current");
+    useGlFunctionsOf(eglGetProcAddress);
   }
 
  private:

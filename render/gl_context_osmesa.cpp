@@ -1,15 +1,37 @@
 #ifdef MEDULLA_HAVE_OSMESA
 
-#include <GL/gl.h>
 #include <GL/osmesa.h>
 
 #include <array>
 #include <stdexcept>
 
 #include "render/gl_context.h"
+#include "render/gl_functions.h"
+#include "render/shared_library.h"
 
 namespace medulla {
 namespace {
+
+// What is called of OSMesa.
+struct Osmesa {
+  decltype(&OSMesaCreateContextAttribs) createContextAttribs;
+  decltype(&OSMesaDestroyContext) destroyContext;
+  decltype(&OSMesaMakeCurrent) makeCurrent;
+  decltype(&OSMesaGetProcAddress) getProcAddress;
+
+  Osmesa() {
+    const SharedLibrary library("libOSMesa.so.8");
+    library.find("OSMesaCreateContextAttribs", createContextAttribs);
+    library.find("OSMesaDestroyContext", destroyContext);
+    library.find("OSMesaMakeCurrent", makeCurrent);
+    library.find("OSMesaGetProcAddress", getProcAddress);
+  }
+};
+
+const Osmesa& osmesa() {
+  static const Osmesa library;
+  return library;
+}
 
 class OsmesaContext : public GlContext {
  public:
@@ -25,14 +47,15 @@ class OsmesaContext : public GlContext {
                               OSMESA_CONTEXT_MINOR_VERSION,
                               3,
                               0};
-    context_ = OSMesaCreateContextAttribs(attributes, nullptr);
+    context_ = osmesa().createContextAttribs(attributes, nullptr);
     if (!context_) throw std::runtime_error("OSMesa could not make an OpenGL 3.3 core context");
     OsmesaContext::makeCurrent();  // by name: virtual dispatch does not reach further in a constructor
   }
-  ~OsmesaContext() override { OSMesaDestroyContext(context_); }
+  ~OsmesaContext() override { osmesa().destroyContext(context_); }
   void makeCurrent() override {
-    if (!OSMesaMakeCurrent(context_, buffer_.data(), GL_UNSIGNED_BYTE, kSide, kSide))
+    if (!osmesa().makeCurrent(context_, buffer_.data(), GL_UNSIGNED_BYTE, kSide, kSide))
       throw std::runtime_error("OSMesa could not make its context current");
+    useGlFunctionsOf(osmesa().getProcAddress);
   }
 
  private:

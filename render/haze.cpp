@@ -1,12 +1,9 @@
-#define GL_GLEXT_PROTOTYPES
 #include "render/haze.h"
-
-#include <GL/gl.h>
-#include <GL/glext.h>
 
 #include <cmath>
 #include <vector>
 
+#include "render/gl_functions.h"
 #include "render/noise.h"
 #include "render/shaders.h"
 

@@ -1,8 +1,4 @@
-#define GL_GLEXT_PROTOTYPES
 #include "render/model_view.h"
-
-#include <GL/gl.h>
-#include <GL/glext.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +6,7 @@
 #include <numbers>
 
 #include "render/across.h"
+#include "render/gl_functions.h"
 #include "render/shaders.h"
 
 namespace medulla {

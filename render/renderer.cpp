@@ -1,8 +1,4 @@
-#define GL_GLEXT_PROTOTYPES
 #include "render/renderer.h"
-
-#include <GL/gl.h>
-#include <GL/glext.h>
 
 #include <algorithm>
 #include <array>
@@ -14,6 +10,7 @@
 
 #include "render/ball_shade.h"
 #include "render/gl_context.h"
+#include "render/gl_functions.h"
 #include "render/haze.h"
 #include "render/instrument_mesh.h"
 #include "render/model_view.h"

@@ -1,10 +1,8 @@
-#define GL_GLEXT_PROTOTYPES
 #include "render/shaders.h"
 
-#include <GL/gl.h>
-#include <GL/glext.h>
-
 #include <stdexcept>
+
+#include "render/gl_functions.h"
 
 namespace medulla {
 namespace {

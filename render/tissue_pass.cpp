@@ -1,8 +1,4 @@
-#define GL_GLEXT_PROTOTYPES
 #include "render/tissue_pass.h"
-
-#include <GL/gl.h>
-#include <GL/glext.h>
 
 #include <fmt/format.h>
 
@@ -12,6 +8,7 @@
 #include <numbers>
 
 #include "render/detail_texture.h"
+#include "render/gl_functions.h"
 #include "render/shaders.h"
 
 namespace medulla {

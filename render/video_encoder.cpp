@@ -1,17 +1,12 @@
 #include "render/video_encoder.h"
 
-extern "C" {
-#include <libavcodec/avcodec.h>
-#include <libavformat/avformat.h>
-#include <libavutil/opt.h>
-}
-
 #include <cassert>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
+#include "render/ffmpeg.h"
 #include "render/film_palette.h"
 
 namespace medulla {
@@ -70,7 +65,7 @@ struct VideoEncoder::Data {
   const Encoding& encoding;
   VideoFormat format;
   int width, height;
-  AVRational tick;  // s, of one picture
+  AVRational tick{};  // s, of one picture
   std::string partial;
   AVFormatContext* muxer = nullptr;
   AVCodecContext* codec = nullptr;
@@ -82,12 +77,11 @@ struct VideoEncoder::Data {
   std::optional<FilmPalette> palette;
 
   Data(VideoFormat f, std::string path, int w, int h, double fps)
-      : encoding(encodingOf(f)),
-        format(f),
-        width(w),
-        height(h),
-        tick(av_inv_q(av_d2q(fps, 100000))),
-        partial(std::move(path)) {}
+      : encoding(encodingOf(f)), format(f), width(w), height(h), partial(std::move(path)) {
+    loadEncoders();
+    if (format == VideoFormat::gif) loadFilters();
+    tick = av_inv_q(av_d2q(fps, 100000));
+  }
   ~Data() {
     // Abandoned, the muxer of GIF would keep its last packet for ever; others may take long over a trailer.
     if (begun && format == VideoFormat::gif) av_write_trailer(muxer);
