@@ -20,6 +20,7 @@
 #include "app/simulation.h"
 #include "physics/dynamics/fixation.h"
 #include "physics/dynamics/link_mechanics.h"
+#include "physics/dynamics/rigid_support.h"
 #include "physics/model/node_volumes.h"
 #include "physics/sort_unique.h"
 #include "render/renderer.h"
@@ -31,11 +32,18 @@ using Attributes = std::initializer_list<std::string_view>;
 // What says where nodes or links are looked for.
 static const Attributes kRegions{"box", "sphere", "plane"};
 
+// nullptr where the line's values are the file's.
+static const OverriddenAttribute* overriddenAt(const Scene& scene, int line, Attributes attributes) {
+  for (const OverriddenAttribute& o : scene.overridden)
+    if (o.line == line && isOneOf(o.attribute, attributes)) return &o;
+  return nullptr;
+}
+
 // Of values that turn out to be wrong only now: said where they stand, in the file or, if one of them does, on the
 // command line.
 static std::runtime_error valueError(const Scene& scene, int line, Attributes attributes, const std::string& message) {
-  for (const OverriddenAttribute& o : scene.overridden)
-    if (o.line == line && isOneOf(o.attribute, attributes)) return inputError("--set " + o.path, 0, message);
+  if (const OverriddenAttribute* o = overriddenAt(scene, line, attributes))
+    return inputError("--set " + o->path, 0, message);
   return inputError(scene.path, line, message);
 }
 
@@ -43,7 +51,7 @@ static std::runtime_error valueError(const Scene& scene, int line, Attributes at
 static void requireFile(const Scene& scene, int line, const std::string& attribute, const std::string& what,
                         const std::string& path) {
   if (!fileExists(path))
-    throw valueError(scene, line, {attribute}, fmt::format("{} \"{}\" does not exist", what, path));
+    throw valueError(scene, line, {attribute}, fmt::format("{} {} does not exist", what, inQuotes(path, '"')));
 }
 
 // As the build's command line says it.
@@ -100,8 +108,9 @@ static void resolvePatches(const Scene& scene, SceneBody& body) {
   std::sort(asked.begin(), asked.end());
   std::sort(known.begin(), known.end());
   if (model.identified && asked == known && std::abs(model.identified->poisson - body.tissue.poisson) < 1e-9) return;
+  const bool byTissue = overriddenAt(scene, body.tissueLine, {"poisson"}) != nullptr;
   throw valueError(
-      scene, body.line, {"links", "model", "tissue"},
+      scene, byTissue ? body.tissueLine : body.line, {"links", "model", "tissue", "poisson"},
       fmt::format("body \"{}\" has identified links, and its model {}; run where its mesh lies, this would make it: {}",
                   body.name,
                   !model.identified ? "has none"
@@ -120,6 +129,25 @@ static void fixSphere(SceneBody& body, int sphere, FixedFreedom freedom) {
     known->freedom = freedom;
 }
 
+// The nodes of a skin follow their spheres: a part that lets no sphere be held, neither alone nor beside the others,
+// would do nothing.
+static void requireHeldSkin(const Scene& scene, const SceneBody& body, const std::vector<std::vector<int>>& parts) {
+  if (body.surface != SurfaceMode::skin) return;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    std::vector<int> others;
+    for (std::size_t e = 0; e < parts.size(); ++e)
+      if (e != k) others.insert(others.end(), parts[e].begin(), parts[e].end());
+    sortUnique(others);
+    const std::vector<int> held = spheresHeldBy(*body.model, parts[k]);
+    if (!held.empty() || spheresHeldBy(*body.model, others) != spheresHeldBy(*body.model, body.fixedNodes)) continue;
+    const bool bySurface = overriddenAt(scene, body.line, {"surface"}) != nullptr;
+    throw valueError(scene, bySurface ? body.line : body.fixes[k].line, {"surface", "box", "sphere", "plane"},
+                     fmt::format("nothing of body \"{}\" is held in here: its surface is a skin, and no filling sphere "
+                                 "has half of its surface there; expected more of it, or spheres by number",
+                                 body.name));
+  }
+}
+
 // Nodes that are fixed, and the spheres that all of them together hold: regions that meet on a sphere hold it as one
 // that spans both would. It turns unless those hold it alone that let nothing turn.
 static void resolveFixes(const Scene& scene, SceneBody& body) {
@@ -134,8 +162,9 @@ static void resolveFixes(const Scene& scene, SceneBody& body) {
     body.fixedNodes.clear();
   }
   std::vector<int> whollyHeld;
+  std::vector<std::vector<int>> parts;
   for (const SceneFix& fix : body.fixes) {
-    const std::vector<int> nodes = findNodes(scene, fix.line, fix.nodes, body);
+    const std::vector<int>& nodes = parts.emplace_back(findNodes(scene, fix.line, fix.nodes, body));
     body.fixedNodes.insert(body.fixedNodes.end(), nodes.begin(), nodes.end());
     if (fix.freedom == FixedFreedom::all) whollyHeld.insert(whollyHeld.end(), nodes.begin(), nodes.end());
   }
@@ -143,13 +172,7 @@ static void resolveFixes(const Scene& scene, SceneBody& body) {
   sortUnique(whollyHeld);
   for (const int sphere : spheresHeldBy(model, body.fixedNodes)) fixSphere(body, sphere, FixedFreedom::translation);
   for (const int sphere : spheresHeldBy(model, whollyHeld)) fixSphere(body, sphere, FixedFreedom::all);
-  // The nodes of a skin follow their spheres: where none is held, fixing them would do nothing.
-  if (body.surface == SurfaceMode::skin && !body.fixes.empty() && body.fixed.empty())
-    throw valueError(
-        scene, body.fixes[0].line, kRegions,
-        fmt::format("nothing of body \"{}\" is held: its surface is a skin, and no filling sphere has half "
-                    "of its surface in here; expected more of it, or spheres by number",
-                    body.name));
+  requireHeldSkin(scene, body, parts);
 }
 
 // Of those fixed by number the file alone tells.
@@ -176,12 +199,15 @@ static void requireSteeredLinks(const Scene& scene, const SceneBody& body) {
 
 static void resolveLoads(const Scene& scene, SceneBody& body) {
   const SoftBodyModel& model = *body.model;
-  for (const SceneLoad& load : body.loads) {
+  for (SceneLoad& load : body.loads) {
     if (!load.forcesPath.empty()) requireFile(scene, load.line, "file", "file of forces", load.forcesPath);
     const std::vector<DeadLoad> loads =
         load.forcesPath.empty() ? spreadLoad(model, findNodes(scene, load.line, load.nodes, body), load.whole)
                                 : readVertexForces(load.forcesPath, model, load.whole);
     body.deadLoads.insert(body.deadLoads.end(), loads.begin(), loads.end());
+    load.isIdle = holdsByNodes(body) && std::all_of(loads.begin(), loads.end(), [&](const DeadLoad& l) {
+                    return std::binary_search(body.fixedNodes.begin(), body.fixedNodes.end(), l.node);
+                  });
   }
 }
 
@@ -224,7 +250,8 @@ static void loadModels(Scene& scene) {
 static void requireLook(const Scene& scene, int line, const std::string& look) {
   const std::vector<std::string> known = lookNames();
   if (isOneOf(look, known)) return;
-  throw valueError(scene, line, {"look"}, fmt::format("unknown look \"{}\": {}", look, hintOfNames(look, known)));
+  throw valueError(scene, line, {"look"},
+                   fmt::format("unknown look {}: {}", inQuotes(look, '"'), hintOfNames(look, known)));
 }
 
 static Trajectory loadTrajectory(const Scene& scene, SceneTool& tool) {

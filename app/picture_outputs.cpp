@@ -123,8 +123,11 @@ void PngFolder::write(int number, const Image& image) {
   });
 }
 
-int PngFolder::finish() {
+void PngFolder::finish() {
   queue_.finish();
+}
+
+int PngFolder::commit() {
   std::vector<fs::path> pictures;
   for (const auto& entry : fs::directory_iterator(collecting_))
     if (isPicture(entry.path())) pictures.push_back(entry.path());
@@ -147,8 +150,7 @@ PictureOutputs::PictureOutputs(const std::vector<std::string>& paths, const Sett
     const std::string extension = fs::path(path).extension().string();
     if (settings.still) {
       if (extension != ".png") throw std::runtime_error(path + ": expected FILE.png for a still");
-      requireWritable({path});
-      stills_.push_back(path);
+      stills_.emplace_back(path);
     } else if (isVideoName(path)) {
       videos_.emplace_back(path, settings.width, settings.height, settings.fps);
     } else if (isVideoName("film" + fs::path(path).filename().string())) {
@@ -185,11 +187,22 @@ StageTimes::Stage PictureOutputs::encoding() const {
 
 void PictureOutputs::finish() {
   for (VideoWriter& video : videos_) video.finish(checkInterrupt);
+  for (const auto& folder : folders_) folder->finish();
+  for (OutputFile& still : stills_) {
+    still.write(encodePng(still_));
+    still.finish();
+  }
+}
+
+std::vector<std::string> PictureOutputs::commit() {
+  std::vector<std::string> notes;
+  for (VideoWriter& video : videos_) video.commit();
   for (const auto& folder : folders_)
-    if (const int gone = folder->finish(); gone > 0)
-      notes_.push_back(fmt::format("{}: {} numbered pictures beyond this run's are gone: they were of an earlier one",
-                                   folder->path(), gone));
-  for (const std::string& path : stills_) writePng(path, still_);
+    if (const int gone = folder->commit(); gone > 0)
+      notes.push_back(fmt::format("{}: {} numbered pictures beyond this run's are gone: they were of an earlier one",
+                                  folder->path(), gone));
+  for (OutputFile& still : stills_) still.commit();
+  return notes;
 }
 
 }  // namespace medulla

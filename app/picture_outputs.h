@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -36,7 +37,8 @@ class PngFolder {
   std::string path() const { return folder_.string(); }
   bool has(int number) const;                  // drawn before, and whole
   void write(int number, const Image& image);  // throws for an earlier one that could not be written
-  int finish();                                // how many pictures of an earlier run are gone
+  void finish();                               // they are all written
+  int commit();                                // and move up; how many pictures of an earlier run are gone
   const StageTimes::Stage& encoding() const { return queue_.encoding(); }
 
  private:
@@ -69,16 +71,15 @@ class PictureOutputs {
   PictureOutputs(const std::vector<std::string>& paths, const Settings& settings);
   bool has(int number) const;  // nobody needs this picture any more
   void write(int number, const Image& image);
-  void finish();                                                    // throws Interrupted too
-  const std::vector<std::string>& notes() const { return notes_; }  // after finish(): what users may not expect
+  void finish();                       // throws Interrupted too
+  std::vector<std::string> commit();   // then: all appear under their names; returns what users may not expect
   StageTimes::Stage encoding() const;  // of all videos and folders, in threads of their own
 
  private:
   std::vector<VideoWriter> videos_;
   std::vector<std::unique_ptr<PngFolder>> folders_;
-  std::vector<std::string> stills_;
+  std::deque<OutputFile> stills_;
   Image still_;
-  std::vector<std::string> notes_;
 };
 
 }  // namespace medulla

@@ -263,7 +263,7 @@ Verb addReplay(CLI::App& app) {
               "times of ticks, and which came late");
   c->add_flag("--until-rest", a->untilRest,
               "end when no body has moved for a swing of its slowest mode, no load is still growing and no tool moves "
-              "any more; "
+              "any more; none sleeps before; "
               "exit code 4 and no files where that is not before the scene's duration");
   return {c, [a] {
             RunOptions options = runOptions(a->run);

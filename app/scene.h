@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "haptics/tool_input.h"
@@ -31,12 +32,13 @@ struct SceneLoad {
   NodeChoice nodes;
   std::string forcesPath;  // a force per vertex, instead of nodes and force; empty: those
   DeadLoad whole;          // force on all chosen nodes together, N, world; its node is of no account
+  bool isIdle = false;     // acts where the body is held alone: found by loadScene()
 };
 
 // loadScene() finds the model, fixed nodes and dead loads, and adds to the spheres fixed by number those that fixed
 // nodes hold.
 struct SceneBody : BodyDescription {
-  int line = 0;
+  int line = 0, tissueLine = 0;
   std::string modelPath, look;
   bool choosesLinks = false;  // says which, rather than leaving it to the default
   std::string referencePath;  // where another program puts its vertices at the end; empty: none
@@ -119,6 +121,8 @@ struct SceneOverride {
   std::string path, value;
 };
 
+// Whether an override has put something there: "output.fps".
+bool isOverridden(const Scene& scene, std::string_view path);
 // Whether an override says how long the scene is: a run cut short from the command line, say.
 bool durationOverridden(const Scene& scene);
 

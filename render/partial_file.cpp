@@ -20,7 +20,7 @@ std::runtime_error unwritable(const std::string& path) {
   return std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
 }
 
-static std::string behindLink(const std::string& path) {
+std::string behindLink(const std::string& path) {
   constexpr int kMost = 40;  // as many as Linux follows: a circle ends
   std::filesystem::path target = path;
   std::error_code error;
@@ -67,13 +67,23 @@ static std::string folderOf(const std::string& path) {
   return folder.empty() ? "." : folder;
 }
 
+// Of what is replaced. Where that fails the file is as new ones are.
+static void takePermissions(const std::string& target, const Descriptor& to) {
+  constexpr mode_t readWriteAndRun = 0777;
+  struct stat earlier {};
+  if (::stat(target.c_str(), &earlier) == 0) (void)::fchmod(to.value(), earlier.st_mode & readWriteAndRun);
+}
+
 PartialFile::PartialFile(const std::string& target) : target_(resolveTarget(target)), made_(folderOf(target)) {
   const mode_t readAndWrite = 0666;  // less the user's mask
   // Names left by killed runs are stepped over: O_EXCL never touches a file that somebody else made.
   for (int attempt = 0;; ++attempt) {
     path_ = besideTarget(target_, fmt::format(".{}-{}.part", ::getpid(), attempt));
     const Descriptor made(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, readAndWrite));
-    if (made.isOpen()) return;
+    if (made.isOpen()) {
+      takePermissions(target_, made);
+      return;
+    }
     if (errno != EEXIST) throw unwritable(target);
   }
 }

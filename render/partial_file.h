@@ -11,11 +11,15 @@ namespace medulla {
 // Of what the system has just refused to write.
 std::runtime_error unwritable(const std::string& path);
 
+// What a symbolic link stands for, whether there is something yet or not; any other path itself.
+std::string behindLink(const std::string& path);
+
 // A file beside its target that takes the target's name only when it is whole: TARGET.PID-N.part up to commit(), or
 // as much of the target's name as a name has room for. That holds against whatever ends a program, not against a power
 // cut, for which every picture of a film would have to wait for the disk.
 // Destroyed before that it is removed, and an earlier file of that name stays as it was. What a symbolic link stands
-// for is replaced, not the link, also where there is nothing yet.
+// for is replaced, not the link, also where there is nothing yet. Who may read and write a file that is replaced may
+// its successor.
 class PartialFile {
  public:
   // There at once, and empty; so are folders in the target's path that are missing, which go again with a file that

@@ -114,13 +114,19 @@ void writePng(const std::string& path, const Image& image, const std::vector<Png
 }
 
 bool isPng(const std::string& path) {
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(path, unknown)) return false;  // a pipe would be waited for
   std::ifstream file(path, std::ios::binary);
   char first[sizeof kSignature] = {};
   return file.read(first, sizeof first) && std::memcmp(first, kSignature, sizeof first) == 0;
 }
 
 Image readPng(const std::string& path, std::vector<PngText>* texts) {
-  if (std::filesystem::is_directory(path)) throw std::runtime_error(path + ": is a folder, expected a PNG file");
+  std::error_code unknown;
+  if (std::filesystem::is_directory(path, unknown))
+    throw std::runtime_error(path + ": is a folder, expected a PNG file");
+  if (std::filesystem::exists(path, unknown) && !std::filesystem::is_regular_file(path, unknown))
+    throw std::runtime_error(path + ": is not a regular file, expected a PNG file");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw std::runtime_error(path + ": cannot be read: " + std::strerror(errno));
   const std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <filesystem>
 #include <stdexcept>
 
@@ -16,9 +17,12 @@ namespace {
 struct FormatName {
   const char* extension;
   VideoFormat format;
+  double most;  // pictures per second that players show
 };
-constexpr FormatName kFormats[] = {
-    {".mp4", VideoFormat::mp4}, {".webm", VideoFormat::webm}, {".gif", VideoFormat::gif}, {".webp", VideoFormat::webp}};
+constexpr FormatName kFormats[] = {{".mp4", VideoFormat::mp4, 1e9},
+                                   {".webm", VideoFormat::webm, 1e9},
+                                   {".gif", VideoFormat::gif, 50},
+                                   {".webp", VideoFormat::webp, 90}};
 
 const FormatName* findFormat(const std::string& path) {
   const std::string extension = std::filesystem::path(path).extension().string();
@@ -33,9 +37,9 @@ VideoFormat checkedFormat(const std::string& path, int width, int height, double
   if (width % 2 != 0 || height % 2 != 0)
     throw std::runtime_error(path + ": a video of " + std::to_string(width) + "x" + std::to_string(height) +
                              " pixels, expected even numbers");
-  constexpr double gifMost = 50;
-  if (format->format == VideoFormat::gif && fps > gifMost)
-    throw std::runtime_error(path + ": more than 50 pictures per second, which no GIF can show");
+  if (fps > format->most)
+    throw std::runtime_error(path + ": more than " + std::to_string(std::lround(format->most)) +
+                             " pictures per second, which no player shows of a " + format->extension);
   return format->format;
 }
 
@@ -99,6 +103,9 @@ void VideoWriter::finish(const std::function<void()>& goOn) {
     data_->queue.finish();
     data_->encoder.finish(goOn);
   });
+}
+
+void VideoWriter::commit() {
   data_->partial.commit();
 }
 

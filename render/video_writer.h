@@ -13,12 +13,12 @@ namespace medulla {
 bool isVideoName(const std::string& path);
 
 // A video through FFmpeg's libraries, of the kind that its name says. The file grows beside its target under a name of
-// its own and is renamed by finish(); a writer destroyed before that leaves nothing.
+// its own and is renamed by commit(); a writer destroyed before that leaves nothing.
 class VideoWriter {
  public:
-  // Throws std::runtime_error when the file cannot be written, the size is odd (colours are
-  // stored for 2x2 pixels at once), or a GIF is to show more than 50 pictures per second (its times are hundredths of a
-  // second, and players take the shortest for a tenth).
+  // Throws std::runtime_error when the file cannot be written, the size is odd (colours are stored for 2x2 pixels at
+  // once), or more pictures per second are asked for than players show: of a GIF, whose times are hundredths of a
+  // second, more than 50, of a WebP, whose are thousandths, more than 90. They take 0.01 s and less for 0.1.
   VideoWriter(const std::string& path, int width, int height, double fps);
   ~VideoWriter();
   VideoWriter(VideoWriter&&) noexcept;
@@ -26,6 +26,7 @@ class VideoWriter {
   // Calls `goOn` before each picture that is still to be encoded: a GIF is from first to last. What it throws, any but
   // a std::runtime_error, ends the film unfinished and comes through.
   void finish(const std::function<void()>& goOn = [] {});
+  void commit();                              // once, last: gives the film its name
   const StageTimes::Stage& encoding() const;  // what its thread has taken; after finish()
 
  private:

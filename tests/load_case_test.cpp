@@ -108,6 +108,7 @@ TEST(VertexFile, MistakesNameTheLine) {
       forces("vertex,fx[mN],fy[mN],fz[mN]\n0,1,2,3\n"),
       "f.csv:1: the first row is 'vertex,fx[mN],fy[mN],fz[mN]', expected a header vertex,fx[N],fy[N],fz[N] or numbers");
   EXPECT_EQ(forces("1,0,0,0\n1,0,0,1\n"), "f.csv:2: vertex 1 stands twice");
+  EXPECT_EQ(forces("1,0,-2e6,0\n"), "f.csv:1: a force beyond 1e+06 N");
   EXPECT_EQ(forces("7,0,0,0\n"), "f.csv:1: column vertex is '7', expected a whole number from 0 to 5");
 }
 
@@ -231,12 +232,21 @@ TEST_F(LoadCase, MistakesNameFileAndLine) {
             "case.xml:5: body \"pear\" drives sphere 1, which a <fix> of its surface holds: expected one of the two");
   const std::string few = scene("<fix sphere='-0.05 -0.07 0.02 0.012'/>");
   EXPECT_EQ(complaintOf([&] { loadScene(readScene(few)); }), "");
+  const std::string noSkin =
+      "nothing of body \"pear\" is held in here: its surface is a skin, and no filling sphere has half of its surface "
+      "there; expected more of it, or spheres by number";
   EXPECT_EQ(complaintOf([&] {
               loadScene(readScene(few, {{"body.pear.surface", "skin"}}));
             }),
-            few +
-                ":4: nothing of body \"pear\" is held: its surface is a skin, and no filling sphere has half of its "
-                "surface in here; expected more of it, or spheres by number");
+            "--set body.pear.surface: " + noSkin);
+  const auto skinWith = [&](const std::string& more) {
+    std::string text = readFile(scene(kHeld + ("\n" + more)));
+    text.insert(text.find("<body ") + 6, "surface='skin' ");
+    folder.write("case.xml", text);
+    return complaintOf([&] { loadScene(readScene(folder / "case.xml")); });
+  };
+  EXPECT_EQ(skinWith(""), "");
+  EXPECT_EQ(skinWith("<fix sphere='-0.05 -0.07 0.02 0.012'/>"), few + ":5: " + noSkin);
   EXPECT_EQ(refusal("<load box='5 5 5 6 6 6' force='1 0 0'/>"),
             "case.xml:4: no surface node of body \"pear\" lies in here");
   EXPECT_EQ(refusal("<links box='5 5 5 6 6 6' flexion='2'/>"),

@@ -1,6 +1,7 @@
 #include "app/picture_outputs.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "render/image.h"
 #include "tests/own_scene.h"
@@ -120,6 +121,8 @@ TEST_F(Outputs, TwoRunsDoNotDrawTheSamePicturesAtOnce) {
   expectRefused(render({"--size", "64x48", "-o", "frames"}), "another run is drawing these pictures");
   EXPECT_EQ(render({"--size", "64x48", "--frames", "1:3", "-o", "frames"}).exitCode, 0);
   first.finish();
+  EXPECT_FALSE(fs::exists(folder / "frames/00000.png"));
+  first.commit();
   EXPECT_TRUE(fs::exists(folder / "frames/00000.png"));
   EXPECT_TRUE(fs::exists(folder / "frames/00002.png"));
 }
@@ -145,6 +148,9 @@ TEST_F(Outputs, AShorterRunLeavesNoPicturesOfALongerOne) {
   for (const auto& entry : fs::directory_iterator(folder / "frames")) left += entry.exists();
   EXPECT_EQ(left, 6 + 6 + 1);
   EXPECT_FALSE(fs::exists(folder / "frames/00006.png"));
+  EXPECT_EQ(render(shorter).err, "");
+
+  ASSERT_EQ(mkfifo((folder / "frames/00006.png").c_str(), 0600), 0);  // which nobody will ever write into
   EXPECT_EQ(render(shorter).err, "");
 }
 
@@ -268,6 +274,19 @@ TEST_F(Outputs, ALinkIsFollowedAndStays) {
   }
 }
 
+TEST_F(Outputs, TwoOutputsThatLinksLeadToOnePlaceAreRefused) {
+  fs::create_symlink("b.csv", folder / "a.csv");  // where nothing is yet
+  expectRefused(run({"replay", "own/organ.xml", "--log", "a.csv", "--record", "b.csv"}), "named for two outputs");
+}
+
+TEST_F(Outputs, WhoMayReadAFileMayReadItsSuccessor) {
+  folder.write("a.csv", "earlier");
+  fs::permissions(folder / "a.csv", fs::perms::owner_read | fs::perms::owner_write);
+  ASSERT_EQ(run({"replay", "own/organ.xml", "--log", "a.csv"}).exitCode, 0);
+  EXPECT_NE(read("a.csv"), "earlier");
+  EXPECT_EQ(fs::status(folder / "a.csv").permissions(), fs::perms::owner_read | fs::perms::owner_write);
+}
+
 TEST_F(Outputs, AFullDiskStopsTheRunAndLeavesNothing) {
   ProgramOptions full;
   full.fileSizeLimit = 1000;
@@ -302,6 +321,18 @@ TEST_F(Outputs, OfARunThatOneFileHasNoRoomForNoneAppears) {
   full.fileSizeLimit = surface - 1;
   expectRefused(run({words.begin(), words.end() - 2}, full), "a.obj: cannot be written: File too large");
   EXPECT_TRUE(contents().empty()) << contents()[0];
+}
+
+TEST_F(Outputs, OfSeveralFilmsThatOneHasNoRoomForEarlierOnesStay) {
+  const std::vector<std::string> words{"--size", "96x64", "-o", "a.mp4", "-o", "frames", "-o", "a.webm"};
+  ASSERT_EQ(render(words).exitCode, 0);
+  const long film = static_cast<long>(fs::file_size(folder / "a.mp4")),
+             other = static_cast<long>(fs::file_size(folder / "a.webm"));
+  for (const char* name : {"a.mp4", "a.webm", "frames/00003.png"}) folder.write(name, "earlier");
+  ProgramOptions full;
+  full.fileSizeLimit = std::max(film, other) - 1;
+  expectRefused(render(words, full), std::string(film > other ? "a.mp4" : "a.webm") + ": cannot be written");
+  for (const char* name : {"a.mp4", "a.webm", "frames/00003.png"}) EXPECT_EQ(read(name), "earlier") << name;
 }
 
 TEST_F(Outputs, WithoutAnyContextTheReasonsAreSaid) {

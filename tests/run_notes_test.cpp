@@ -328,8 +328,12 @@ TEST_F(RunNotes, LoadsThatDoNothing) {
   };
   const std::string end = "<fix sphere='-0.0525 -0.0385 0.02 0.012'/>",
                     load = "<load sphere='-0.0525 -0.0385 0.02 0.012' force='0 0 -0.1'";
-  EXPECT_EQ(notesOf(fix + load + "/>"), Notes{});
-  EXPECT_EQ(notesOf(end + load + "/>"), Notes{"note: every load on body 'organ' acts where it is held"});
+  EXPECT_EQ(notesOf(fix + load + " to='0.4'/>"), Notes{});
+  EXPECT_EQ(notesOf(fix + load + "/>"),
+            Notes{"note: a load on body 'organ' grows until 1 s, and the scene ends at 0.48 s, at 48 % of it"});
+  const std::string elsewhere = "<load sphere='-0.06 -0.07 0.02 0.03' force='0 0 -0.1' to='0.4'/>";
+  EXPECT_EQ(notesOf(end + load + " to='0.4'/>" + elsewhere).size(), 1u);
+  EXPECT_EQ(notesOf(end + load + " to='0.4'/>"), Notes{"note: a load on body 'organ' acts where it is held"});
   EXPECT_EQ(notesOf(fix + load + " from='0.48' to='1'/>"),
             Notes{"note: a load on body 'organ' begins at 0.48 s, and the scene ends at 0.48 s"});
 }

@@ -287,8 +287,7 @@ TEST_F(SceneFile, WrongValuesOfTimesDynamicsAndBodiesNameTheLineAndWhatWasExpect
       {"sleep_after=\"0.5\"", "sleep_after=\"-1\"", R"(x.xml:5: <dynamics> sleep_after="-1": expected 1 number >= 0)"},
       {"\"implicit\"", "\"mixed\"", R"(x.xml:5: <dynamics> integrator="mixed": expected one of explicit, implicit)"},
       {"order=\"2\"", "order=\"3\"", R"(x.xml:5: <dynamics> order="3": expected one of 1, 2)"},
-      {"\"implicit\"", "\"explicit\"",
-       R"(x.xml:5: <dynamics> order="2": expected 1 with integrator="explicit": order 2 needs integrator="implicit")"},
+      {"\"implicit\"", "\"explicit\"", R"(x.xml:5: <dynamics> order="2": order="2" needs integrator="implicit")"},
       {"substeps=\"16\"", "substeps=\"1.5\"",
        R"(x.xml:5: <dynamics> substeps="1.5": expected 1 integer >= 0 and <= 1e+05)"},
       {"\"swept\"", "\"cones\"",
@@ -299,6 +298,9 @@ TEST_F(SceneFile, WrongValuesOfTimesDynamicsAndBodiesNameTheLineAndWhatWasExpect
       {"names=\"second\"", "names=\"second gallbladder\"",
        R"(x.xml:14: <neighbours> names="second gallbladder": a body is no neighbour of itself)"},
       {"names=\"second\"", "names=\"\"", R"(x.xml:14: <neighbours> names="": is empty)"},
+      {"look=\"fat\" contact=\"false\"", "look=\"fat\" contact=\"false\" friction=\"1\"",
+       R"(x.xml:17: <static> friction="1": friction needs contact="true")"},
+      {"names=\"second\"", "names=\" \"", R"(x.xml:14: <neighbours> names=" ": expected names of bodies)"},
       {"servo=\"1000\"", "servo=\"1001\"",
        R"(x.xml:4: <clock> servo="1001": expected the servo rate to be a multiple of the dynamics rate)"},
       {"settle=\"2\"", "settle=\"61\"", R"(x.xml:4: <clock> settle="61": expected 1 number >= 0 and <= 60)"},
@@ -381,7 +383,7 @@ TEST_F(SceneFile, WrongValuesOfThePictureLikewise) {
        R"(x.xml:20: <camera> position="0 0 0.2": position and target are the same point)"},
       {"endoscope=\"false\"", "endoscope=\"no\"", R"(x.xml:20: <camera> endoscope="no": expected true or false)"},
       {"intensity=\"1.5\"", "offset=\"1 0 0\"",
-       R"(x.xml:24: <light> offset="1 0 0": the light has a position in the world, expected one of the two)"},
+       R"(x.xml:24: <light> offset="1 0 0": expected one of offset, from the lens, and position, in the world)"},
       {"position=\"0.01 0 0.01\"", "", R"(x.xml:24: <light> caustics="0.5": expected a light with a position)"},
       {"haze=\"0.1 0.2 0.3\"", "", R"(x.xml:24: <light> haze_distance="4": expected a haze beside it)"},
       {"haze=\"0.1 0.2 0.3\"", "haze=\"0.1 0.2 -1\"",
@@ -397,12 +399,20 @@ TEST_F(SceneFile, WrongValuesOfThePictureLikewise) {
   });
 }
 
+TEST_F(SceneFile, AValueMayGoOnInTheNextLine) {
+  const Scene s = read(edited("pressed &amp; held", "pressed &amp;\nheld"));
+  ASSERT_FALSE(s.captions.empty());
+  EXPECT_EQ(s.captions[0].text, "pressed & held");
+}
+
 TEST_F(SceneFile, FilesThatAreNoScenes) {
   EXPECT_EQ(complaint(""), "x.xml: broken XML: the file is empty");
   EXPECT_EQ(complaint("t[s],x[m]\n"), "x.xml: is no XML: expected a file that begins with <");
   EXPECT_EQ(complaint("<model version='1'/>"), "x.xml:1: the root element is <model>, expected <scene>");
   EXPECT_EQ(complaint("\n<scene name='a'>\n<clock duration=1/></scene>"),
             "x.xml:3: broken XML: an attribute is not of the form name=\"value\", or stands twice");
+  EXPECT_EQ(complaint("<!DOCTYPE scene [ <!ENTITY e '0.2'> ]>\n<scene name='a'/>").substr(5),
+            ":1: declarations within a DOCTYPE are not understood");
   EXPECT_EQ(complaint(std::string("<scene\0/>", 9)), "x.xml: holds a zero byte, expected XML text");
   EXPECT_EQ(complaint("<scene>\n<!-- gr\xf6\xdf -->"), "x.xml:2: holds the byte 0xF6, expected UTF-8 or ASCII");
   EXPECT_EQ(complaint("<scene/>\n<!--\xc3"), "x.xml:2: ends within a letter, expected UTF-8 or ASCII");

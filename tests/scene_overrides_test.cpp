@@ -39,6 +39,19 @@ TEST_F(SceneOverrides, AShorterRunDropsTheGoldenTimesBeyondIt) {
   EXPECT_EQ(read(completeScene, {{"clock.duration", "3.5"}}).goldenTimes, (std::vector<double>{0.5, 3}));
 }
 
+TEST_F(SceneOverrides, AnotherRateMayMakeOnePictureOfTwoGoldenMoments) {
+  EXPECT_EQ(read(edited("golden=\"0.5 3 7\"", "golden=\"0.5 0.6\""), {{"output.fps", "1"}}).goldenTimes.size(), 2u);
+}
+
+TEST_F(SceneOverrides, OfValuesThatContradictEachOtherTheOverrideIsToBlame) {
+  const auto set = [&](const char* path, const char* value) { return complaint(completeScene, {{path, value}}); };
+  EXPECT_EQ(set("dynamics.integrator", "explicit"),
+            "--set dynamics.integrator: <dynamics> integrator=\"explicit\": order=\"2\" needs integrator=\"implicit\"");
+  EXPECT_TRUE(
+      set("clock.dynamics", "70").starts_with("--set clock.dynamics: <clock> dynamics=\"70\": expected the servo"));
+  EXPECT_TRUE(set("light.offset", "0 0 0").starts_with("--set light.offset: "));
+}
+
 TEST_F(SceneOverrides, MistakesInOverridesNameTheOverride) {
   const auto set = [&](const char* path, const char* value) { return complaint(completeScene, {{path, value}}); };
   EXPECT_EQ(

@@ -177,6 +177,29 @@ TEST_F(CacheOfScene, OfAnotherMotionItIsRefusedOfAnotherPictureNot) {
   EXPECT_FALSE(std::filesystem::exists(folder / "x"));
 }
 
+// The vertices of a glTF mesh lie in a file that the scene does not name.
+TEST_F(CacheOfScene, VerticesThatAMeshFileNamesCount) {
+  const auto writeVertices = [&](float height) {
+    const float p[12] = {0, 0, 0, 0.01F, 0, 0, 0, 0.01F, 0, 0, 0, height};
+    const std::uint16_t t[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+    folder.write("own/a.bin", std::string(reinterpret_cast<const char*>(p), sizeof p) +
+                                  std::string(reinterpret_cast<const char*>(t), sizeof t));
+  };
+  folder.write("own/a.gltf", R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"buffers":[{"uri":"a.bin","byteLength":72}],
+"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":24}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[0.01,0.01,0.01]},
+{"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}]})");
+  std::string scene = read("own/organ.xml");
+  scene.insert(scene.find("<tool"), R"(<static shape="mesh" mesh="a.gltf" look="wall" position="0 1 0"/>)");
+  folder.write("own/organ.xml", scene);
+  writeVertices(0.01F);
+  ASSERT_EQ(run({"replay", "own/organ.xml", "--cache", "organ.cache"}).err, "");
+  ASSERT_EQ(render({"--frames", "0:1", "-o", "x"}).err, "");
+  writeVertices(0.02F);
+  expectRefused(render({"--frames", "0:1", "-o", "x"}), "organ.cache: is of another scene or stale");
+}
+
 // The strip chart shows the force of every tick, which no picture holds.
 TEST_F(CacheOfScene, HelpNamesWhatItCannotShow) {
   expectRefused(render({"--show", "force", "-o", "x"}), "--show force: nothing is simulated, and a cache has pictures",
@@ -194,6 +217,7 @@ TEST_F(CacheOfScene, HelpNamesWhatItCannotShow) {
 
 TEST_F(CacheOfScene, CompareNamesTheFirstPictureAndFieldThatDiffer) {
   EXPECT_EQ(run({"compare", "organ.cache", "organ.cache"}).out, "equal yes\npictures 12\n");
+  expectRefused(run({"compare", "organ.cache", "none.cache"}), "none.cache: cannot be opened");
   const auto replay = [&](const std::string& set) {
     ASSERT_EQ(run({"replay", "own/organ.xml", "--cache", "other.cache", "--set", set}).exitCode, 0);
   };

@@ -68,6 +68,7 @@ TEST_F(VideoWriterTest, FilmHasEveryPictureRightColoursAndTags) {
     for (int k = 0; k < 20; ++k) writer.write(flat(64, 32, 200, 60, 40));
     EXPECT_FALSE(fs::exists(path("a.mp4")));
     writer.finish();
+    writer.commit();
   }
   ASSERT_TRUE(fs::exists(path("a.mp4")));
   EXPECT_EQ(filesInFolder(), 1u);
@@ -88,6 +89,7 @@ TEST_F(VideoWriterTest, EveryKindOfVideoHasEveryPicture) {
     VideoWriter writer(path(name), 64, 32, 25);
     for (int k = 0; k < 10; ++k) writer.write(flat(64, 32, std::uint8_t(200 - 8 * k), 60, 40));
     writer.finish();
+    writer.commit();
     EXPECT_GT(fs::file_size(path(name)), 100u) << name;
   }
   EXPECT_EQ(filesInFolder(), 3u);
@@ -124,6 +126,7 @@ TEST_F(VideoWriterTest, TheSamePicturesMakeTheSameBytes) {
         writer.write(noise);
       }
       writer.finish();
+      writer.commit();
       return readFile(path(name + kind));
     };
     const std::string first = bytes("first");
@@ -135,7 +138,9 @@ TEST_F(VideoWriterTest, TheSamePicturesMakeTheSameBytes) {
 TEST_F(VideoWriterTest, WhatAKindCannotHoldIsRefused) {
   EXPECT_EQ(complaintOf([&] { VideoWriter(path("a.mp4"), 65, 32, 30); }),
             path("a.mp4") + ": a video of 65x32 pixels, expected even numbers");
-  EXPECT_NE(complaintOf([&] { VideoWriter(path("a.gif"), 64, 32, 60); }).find("more than 50"), std::string::npos);
+  EXPECT_EQ(complaintOf([&] { VideoWriter(path("a.gif"), 64, 32, 60); }),
+            path("a.gif") + ": more than 50 pictures per second, which no player shows of a .gif");
+  EXPECT_NE(complaintOf([&] { VideoWriter(path("a.webp"), 64, 32, 91); }).find("more than 90"), std::string::npos);
   EXPECT_TRUE(isVideoName("a.webm"));
   EXPECT_FALSE(isVideoName("a.png"));
   EXPECT_EQ(filesInFolder(), 0u);
@@ -184,6 +189,7 @@ TEST_F(VideoWriterTest, AFullDiskIsToldAndLeavesNothing) {
         writer.write(noise);
       }
       writer.finish();
+      writer.commit();
     });
     EXPECT_EQ(message, path(name) + ": cannot be written: File too large");
     EXPECT_EQ(filesInFolder(), 0u) << name;
@@ -196,6 +202,7 @@ TEST_F(VideoWriterTest, ADiskThatIsFullAtTheEndIsTold) {
     VideoWriter writer(path(name), 64, 32, 30);
     for (int k = 0; k < 10; ++k) writer.write(flat(64, 32, std::uint8_t(20 * k), 2, 3));
     writer.finish();
+    writer.commit();
   };
   for (const char* name : {"a.mp4", "a.webm", "a.gif", "a.webp"}) {
     write(name);
@@ -212,6 +219,7 @@ TEST_F(VideoWriterTest, ANameMayLookLikeAnAddress) {
     VideoWriter writer(path("http:a%03d.mp4"), 64, 32, 30);
     writer.write(flat(64, 32, 1, 2, 3));
     writer.finish();
+    writer.commit();
   }
   EXPECT_TRUE(fs::exists(path("http:a%03d.mp4")));
   EXPECT_EQ(filesInFolder(), 1u);

@@ -76,11 +76,10 @@ PictureOutputs::Settings outputSettings(const LoadedScene& loaded, const RenderO
 
 }  // namespace
 
-// All that touches OpenGL or files: made and ended in the thread that draws.
+// All that touches OpenGL: made and ended in the thread that draws.
 struct Artist::Desk {
   Renderer renderer;
   SceneView view;
-  PictureOutputs outputs;
   Image panel, image;
   Progress progress;
   int done = 0;
@@ -88,11 +87,9 @@ struct Artist::Desk {
   int ahead = 0;            // panels begun and not taken
   int taken = 0;            // panels of the oldest picture
 
-  Desk(const LoadedScene& loaded, const RenderOptions& options, int first, int count, int width,
-       const DynamicsFrame& rest)
+  Desk(const LoadedScene& loaded, const RenderOptions& options, int count, int width, const DynamicsFrame& rest)
       : renderer(rendererSettings(width, loaded.scene.height, options.context, options.quality)),
         view(loaded, rest, renderer),
-        outputs(options.outputs, outputSettings(loaded, options, first, count, renderer.description())),
         image(blackImage(loaded.scene.width, loaded.scene.height)),
         progress("render", static_cast<double>(count), "pictures") {}
 };
@@ -123,7 +120,9 @@ Artist::~Artist() {
 void Artist::work(const DynamicsFrame& rest, std::promise<void> ready) {
   try {
     times_.start("start drawing");
-    desk_ = std::make_unique<Desk>(*loaded_, *options_, first_, count_, panelWidth_, rest);
+    desk_ = std::make_unique<Desk>(*loaded_, *options_, count_, panelWidth_, rest);
+    outputs_.emplace(options_->outputs,
+                     outputSettings(*loaded_, *options_, first_, count_, desk_->renderer.description()));
   } catch (...) {
     ready.set_exception(std::current_exception());
     return;
@@ -161,10 +160,9 @@ void Artist::drawAll() {
   while (desk_->ahead > 0) takePanel();
   checkInterrupt();
   times_.start("end files");
-  desk_->outputs.finish();
+  outputs_->finish();
   times_.stop();
-  encoding_ = desk_->outputs.encoding();
-  notes_ = desk_->outputs.notes();
+  encoding_ = outputs_->encoding();
 }
 
 void Artist::takePanel() {
@@ -181,7 +179,7 @@ void Artist::takePanel() {
   if (sheet.chart) drawStripChart(*sheet.chart, desk.image);
   if (!sheet.caption.empty() && !drawCaption(sheet.caption, panelWidth_, desk.image)) ++withoutCaption_;
   times_.start("hand over");
-  desk.outputs.write(sheet.number, desk.image);
+  outputs_->write(sheet.number, desk.image);
   ++drawn_;
   giveBack(std::move(sheet));
 }
@@ -197,7 +195,7 @@ void Artist::draw(int number, const PictureState& state, ForceView* forces, Stag
   Sheet sheet = sheets_.take();
   times.start("compose");
   sheet.number = number;
-  sheet.needed = !desk_->outputs.has(number);
+  sheet.needed = !outputs_->has(number);
   if (forces != nullptr) sheet.chart = forces->chart(state);
   if (options_->view.shown.caption) sheet.caption = captionAt(loaded_->scene, state.time);
   sheet.panels.resize(options_->view.panels.size());
@@ -218,7 +216,10 @@ void Artist::finish() {
   sheets_.rethrow();
   if (drawn_ > 0 && !sawBody_) tell("note: no body is in sight of the camera in any picture\n");
   if (withoutCaption_ > 0) tell("note: {} of {} pictures are too small for their caption\n", withoutCaption_, drawn_);
-  for (const std::string& note : notes_) tell("note: {}\n", note);  // now that no bar is in the way
+}
+
+void Artist::commit() {
+  for (const std::string& note : outputs_->commit()) tell("note: {}\n", note);
 }
 
 }  // namespace medulla

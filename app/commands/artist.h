@@ -29,7 +29,8 @@ class Artist {
   // Composes the picture of a state and queues it; waits while two are ahead. Throws what went wrong with earlier ones.
   // `forces`: to be shown; may be nullptr.
   void draw(int number, const PictureState& state, ForceView* forces, StageTimes& times);
-  void finish();  // waits for the last, and closes the files
+  void finish();  // waits for the last, and writes the files to their ends
+  void commit();  // then: they appear under their names
 
   // After finish().
   int drawn() const { return drawn_; }  // without those taken over from an earlier run
@@ -56,10 +57,10 @@ class Artist {
   const RenderOptions* options_;
   int first_, count_, panelWidth_;  // panelWidth_: px
   BoundedBuffer<Sheet> sheets_;
-  std::unique_ptr<Desk> desk_;  // the thread's; the caller composes with it
+  std::unique_ptr<Desk> desk_;             // the thread's; the caller composes with it
+  std::optional<PictureOutputs> outputs_;  // the thread's until finish()
   int drawn_ = 0, withoutCaption_ = 0;
   StageTimes::Stage encoding_;
-  std::vector<std::string> notes_;
   bool sawBody_ = false;
   StageTimes times_;
   std::thread thread_;

@@ -6,6 +6,7 @@
 #include "app/commands/commands.h"
 #include "app/files/log_table.h"
 #include "app/files/state_cache.h"
+#include "app/files/text_file.h"
 #include "app/interrupt.h"
 #include "app/standard_streams.h"
 #include "app/tool_fields.h"
@@ -192,9 +193,11 @@ int compareLogs(const CompareOptions& options) {
 
 int runCompare(const CompareOptions& options) {
   const bool cacheA = isCache(options.a), cacheB = isCache(options.b);
-  if (cacheA != cacheB)
-    throw std::runtime_error(fmt::format("{} is a state cache, {} is none: expected two of a kind",
-                                         cacheA ? options.a : options.b, cacheA ? options.b : options.a));
+  if (cacheA != cacheB) {
+    const std::string &cache = cacheA ? options.a : options.b, &other = cacheA ? options.b : options.a;
+    readBytes(other);  // says so where it cannot be read
+    throw std::runtime_error(fmt::format("{} is a state cache, {} is none: expected two of a kind", cache, other));
+  }
   return cacheA ? compareCaches(options) : compareLogs(options);
 }
 

@@ -238,6 +238,7 @@ std::vector<Result> resultsOf(const InfoOptions& options) {
   if (isMeshFile(options.path)) return meshResults(options.path, options.unit);
   if (isCache(options.path)) return cacheResults(options.path);
   const std::string content = readTextFile(options.path);
+  if (trimmed(content).empty()) throw inputError(options.path, 0, "is empty, expected a scene, a model or a table");
   return beginsAsXml(content) ? xmlResults(options.path) : tableResults(options.path, content);
 }
 

@@ -139,6 +139,7 @@ void renderCache(const LoadedScene& loaded, const RenderOptions& options, const 
   }
   times.start("wait");
   artist.finish();
+  artist.commit();
   times.stop();
   if (options.timings) printTimings(timings, artist, wanted.count());
   printFiles(options, artist, wallSeconds() - start);
@@ -167,6 +168,7 @@ void renderRun(const LoadedScene& loaded, const RenderOptions& options, const Wa
     artist.finish();
     times.stop();
   };
+  hooks.commit = [&] { artist.commit(); };
   const std::vector<Result> forces = runToEnd(loaded, options.run, simulation, hooks);
   const double wall = wallSeconds() - start;
   if (options.timings) printTimings(timings, artist, wanted.count());

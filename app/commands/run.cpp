@@ -56,6 +56,8 @@ std::map<std::string, std::string> filesOfTools(const std::string& option, const
 
 LoadedScene loadRun(const RunOptions& options) {
   Scene scene = readScene(options.scene, options.overrides);
+  // What sleeps lies still within a hundredth of its radius, maybe in mid-swing: rest is asked for closer.
+  if (options.untilRest) scene.dynamics.sleepAfter = 0;
   const auto trajectories = filesOfTools("--trajectory", scene, options.trajectories);
   return loadScene(std::move(scene), trajectories);
 }
@@ -98,6 +100,7 @@ std::vector<Result> runToEnd(const LoadedScene& loaded, const RunOptions& option
   recorders.finish(simulation);
   if (hooks.finish) hooks.finish();
   recorders.commit(simulation);
+  if (hooks.commit) hooks.commit();
   printNotes(loaded, simulation.totals(), simulation.world());
   return recorders.forceResults();
 }

@@ -93,6 +93,7 @@ struct RunHooks {
   // When records, log and surfaces are written, before they appear under their names: what fails here leaves those as
   // they were, and a disk that is full for them keeps this from being called.
   std::function<void()> finish;
+  std::function<void()> commit;  // when all have been written and nothing but renaming is left
 };
 
 // Runs the simulation to its end. Until rest: as RestWatch finds it; surfaces asked for at a later time are those at

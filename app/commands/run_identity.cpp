@@ -7,6 +7,7 @@
 #include "app/files/text_file.h"
 #include "app/motion_sources.h"
 #include "physics/content_hash.h"
+#include "physics/model/build.h"
 
 // What a run reads and writes, and what tells it from others.
 namespace medulla {
@@ -42,11 +43,13 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
   requireDistinctFiles(outputs, inputFiles(loaded.scene));
 }
 
-// The scene counts by what it says, the files that it names by their bytes: where they lie does not matter.
+// The scene counts by what it says, the files that it names by their bytes: where they lie does not matter. Meshes
+// count by what was read, too: those of glTF have their vertices in files that only their reader knows of.
 static std::uint64_t runHash(const LoadedScene& loaded, std::uint64_t scene) {
   std::uint64_t hash = contentHash(fmt::format("{} {} {:016x}", MEDULLA_VERSION, MEDULLA_MOTION_SOURCES, scene));
   for (const std::string& path : inputFiles(loaded.scene))
     if (path != loaded.scene.path && fileExists(path)) hash = contentHash(readBytes(path), hash);
+  for (const TriangleMesh& mesh : loaded.statics) hash = contentHash(fmt::format("{:016x}", hashMesh(mesh)), hash);
   return hash;
 }
 

@@ -117,15 +117,17 @@ static void printBuriedTools(const LoadedScene& loaded, const World& world) {
 
 static void printIdleLoads(const Scene& scene, bool isExcerpt) {
   for (const SceneBody& body : scene.bodies) {
-    const std::set<int> held(body.fixedNodes.begin(), body.fixedNodes.end());
-    if (holdsByNodes(body) && !body.deadLoads.empty() &&
-        std::all_of(body.deadLoads.begin(), body.deadLoads.end(),
-                    [&](const DeadLoad& l) { return held.count(l.node) > 0; }))
-      tell("note: every load on body '{}' acts where it is held\n", body.name);
-    for (const SceneLoad& load : body.loads)
-      if (load.whole.from >= scene.duration && !isShortened(scene, isExcerpt))
-        tell("note: a load on body '{}' begins at {:.6g} s, and the scene ends at {:.6g} s\n", body.name,
-             load.whole.from, scene.duration);
+    for (const SceneLoad& load : body.loads) {
+      const double from = load.whole.from, to = load.whole.to;
+      if (load.isIdle) tell("note: a load on body '{}' acts where it is held\n", body.name);
+      if (isShortened(scene, isExcerpt) || to <= scene.duration) continue;
+      if (from >= scene.duration)
+        tell("note: a load on body '{}' begins at {:.6g} s, and the scene ends at {:.6g} s\n", body.name, from,
+             scene.duration);
+      else
+        tell("note: a load on body '{}' grows until {:.6g} s, and the scene ends at {:.6g} s, at {:.3g} % of it\n",
+             body.name, to, scene.duration, 100 * (scene.duration - from) / (to - from));
+    }
   }
 }
 

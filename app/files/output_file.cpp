@@ -46,9 +46,10 @@ void OutputFile::commit() {
 }
 
 // Absolute first: of a path that starts with nothing that exists, weakly_canonical() leaves "a.csv" and "./a.csv" two.
+// Behind its link: weakly_canonical() leaves one alone that stands for nothing yet.
 std::filesystem::path placeOf(const std::string& path) {
   std::error_code error;
-  const std::filesystem::path absolute = std::filesystem::absolute(path, error);
+  const std::filesystem::path absolute = std::filesystem::absolute(behindLink(path), error);
   std::filesystem::path place = std::filesystem::weakly_canonical(absolute, error);
   if (error) place = path;
   return place.has_filename() ? place : place.parent_path();

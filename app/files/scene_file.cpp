@@ -48,16 +48,28 @@ std::string readUniqueName(const XmlElement& element, std::set<std::string>& tak
   return name;
 }
 
+// Of attributes that do not go together, at least one of which is there: what the command line put there, else the
+// first.
+std::string culprit(const XmlElement& e, std::initializer_list<const char*> attributes) {
+  std::string first;
+  for (const char* name : attributes) {
+    const XmlAttribute* a = e.find(name);
+    if (a != nullptr && a->where.starts_with("--set")) return name;
+    if (a != nullptr && first.empty()) first = name;
+  }
+  return first;
+}
+
 void readClock(const XmlElement& clock, Scene& scene) {
   scene.duration = readNumber(clock, "duration", scene.duration, {0, 86400, true, false});
   scene.dynamicsRate = readNumber(clock, "dynamics", scene.dynamicsRate, {20, 1200});
   const double settle = readNumber(clock, "settle", 0, {0, 60});  // s
   scene.dynamics.frameDuration = 1 / scene.dynamicsRate;
-  scene.dynamics.settleFrames = static_cast<int>(std::lround(settle * scene.dynamicsRate));
+  scene.dynamics.settleFrames = static_cast<int>(std::ceil(settle * scene.dynamicsRate - 1e-9));
   scene.servoRate = readNumber(clock, "servo", scene.servoRate, {20, 20000});
   const double ratio = scene.servoRate / scene.dynamicsRate;
   if (ratio < 1 || std::abs(ratio - std::round(ratio)) > 1e-9 * ratio) {
-    refuse(clock, clock.find("servo") ? "servo" : "dynamics",
+    refuse(clock, culprit(clock, {"servo", "dynamics"}),
            "expected the servo rate to be a multiple of the dynamics rate");
   }
 }
@@ -66,8 +78,8 @@ void readDynamics(const XmlElement& dynamics, WorldSettings& out) {
   out.integrator = readEnum(dynamics, "integrator", out.integrator);
   out.order = 1 + readChoice(dynamics, "order", {"1", "2"}, 0);
   if (out.order == 2 && out.integrator != Integrator::implicit)
-    refuse(dynamics, "order", "expected 1 with integrator=\"explicit\": order 2 needs integrator=\"implicit\"");
-  out.gravity = readVector(dynamics, "gravity", out.gravity);
+    refuse(dynamics, culprit(dynamics, {"order", "integrator"}), "order=\"2\" needs integrator=\"implicit\"");
+  out.gravity = readVector(dynamics, "gravity", out.gravity, kAnyForce);
   out.ambientDrag = readNumber(dynamics, "ambient_drag", out.ambientDrag, kNotNegative);
   out.sleepAfter = readNumber(dynamics, "sleep_after", out.sleepAfter, kNotNegative);
   out.substeps = readInteger(dynamics, "substeps", out.substeps, {0, kMostSubsteps});
@@ -79,6 +91,7 @@ constexpr Range kDensity{1e-6};  // kg/m3: air has 1.2, and masses that vanish d
 struct NamedTissue {
   std::string name;
   Tissue tissue;
+  int line;
 };
 
 std::vector<NamedTissue> readTissues(const XmlElement& root) {
@@ -91,16 +104,16 @@ std::vector<NamedTissue> readTissues(const XmlElement& root) {
     t.density = readNumber(*e, "density", t.density, kDensity);
     t.damping = readNumber(*e, "damping", t.damping, kNotNegative);
     t.friction = readNumber(*e, "friction", t.friction, kNotNegative);
-    out.push_back({readUniqueName(*e, taken), t});
+    out.push_back({readUniqueName(*e, taken), t, e->line});
   }
   return out;
 }
 
-Tissue findTissue(const XmlElement& body, const std::vector<NamedTissue>& tissues) {
+const NamedTissue& findTissue(const XmlElement& body, const std::vector<NamedTissue>& tissues) {
   const std::string name = readText(body, "tissue");
   std::vector<std::string> known;
   for (const NamedTissue& t : tissues) {
-    if (t.name == name) return t.tissue;
+    if (t.name == name) return t;
     known.push_back(t.name);
   }
   refuse(body, "tissue", "no <tissue> of this name; " + hintOfNames(name, known));
@@ -160,11 +173,11 @@ std::vector<SceneLoad> readLoads(const XmlElement& body, const std::string& scen
     if (fromFile) load.forcesPath = readPath(*e, "file", scenePath);
     if (fromFile && e->find("force")) refuse(*e, "force", "the file has the forces, expected one of the two");
     if (!fromFile && !e->find("force")) refuse(*e, "force", "expected the attribute \"force\"");
-    load.whole.force = readVector(*e, "force", load.whole.force);
+    load.whole.force = readVector(*e, "force", load.whole.force, kAnyForce);
     load.whole.from = readNumber(*e, "from", load.whole.from, kNotNegative);
     load.whole.to = readNumber(*e, "to", load.whole.to, kNotNegative);
     if (load.whole.to < load.whole.from)
-      refuse(*e, e->find("to") ? "to" : "from",
+      refuse(*e, culprit(*e, {"to", "from"}),
              fmt::format("the load grows from {} s to {} s, expected the earlier time first", load.whole.from,
                          load.whole.to));
     out.push_back(std::move(load));
@@ -182,7 +195,7 @@ void readDrivenSpheres(const XmlElement& body, SceneBody& out) {
     if (std::any_of(out.driven.begin(), out.driven.end(), isThis))
       refuse(*drive, "sphere", "this sphere is driven twice");
     d.axis = readVector(*drive, "axis", d.axis);
-    if (d.axis.isZero()) refuse(*drive, "axis", "expected a direction");
+    if (d.axis.isZero(0)) refuse(*drive, "axis", "expected a direction");
     d.amplitude = readNumber(*drive, "amplitude", d.amplitude, {.low = 0, .most = kAnyLength.most});
     d.frequency = readNumber(*drive, "frequency", d.frequency, {.low = 0, .lowExcluded = true, .most = kMostOfSwing});
     d.phase = readNumber(*drive, "phase", d.phase, {.most = kMostOfSwing});
@@ -219,10 +232,12 @@ void readNeighbours(const XmlElement& root, Scene& scene) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     for (const XmlElement* e : childrenOf(*bodies[b], "neighbours")) {
       std::vector<int>& out = scene.bodies[b].neighbours.emplace();
-      for (const std::string& name : readWords(*e, "names")) {
+      const std::vector<std::string> names = readWords(*e, "names");
+      if (names.empty()) refuse(*e, "names", "expected names of bodies");
+      for (const std::string& name : names) {
         const auto found = std::find(known.begin(), known.end(), name);
         if (found == known.end())
-          refuse(*e, "names", fmt::format("no <body> is named \"{}\"; {}", name, hintOfNames(name, known)));
+          refuse(*e, "names", fmt::format("no <body> is named {}; {}", inQuotes(name, '"'), hintOfNames(name, known)));
         if (name == known[b]) refuse(*e, "names", "a body is no neighbour of itself");
         out.push_back(static_cast<int>(found - known.begin()));
       }
@@ -239,7 +254,9 @@ void readBodies(const XmlElement& root, Scene& scene) {
     body.name = readUniqueName(*e, taken);
     body.modelPath = readPath(*e, "model", scene.path);
     body.look = readText(*e, "look");
-    body.tissue = findTissue(*e, tissues);
+    const NamedTissue& tissue = findTissue(*e, tissues);
+    body.tissue = tissue.tissue;
+    body.tissueLine = tissue.line;
     body.links = readEnum(*e, "links", body.links);
     body.choosesLinks = e->find("links") != nullptr;
     body.surface = readEnum(*e, "surface", body.surface);
@@ -294,6 +311,8 @@ void readStatics(const XmlElement& root, Scene& scene) {
     out.contact = readBool(*e, "contact", !mesh);
     out.look = readText(*e, "look");
     if (out.look.empty() && !out.contact) refuse(*e, "shape", "without contact and without a look it has no effect");
+    if (!out.contact && e->find("friction"))
+      refuse(*e, culprit(*e, {"friction", "contact"}), "friction needs contact=\"true\"");
     out.unit = lengthUnits()[readChoice(*e, "unit", lengthUnits(), 0)];
     scene.statics.push_back(std::move(out));
   }
@@ -359,7 +378,8 @@ void readLight(const XmlElement& light, Scene& scene) {
   scene.lightReferenceDistance =
       readNumber(light, "reference_distance", away > 0 ? away : scene.lightReferenceDistance, kAnyLength);
   if (scene.lightPosition && light.find("offset"))
-    refuse(light, "offset", "the light has a position in the world, expected one of the two");
+    refuse(light, culprit(light, {"offset", "position"}),
+           "expected one of offset, from the lens, and position, in the world");
   const std::vector<double> haze = readNumbers(light, "haze", 3, kNotNegative);
   if (!haze.empty()) scene.haze = Eigen::Vector3d(haze[0], haze[1], haze[2]);
   scene.hazeDistance = readNumber(light, "haze_distance", scene.hazeDistance, kAnyLength);
@@ -400,7 +420,7 @@ void readOutput(const XmlElement& output, Scene& scene) {
     refuse(output, "golden", "a time beyond the scene's duration");
   const std::vector<int> pictures = goldenPictures(scene);
   const auto twice = std::adjacent_find(pictures.begin(), pictures.end());
-  if (twice != pictures.end() && !durationOverridden(scene))
+  if (twice != pictures.end() && !durationOverridden(scene) && !isOverridden(scene, "output.fps"))
     refuse(output, "golden", fmt::format("two golden moments are picture {} at {:.6g} Hz", *twice, scene.fps));
   readCaptions(output, scene);
 }
@@ -434,9 +454,13 @@ std::uint64_t hashOf(const XmlElement& e, bool motionOnly, std::uint64_t hash) {
 
 }  // namespace
 
-bool durationOverridden(const Scene& scene) {
+bool isOverridden(const Scene& scene, std::string_view path) {
   return std::any_of(scene.overridden.begin(), scene.overridden.end(),
-                     [](const OverriddenAttribute& o) { return o.path == "clock.duration"; });
+                     [path](const OverriddenAttribute& o) { return o.path == path; });
+}
+
+bool durationOverridden(const Scene& scene) {
+  return isOverridden(scene, "clock.duration");
 }
 
 int pictureCount(const Scene& scene) {

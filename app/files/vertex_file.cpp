@@ -12,6 +12,7 @@
 #include "app/files/number_text.h"
 #include "app/files/text.h"
 #include "app/files/text_file.h"
+#include "app/files/xml_element.h"
 #include "physics/sort_unique.h"
 
 namespace medulla {
@@ -77,6 +78,8 @@ std::vector<DeadLoad> parseVertexForces(std::string_view text, const std::string
     DeadLoad& load = loads.emplace_back(whole);
     load.node = node;
     for (int k = 0; k < 3; ++k) load.force[k] = row.number(k + 1, kForceColumns[k + 1]);
+    if (load.force.cwiseAbs().maxCoeff() > kAnyForce.most)
+      row.fail(fmt::format("a force beyond {:g} N", kAnyForce.most));
   });
   return loads;
 }

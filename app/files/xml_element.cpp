@@ -72,8 +72,12 @@ XmlElement copyElement(const std::string& path, const tinyxml2::XMLElement& elem
   out.name = element.Name();
   out.line = element.GetLineNum();
   out.where = place(path, out.line);
-  for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next())
+  for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next()) {
     out.attributes.push_back({a->Name(), a->Value(), place(path, a->GetLineNum())});
+    // As XML has it (3.3.3): a value that goes on in the next line has a blank there.
+    for (char& c : out.attributes.back().value)
+      if (c == '\n' || c == '\t' || c == '\r') c = ' ';
+  }
   for (const tinyxml2::XMLNode* n = element.FirstChild(); n; n = n->NextSibling()) {
     if (const tinyxml2::XMLElement* child = n->ToElement()) out.children.push_back(copyElement(path, *child));
     if (const tinyxml2::XMLText* text = n->ToText()) copyText(path, *text, out);
@@ -114,7 +118,10 @@ XmlElement parseXml(const std::string& path) {
   if (!root) throw inputError(path, 0, "broken XML: no element");
   for (const tinyxml2::XMLNode* n = document.FirstChild(); n; n = n->NextSibling())
     if (n != root && (n->ToElement() || n->ToText()))
-      throw inputError(path, n->GetLineNum(), "broken XML: more than one element or text at the top");
+      throw inputError(path, n->GetLineNum(),
+                       text.find("<!ENTITY") != std::string::npos
+                           ? "declarations within a DOCTYPE are not understood"
+                           : "broken XML: more than one element or text at the top");
   return copyElement(path, *root);
 }
 

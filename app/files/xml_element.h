@@ -68,6 +68,8 @@ struct Range {
 inline constexpr Range kAnyNumber{};
 inline constexpr Range kPositive{0, std::numeric_limits<double>::infinity(), true, false};
 inline constexpr Range kNotNegative{0};
+// In newtons and m/s2: beyond what any step follows.
+inline constexpr Range kAnyForce{.most = 1e6};
 // In metres, of what is drawn and felt: both is done in single precision.
 inline constexpr Range kAnyPlace{.most = 1000};
 inline constexpr Range kAnyLength{.low = 0, .lowExcluded = true, .most = kAnyPlace.most};

@@ -22,7 +22,7 @@ std::optional<Region> makeRegion(Region::Shape shape, const std::vector<double>&
     case Region::Shape::halfSpace:
       region.normal = corner(0);
       region.distance = numbers[3];
-      holds = !region.normal.isZero();
+      holds = !region.normal.isZero(0);
       break;
   }
   return holds ? std::optional(region) : std::nullopt;

@@ -227,7 +227,8 @@ void fallAsleep(WorldData& d, const Loads& loads) {
   const auto isTired = [&](std::size_t b) {
     const double lowest = d.ranges[b].lowestFrequency;
     const double swing = lowest > 0 ? 2 * std::numbers::pi / (lowest * d.settings.frameDuration) : 0;
-    return !d.rest[b].asleep && d.rest[b].stillFrames > std::max(enough, swing);
+    // The first frame has nothing to be compared with.
+    return !d.rest[b].asleep && d.rest[b].stillFrames > std::max({1.0, enough, swing});
   };
   bool isAny = false;
   for (std::size_t b = 0; b < d.rest.size() && !isAny; ++b) isAny = isTired(b);
