@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "physics/dynamics/body_mechanics.h"
 #include "physics/dynamics/region.h"
+#include "physics/model/build.h"
 #include "tests/dynamics_states.h"
 #include "tests/synthetic_model.h"
+#include "tests/test_shapes.h"
 
 // Parts of the surface that are held, and what they hold.
 namespace medulla {
@@ -96,6 +99,31 @@ TEST(Fixation, AJaggedRimClampsABeamFartherOutInOnePlane) {
     EXPECT_NEAR(std::abs(wavy.restU.dot(high)), alongU ? 1 : 0, 1e-9);
     EXPECT_NEAR(freeLength(alongU ? wavy.flexionV : wavy.flexionU, ei), length - 0.4 * kWave, 1e-9);
     EXPECT_NEAR(freeLength(alongU ? wavy.flexionU : wavy.flexionV, ei), length + 0.4 * kWave, 1e-9);
+  }
+}
+
+// Wherever the spheres happen to lie: of seven to ten the part of the rim that hangs on the first free link or its
+// held sphere is half of it to all.
+TEST(Fixation, ARegionAcrossALinkHoldsItWhereItsWholeRimLies) {
+  constexpr double kFiniteElements = 0.848;  // Hz, of models of 7 and 14 spheres that these identified, and mirrored
+  Region ball;
+  ball.shape = Region::Shape::ball;
+  ball.centre = {-0.025, -0.008, -0.017};
+  ball.radius = 0.016;
+  for (const int spheres : {7, 8, 9, 10}) {
+    BuildSettings settings;
+    settings.spheres = spheres;
+    BuildReport report;
+    BodyDescription b;
+    b.tissue.young = 9e3;
+    b.tissue.poisson = 0.45;
+    b.tissue.density = 1060;
+    b.model = std::make_shared<const SoftBodyModel>(
+        buildModel(repairMesh(assetMesh("gallbladder/gallbladder.obj")), nullptr, settings, report));
+    b.fixedNodes = nodesInRegion(*b.model, ball);
+    for (const int sphere : spheresHeldBy(*b.model, b.fixedNodes)) b.fixed.push_back({sphere});
+    const World world({}, {b});
+    EXPECT_NEAR(world.lowestFrequency(0) / (2 * std::numbers::pi), kFiniteElements, 0.12 * kFiniteElements) << spheres;
   }
 }
 

@@ -6,10 +6,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
 
+#include "physics/model/disjoint_sets.h"
 #include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
@@ -20,22 +22,59 @@ using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Nodes that are fixed and have a neighbour that is not.
-std::vector<bool> rimOfFixed(const BodyDescription& body) {
+// Nodes that are fixed and have a neighbour that is not, by what of the rim hangs together.
+using Rims = std::vector<std::vector<int>>;
+Rims rimsOfFixed(const BodyDescription& body) {
   const SoftBodyModel& m = *body.model;
-  std::vector<bool> fixed(m.restNodes.size(), false), rim = fixed;
-  for (const int node : body.fixedNodes) fixed[node] = true;
+  std::vector<char> fixed(m.restNodes.size(), 0), rim = fixed;
+  for (const int node : body.fixedNodes) fixed[node] = 1;
   for (const auto& [a, b] : m.edges)
-    if (fixed[a] != fixed[b]) rim[fixed[a] ? a : b] = true;
-  return rim;
+    if (fixed[a] != fixed[b]) rim[fixed[a] ? a : b] = 1;
+  DisjointSets together(rim.size());
+  for (const auto& [a, b] : m.edges)
+    if (rim[a] && rim[b]) together.join(a, b);
+  std::map<int, std::vector<int>> byFirst;
+  for (std::size_t i = 0; i < rim.size(); ++i)
+    if (rim[i]) byFirst[together.of(static_cast<int>(i))].push_back(static_cast<int>(i));
+  Rims out;
+  for (auto& [first, nodes] : byFirst) out.push_back(std::move(nodes));
+  return out;
 }
 
-// The rim's nodes that hang on a link or on its held sphere.
-std::vector<Vector3d> rimAround(const SoftBodyModel& m, const std::vector<bool>& rim, int link, int sphere) {
-  std::vector<Vector3d> out;
-  for (std::size_t i = 0; i < rim.size(); ++i) {
-    const Attachment& a = m.attachments[i];
-    if (rim[i] && a.host == (a.onLink ? link : sphere)) out.push_back(m.restNodes[i]);
+// A link that leaves what is held.
+struct Crossing {
+  int link, heldSphere;
+};
+
+struct Rim {
+  std::vector<Vector3d> nodes;
+  bool isShared = false;  // by several links
+};
+
+// The rim that a link leaves through: that of which some nodes hang on it or on its held sphere. It counts whole: how
+// much of it hangs there is as spheres happen to lie, and some of its nodes tell how it leans, not where it is. (Of a
+// gallbladder of nine spheres half a rim hung there, its mean a third of the link off: 70 % too stiff.) Where several
+// links share a rim each has what hangs there: whole, it bends a liver of 35 spheres nearer (14.3 for 14.7 % at most)
+// and a gallbladder of 25, whose neck is held, less near (6.9 for 6.0).
+Rim rimAround(const SoftBodyModel& m, const Rims& rims, const std::vector<Crossing>& crossings, int link) {
+  const auto hangsOn = [&](const Crossing& c) {
+    return [&m, &c](int node) {
+      const Attachment& a = m.attachments[node];
+      return a.host == (a.onLink ? c.link : c.heldSphere);
+    };
+  };
+  Rim out;
+  for (const std::vector<int>& rim : rims) {
+    std::vector<const Crossing*> through;
+    for (const Crossing& c : crossings)
+      if (std::any_of(rim.begin(), rim.end(), hangsOn(c))) through.push_back(&c);
+    const auto own =
+        std::find_if(through.begin(), through.end(), [link](const Crossing* c) { return c->link == link; });
+    if (own == through.end()) continue;
+    const bool isShared = through.size() > 1;
+    out.isShared = out.isShared || isShared;
+    for (const int node : rim)
+      if (!isShared || hangsOn(**own)(node)) out.nodes.push_back(m.restNodes[node]);
   }
   return out;
 }
@@ -43,12 +82,12 @@ std::vector<Vector3d> rimAround(const SoftBodyModel& m, const std::vector<bool>&
 // How far along the link, as a share from `end` on, the surface around a held sphere is fixed: the mean of the rim,
 // 0 where that lies behind the link. Nothing where no rim hangs there: a sphere that is held by its number holds no
 // section.
-std::optional<double> fixedShare(const std::vector<Vector3d>& rim, const Vector3d& end, const Vector3d& line) {
-  constexpr double kMost = 0.5;
-  if (rim.empty()) return {};
+std::optional<double> fixedShare(const Rim& rim, const Vector3d& end, const Vector3d& line) {
+  const double most = rim.isShared ? 0.5 : 0.9;
+  if (rim.nodes.empty()) return {};
   double sum = 0;
-  for (const Vector3d& node : rim) sum += (node - end).dot(line) / line.squaredNorm();
-  return std::clamp(sum / static_cast<double>(rim.size()), 0.0, kMost);
+  for (const Vector3d& node : rim.nodes) sum += (node - end).dot(line) / line.squaredNorm();
+  return std::clamp(sum / static_cast<double>(rim.nodes.size()), 0.0, most);
 }
 
 struct SectionAxes {
@@ -242,8 +281,14 @@ std::vector<Vector3d> linkMiddles(const BodyDescription& body) {
 std::vector<LinkSpan> linkSpans(const BodyDescription& body, const std::vector<bool>& moves,
                                 const std::vector<bool>& turns) {
   const SoftBodyModel& m = *body.model;
-  const std::vector<bool> rim = rimOfFixed(body);
+  const Rims rims = rimsOfFixed(body);
   const auto isHeld = [&](int sphere) { return !moves[sphere] && !turns[sphere]; };
+  std::vector<Crossing> crossings;
+  for (std::size_t k = 0; k < m.links.size(); ++k) {
+    const ElasticLink& l = m.links[k];
+    if (isHeld(l.sphere0) != isHeld(l.sphere1))
+      crossings.push_back({static_cast<int>(k), isHeld(l.sphere0) ? l.sphere0 : l.sphere1});
+  }
   std::vector<LinkSpan> out;
   for (std::size_t k = 0; k < m.links.size(); ++k) {
     const ElasticLink& l = m.links[k];
@@ -254,14 +299,14 @@ std::vector<LinkSpan> linkSpans(const BodyDescription& body, const std::vector<b
     LinkSpan span;
     if (isHeld(l.sphere0) != isHeld(l.sphere1)) {
       const bool first = isHeld(l.sphere0);
-      const std::vector<Vector3d> around = rimAround(m, rim, static_cast<int>(k), first ? l.sphere0 : l.sphere1);
+      const Rim around = rimAround(m, rims, crossings, static_cast<int>(k));
       const std::optional<double> share =
           first ? fixedShare(around, end0, line) : fixedShare(around, end0 + line, -line);
       (first ? span.clamped0 : span.clamped1) = share.has_value();
       if (first) span.from = share.value_or(0);
       if (!first) span.to = 1 - share.value_or(0);
       const SectionAxes axes = axesOf(line, l.restU);
-      span.beyond = beyondRim(around, first ? -axes.t : axes.t, axes, (span.to - span.from) * line.norm());
+      span.beyond = beyondRim(around.nodes, first ? -axes.t : axes.t, axes, (span.to - span.from) * line.norm());
     }
     span.end0 = end0 + span.from * line;
     span.end1 = end0 + span.to * line;
