@@ -341,6 +341,16 @@ TEST(SurfaceParts, AFallingBodyKeepsItsSpin) {
 }
 
 // Where the drag bears it, weight is felt no more than in free fall: carried nodes' weight alone would turn it.
+// Its nodes hang under what it feels, which is nothing.
+TEST(SurfaceParts, AFallingBodyHasTheShapeOfAFullSurface) {
+  World part = worldOf(tube(SurfaceMode::contact, false), {0, -9.81, 0}),
+        full = worldOf(tube(SurfaceMode::full, false), {0, -9.81, 0});
+  DynamicsFrame rest;
+  full.readFrame(rest);
+  for (int k = 0; k < 20; ++k) (k % 2 == 0 ? part : full).advance({});
+  EXPECT_LT(farthestApart(part, full, rest), 1e-9);
+}
+
 TEST(SurfaceParts, ABodyThatSinksDoesNotTurn) {
   World world({.gravity = {0, -9.81, 0}, .ambientDrag = 2}, {lopsided(SurfaceMode::contact, {})});
   for (int k = 0; k < 200; ++k) world.advance({});

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -57,8 +58,11 @@ void waitForInput(const Descriptor& pipe) {
 
 // To its end.
 std::string readAll(const Descriptor& file, bool pipe, const std::string& path) {
-  constexpr std::size_t kPipeMost = 1U << 30;
+  constexpr std::size_t kPipeMost = 1U << 30;  // also of what is trusted of a file's size
   std::string bytes;
+  struct stat status {};
+  if (!pipe && ::fstat(file.value(), &status) == 0)
+    bytes.reserve(std::min(static_cast<std::size_t>(status.st_size), kPipeMost));
   char block[1 << 16];
   for (;;) {
     if (pipe) waitForInput(file);

@@ -42,10 +42,10 @@ void placeSkinOnSphere(WorldData& d, const HostRange& range) {
 
 // To where its nodes hang still from the anchors that place() has left them at, as they hung before.
 void hang(WorldData& d, const HostRange& range) {
-  const double pressure = stillPressure(d, range.firstGroup, range.endGroup, d.surface.parts[range.part].heldBulk);
+  const Lanes3 gravity = hangingGravity(d, range.body);
+  const double pressure = stillPressure(d, gravity, range.firstGroup, range.endGroup, d.surface.parts[range.part].heldBulk);
   const HostRange moving = movingRange(d, range.part);
   if (moving.firstGroup == moving.endGroup) d.nodes.swollen[range.part] = range.bulk > 0 ? pressure / range.bulk : 0;
-  const Lanes3 gravity = splat(d.gravity);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const Lanes3 displaced = hangingAt(d, gravity, splat(pressure), g) + gatherFour(d.surface.shift, 4 * g);
     put(d.nodes.position[g] + (displaced - gatherFour(d.nodes.displaced, 4 * g)), d.nodes.position[g]);

@@ -122,6 +122,8 @@ void layOutCarriedWeight(WorldData& d) {
   SurfaceParts& s = d.surface;
   if (s.nodes.empty() || vectorOf(d.gravity) == Eigen::Vector3d::Zero()) return;
   s.felt.resize(d.bodies.size());
+  s.feltInFrame.resize(d.bodies.size());
+  s.hanging.assign(d.bodies.size(), d.gravity);
   s.falling.resize(d.bodies.size());
   s.carriedMass.resize(d.spheres.position.size());
   s.carriedWeight.resize(d.spheres.groups.size(), {{zeroVectors(), zeroVectors(), zeroVectors()},
@@ -169,6 +171,7 @@ static Lanes fallingVelocity(const WorldData& d, int body) {
 
 void rememberFalling(WorldData& d) {
   SurfaceParts& s = d.surface;
+  std::fill(s.feltInFrame.begin(), s.feltInFrame.end(), Quad{});
   for (std::size_t b = 0; b < s.falling.size(); ++b) store(s.falling[b], fallingVelocity(d, static_cast<int>(b)));
 }
 
@@ -178,9 +181,22 @@ void feelGravity(WorldData& d, const Batch& batch) {
   for (const int b : batch.bodies) {
     const Lanes now = fallingVelocity(d, b);
     const Lanes borne = fnma(splat(d.settings.ambientDrag), now, load(d.gravity));  // the drag acts on all alike
-    store(s.felt[b], fnma(splat(1 / d.substep), now - load(s.falling[b]), borne));
+    const Lanes felt = fnma(splat(1 / d.substep), now - load(s.falling[b]), borne);
+    store(s.felt[b], felt);
+    store(s.feltInFrame[b], load(s.feltInFrame[b]) + felt);
     store(s.falling[b], now);
   }
+}
+
+void hangByFelt(WorldData& d) {
+  SurfaceParts& s = d.surface;
+  if (s.felt.empty()) return;
+  const double most = vectorOf(d.gravity).norm();
+  for (const Batch& batch : d.awake.batches)
+    for (const int b : batch.bodies) {
+      const Eigen::Vector3d mean = vectorOf(s.feltInFrame[b]) / d.substeps;
+      s.hanging[b] = quadOf(Eigen::Vector3d(mean * (most / std::max(mean.norm(), most))));
+    }
 }
 
 // Weight that is moved about within a free body leaves no force on the whole, which maps that are turned by spheres

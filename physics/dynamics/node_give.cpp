@@ -66,9 +66,12 @@ void setCarried(const BodyDescription& body, const BodyMechanics& mechanics, con
       continue;
     }
     const Eigen::SparseVector<double> few = push.sparseView();
-    VectorXd way = VectorXd::Zero(columns);
-    for (Eigen::SparseVector<double>::InnerIterator i(few); i; ++i) way += i.value() * compliance.col(i.index());
-    out[n].carried = few.dot(way);
+    using Entry = Eigen::SparseVector<double>::InnerIterator;
+    for (Entry j(few); j; ++j) {
+      double way = 0;
+      for (Entry i(few); i; ++i) way += i.value() * compliance(j.index(), i.index());
+      out[n].carried += j.value() * way;
+    }
   }
 }
 

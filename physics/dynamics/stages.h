@@ -98,6 +98,9 @@ void weighCarriedNodes(WorldData&);  // carried_weight.cpp, as part of it
 void layOutCarriedWeight(WorldData&);
 void rememberFalling(WorldData&);
 void feelGravity(WorldData&, const Batch&);
+// At a frame's end: under what was felt in its mean carried nodes hang from now on. What strikes a body throws them no
+// farther than they weigh at rest.
+void hangByFelt(WorldData&);
 
 // Angular velocity from orientation and angular momentum.
 void refreshAngularVelocities(WorldData&);

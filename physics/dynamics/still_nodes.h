@@ -46,9 +46,13 @@ inline double swellingOf(const WorldData& d, int firstGroup, int endGroup) {
   return sumOfLanes(give);
 }
 
+// m/s2, under which a body's nodes hang.
+inline Lanes3 hangingGravity(const WorldData& d, int body) {
+  return splat(d.surface.hanging.empty() ? d.gravity : d.surface.hanging[body]);
+}
+
 // Pa: of nodes of these groups that hang still, with `bulk` the host's pressure per volume as they give way to it.
-inline double stillPressure(const WorldData& d, int firstGroup, int endGroup, double bulk) {
-  const Lanes3 gravity = splat(d.gravity);
+inline double stillPressure(const WorldData& d, const Lanes3& gravity, int firstGroup, int endGroup, double bulk) {
   Lanes sunk = splat(0);
   for (int g = firstGroup; g < endGroup; ++g) sunk = sunk + dot(d.nodes.area[g], sagOf(d, gravity, g));
   return bulk * sumOfLanes(sunk);

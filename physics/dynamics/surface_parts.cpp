@@ -205,8 +205,8 @@ void wantLoadedParts(WorldData& d, const Loads& loads) {
 double measureShifts(WorldData& d, std::size_t part) {
   const HostRange range = movingRange(d, part);
   const double bulk = bulkThatGives(d, range, range.firstGroup);
-  const double pressure = stillPressure(d, range.firstGroup, range.endGroup, bulk);
-  const Lanes3 gravity = splat(d.gravity);
+  const Lanes3 gravity = hangingGravity(d, range.body);
+  const double pressure = stillPressure(d, gravity, range.firstGroup, range.endGroup, bulk);
   Lanes squared = splat(0);
   for (int g = range.firstGroup; g < range.endGroup; ++g) {
     const Lanes3 off = gatherFour(d.nodes.displaced, 4 * g) - hangingAt(d, gravity, splat(pressure), g);

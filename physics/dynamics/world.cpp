@@ -278,6 +278,7 @@ std::vector<Eigen::Vector3d> World::advance(const Loads& loads) {
   (implicit ? stepFrameImplicitly : stepFrameExplicitly)(d, loads, toolImpulse);
   ++d.frame;
   startDrivenBodies(d);
+  hangByFelt(d);
   chooseSurfaceParts(d, loads);
   fallAsleep(d, loads);
   // The frames that readers hang nodes on are those of the state at the end.

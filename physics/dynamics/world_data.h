@@ -289,8 +289,9 @@ struct SurfaceParts {
   std::vector<AttachmentGive> give;  // per group of dynamic nodes
   std::vector<Quad> shift;           // m, per node: from where it would hang still by itself
   // Of what carried nodes weigh; `felt` is empty where nothing is carried or has weight. Per body: m/s2, gravity less
-  // how the body fell faster in the last substep; m/s, how fast it falls as a whole.
-  std::vector<Quad> felt, falling;
+  // how the body fell faster in the last substep; their sum over a frame, and what carried nodes hang under, the mean
+  // of the last frame; m/s, how fast it falls as a whole.
+  std::vector<Quad> felt, feltInFrame, hanging, falling;
   std::vector<CarriedWeight> carriedWeight;  // per group of spheres
   std::vector<double> carriedMass;           // kg, per sphere
   std::vector<double> carriedOf, massOf;     // kg, per body: sums of the above, and of its spheres with it
