@@ -70,11 +70,13 @@ static double freeLength(const FlexionStiffness& k, double youngTimesMoment) {
 }
 
 // A rim of height cos(2 angle) clamps by 0.4 of it farther out in one plane, and nearer in the other: mean(cos(2a)
-// cos(a)^2) / mean(cos(a)^2) = 1/2, of which 4/5 count for the fan over the rim. Askew it bends nothing.
+// cos(a)^2) / mean(cos(a)^2) = 1/2, of which 4/5 count for the fan over the rim. Askew it bends nothing. All that
+// beside its mean along the rim, whose edges are not alike.
 TEST(Fixation, AJaggedRimClampsABeamFartherOutInOnePlane) {
   constexpr double kTube = 0.012, kWave = 0.002, kRimAt = 0.0075;
   const auto flat = synthetic::chainModel(synthetic::straightTube(3, 0.06, kTube, 12, 8));
   const Vector3d high = Vector3d(0, 0.6, 0.8);
+  double meanRim = 0;
   const auto mechanicsOf = [&](double wave, double slope) {
     auto model = std::make_shared<SoftBodyModel>(*flat);
     BodyDescription body;
@@ -86,6 +88,13 @@ TEST(Fixation, AJaggedRimClampsABeamFartherOutInOnePlane) {
       const double along = high.dot(out);
       model->restNodes[i].x() += wave * (2 * along * along - 1) + slope * out.y();
     }
+    double sum = 0, whole = 0;
+    for (int i = 9; i < 17; ++i) {
+      const Vector3d &a = model->restNodes[i], &b = model->restNodes[i < 16 ? i + 1 : 9];
+      sum += 0.5 * (a.x() + b.x()) * (a - b).norm();
+      whole += (a - b).norm();
+    }
+    meanRim = sum / whole;
     return bodyMechanics(body);
   };
   const Tissue tissue;
@@ -93,19 +102,20 @@ TEST(Fixation, AJaggedRimClampsABeamFartherOutInOnePlane) {
   const double length = 0.03 - kRimAt - tissue.poisson * tissue.poisson * kTube / 2;
   for (const double slope : {0.0, 0.001}) {
     const LinkStiffness even = mechanicsOf(0, slope).links[0], wavy = mechanicsOf(kWave, slope).links[0];
+    const double beyondMean = length + kRimAt - meanRim;
     EXPECT_NEAR(freeLength(even.flexionU, ei), length, 1e-9);
     EXPECT_NEAR(freeLength(even.flexionV, ei), length, 1e-9);
     const bool alongU = std::abs(wavy.restU.dot(high)) > 0.5;
     EXPECT_NEAR(std::abs(wavy.restU.dot(high)), alongU ? 1 : 0, 1e-9);
-    EXPECT_NEAR(freeLength(alongU ? wavy.flexionV : wavy.flexionU, ei), length - 0.4 * kWave, 1e-9);
-    EXPECT_NEAR(freeLength(alongU ? wavy.flexionU : wavy.flexionV, ei), length + 0.4 * kWave, 1e-9);
+    EXPECT_NEAR(freeLength(alongU ? wavy.flexionV : wavy.flexionU, ei), beyondMean - 0.4 * kWave, 1e-9);
+    EXPECT_NEAR(freeLength(alongU ? wavy.flexionU : wavy.flexionV, ei), beyondMean + 0.4 * kWave, 1e-9);
   }
 }
 
 // Wherever the spheres happen to lie: of seven to ten the part of the rim that hangs on the first free link or its
 // held sphere is half of it to all.
 TEST(Fixation, ARegionAcrossALinkHoldsItWhereItsWholeRimLies) {
-  constexpr double kFiniteElements = 0.848;  // Hz, of models of 7 and 14 spheres that these identified, and mirrored
+  constexpr double kFiniteElements = 0.834;  // Hz, of a model that these identified for the same nodes
   Region ball;
   ball.shape = Region::Shape::ball;
   ball.centre = {-0.025, -0.008, -0.017};
@@ -123,7 +133,7 @@ TEST(Fixation, ARegionAcrossALinkHoldsItWhereItsWholeRimLies) {
     b.fixedNodes = nodesInRegion(*b.model, ball);
     for (const int sphere : spheresHeldBy(*b.model, b.fixedNodes)) b.fixed.push_back({sphere});
     const World world({}, {b});
-    EXPECT_NEAR(world.lowestFrequency(0) / (2 * std::numbers::pi), kFiniteElements, 0.12 * kFiniteElements) << spheres;
+    EXPECT_NEAR(world.lowestFrequency(0) / (2 * std::numbers::pi), kFiniteElements, 0.08 * kFiniteElements) << spheres;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -12,6 +13,7 @@
 #include <stdexcept>
 
 #include "physics/model/disjoint_sets.h"
+#include "physics/model/mesh_topology.h"
 #include "physics/model/symmetric_eigen.h"
 
 namespace medulla {
@@ -22,20 +24,32 @@ using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Nodes that are fixed and have a neighbour that is not, by what of the rim hangs together.
-using Rims = std::vector<std::vector<int>>;
+// A node on the rim of the held surface, and half of the rim beside it, m.
+struct RimNode {
+  int node;
+  double length;
+};
+using Rims = std::vector<std::vector<RimNode>>;
+
+// The edges at which triangles that are held by all their corners end, by what of them hangs together.
 Rims rimsOfFixed(const BodyDescription& body) {
   const SoftBodyModel& m = *body.model;
-  std::vector<char> fixed(m.restNodes.size(), 0), rim = fixed;
+  std::vector<char> fixed(m.restNodes.size(), 0);
   for (const int node : body.fixedNodes) fixed[node] = 1;
-  for (const auto& [a, b] : m.edges)
-    if (fixed[a] != fixed[b]) rim[fixed[a] ? a : b] = 1;
-  DisjointSets together(rim.size());
-  for (const auto& [a, b] : m.edges)
-    if (rim[a] && rim[b]) together.join(a, b);
-  std::map<int, std::vector<int>> byFirst;
-  for (std::size_t i = 0; i < rim.size(); ++i)
-    if (rim[i]) byFirst[together.of(static_cast<int>(i))].push_back(static_cast<int>(i));
+  std::map<std::array<int, 2>, int> heldTriangles;  // per edge
+  for (const auto& [a, b, c] : m.triangles)
+    if (fixed[a] && fixed[b] && fixed[c])
+      for (const std::array<int, 2> edge : {edgeOf(a, b), edgeOf(b, c), edgeOf(c, a)}) ++heldTriangles[edge];
+  DisjointSets together(fixed.size());
+  std::vector<double> length(fixed.size(), 0);
+  for (const auto& [edge, count] : heldTriangles) {
+    if (count > 1) continue;
+    together.join(edge[0], edge[1]);
+    for (const int node : edge) length[node] += 0.5 * (m.restNodes[edge[0]] - m.restNodes[edge[1]]).norm();
+  }
+  std::map<int, std::vector<RimNode>> byFirst;
+  for (int i = 0; i < static_cast<int>(length.size()); ++i)
+    if (length[i] > 0) byFirst[together.of(i)].push_back({i, length[i]});
   Rims out;
   for (auto& [first, nodes] : byFirst) out.push_back(std::move(nodes));
   return out;
@@ -48,7 +62,8 @@ struct Crossing {
 
 struct Rim {
   std::vector<Vector3d> nodes;
-  bool isShared = false;  // by several links
+  std::vector<double> length;  // m, per node
+  bool isShared = false;       // by several links
 };
 
 // The rim that a link leaves through: that of which some nodes hang on it or on its held sphere. It counts whole: how
@@ -58,13 +73,13 @@ struct Rim {
 // and a gallbladder of 25, whose neck is held, less near (6.9 for 6.0).
 Rim rimAround(const SoftBodyModel& m, const Rims& rims, const std::vector<Crossing>& crossings, int link) {
   const auto hangsOn = [&](const Crossing& c) {
-    return [&m, &c](int node) {
-      const Attachment& a = m.attachments[node];
+    return [&m, &c](const RimNode& n) {
+      const Attachment& a = m.attachments[n.node];
       return a.host == (a.onLink ? c.link : c.heldSphere);
     };
   };
   Rim out;
-  for (const std::vector<int>& rim : rims) {
+  for (const std::vector<RimNode>& rim : rims) {
     std::vector<const Crossing*> through;
     for (const Crossing& c : crossings)
       if (std::any_of(rim.begin(), rim.end(), hangsOn(c))) through.push_back(&c);
@@ -73,21 +88,29 @@ Rim rimAround(const SoftBodyModel& m, const Rims& rims, const std::vector<Crossi
     if (own == through.end()) continue;
     const bool isShared = through.size() > 1;
     out.isShared = out.isShared || isShared;
-    for (const int node : rim)
-      if (!isShared || hangsOn(**own)(node)) out.nodes.push_back(m.restNodes[node]);
+    for (const RimNode& n : rim) {
+      if (isShared && !hangsOn(**own)(n)) continue;
+      out.nodes.push_back(m.restNodes[n.node]);
+      out.length.push_back(n.length);
+    }
   }
   return out;
 }
 
-// How far along the link, as a share from `end` on, the surface around a held sphere is fixed: the mean of the rim,
-// 0 where that lies behind the link. Nothing where no rim hangs there: a sphere that is held by its number holds no
-// section.
+// How far along the link, as a share from `end` on, the surface around a held sphere is fixed: the mean along the rim,
+// however far apart its nodes stand, 0 where that lies behind the link. Nothing where no rim hangs there: a sphere that
+// is held by its number holds no section.
+// (By the area that the rim spans, which counts most what lies farthest out, gallbladders on a coarse mesh are 4 % off
+// in stiffness instead of 14, on finer ones 10 instead of 8.)
 std::optional<double> fixedShare(const Rim& rim, const Vector3d& end, const Vector3d& line) {
   const double most = rim.isShared ? 0.5 : 0.9;
-  if (rim.nodes.empty()) return {};
-  double sum = 0;
-  for (const Vector3d& node : rim.nodes) sum += (node - end).dot(line) / line.squaredNorm();
-  return std::clamp(sum / static_cast<double>(rim.nodes.size()), 0.0, most);
+  double sum = 0, whole = 0;
+  for (std::size_t k = 0; k < rim.nodes.size(); ++k) {
+    sum += rim.length[k] * (rim.nodes[k] - end).dot(line) / line.squaredNorm();
+    whole += rim.length[k];
+  }
+  if (!(whole > 0)) return {};
+  return std::clamp(sum / whole, 0.0, most);
 }
 
 struct SectionAxes {
