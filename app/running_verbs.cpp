@@ -44,7 +44,7 @@ void addRunOptions(CLI::App& command, RunArguments& a) {
   command
       .add_option("--record", a.records,
                   "write a tool's motion and force, tick by tick, as a trajectory; read back by --trajectory it gives "
-                  "the same hash (repeatable)")
+                  "the same hash, but for --realtime (repeatable)")
       ->type_name("[TOOL=]FILE.csv")
       ->allow_extra_args(false);
   command

@@ -45,6 +45,7 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   std::vector<ToolSettings> tools;
   for (const SceneTool& tool : loaded.scene.tools) tools.push_back(tool.settings);
   servo_ = std::make_unique<Servo>(bodies, tools, tickDuration_, current_, inputs_, embree);
+  beginAtRest();
 
   totals_.touched.resize(tools.size());
   totals_.held.resize(tools.size());
@@ -56,6 +57,17 @@ Simulation::Simulation(const LoadedScene& loaded, const EmbreeSettings& embree)
   record_.from = record_.to = current_;
   record_.inputs.assign(ticksPerFrame_ + 1, inputs_);
   record_.tools.assign(ticksPerFrame_ + 1, servo_->tools());
+}
+
+// A frame in which nothing happened lies before the first: without one the tissue's answer would be unknown, and what a
+// tool meets a wall.
+void Simulation::beginAtRest() {
+  if (loaded_->trajectories.empty()) return;
+  DynamicsFrame before = current_;
+  before.time -= frameDuration_;
+  const std::vector<Eigen::Vector3d> nothing(loaded_->trajectories.size(), Eigen::Vector3d::Zero());
+  servo_->commit(before, current_, servo_->tools(), &nothing);
+  servo_->beginFrame();
 }
 
 void Simulation::settle() {
@@ -71,6 +83,10 @@ void Simulation::settle() {
 void Simulation::sampleInputs(double time, std::vector<ToolSample>& out) const {
   out.resize(loaded_->trajectories.size());
   for (std::size_t k = 0; k < out.size(); ++k) out[k] = sampleTrajectory(loaded_->trajectories[k], time);
+}
+
+bool Simulation::finished() const {
+  return frame_ >= frameCount_ || (isAwaited_ && record_.start + record_.duration >= loaded_->scene.duration - 1e-9);
 }
 
 void Simulation::advanceFrame() {

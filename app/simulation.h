@@ -92,7 +92,8 @@ class Simulation {
   // With the bodies settled, at time 0. Throws what makeWorld() and World::advance() throw, and Interrupted.
   explicit Simulation(const LoadedScene& loaded, const EmbreeSettings& embree = {});
 
-  bool finished() const { return frame_ >= frameCount_; }
+  // Whatever has been reached, too, when a servo's clock has passed the scene's duration.
+  bool finished() const;
   // Both throw NotFinite when the state stops being finite. The second is the dynamics' half alone, after what
   // a servo that runs elsewhere has recorded.
   void advanceFrame();
@@ -116,6 +117,7 @@ class Simulation {
 
  private:
   void settle();  // until the first frame at time 0
+  void beginAtRest();
   void runTicks();
   void advanceDynamics();
   void accountTicks();

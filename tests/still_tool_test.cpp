@@ -1,4 +1,5 @@
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "app/files/log_table.h"
 #include "tests/own_scene.h"
@@ -32,6 +33,30 @@ TEST_F(OwnScene, AStillToolComesToRestDeepInADent) {
     if (row[0] > 3) forces.extend(Eigen::Vector3d(row[column], row[column + 1], row[column + 2]));
   EXPECT_GT(forces.center().norm(), 1.5);
   EXPECT_LT(forces.diagonal().norm(), 0.02 * forces.center().norm());
+}
+
+// What tissue answers is known from the first tick on: without a frame before the first, 0.9 N, and 0.1 in the next
+// tick.
+TEST_F(OwnScene, AToolThatPressesFromTheStartMeetsNoWall) {
+  folder.write("own/organ.csv",
+               "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,-0.0525,-0.0385,0.0285,1,0,0,0,0\n"
+               "0.1,-0.0525,-0.0385,0.0185,1,0,0,0,0\n");
+  const ProgramResult r =
+      run({"replay", "own/organ.xml", "--set", "tool.probe.stiffness=400", "--log", "log.csv", "--log-rate", "tick"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  const LogTable log = readLog(folder / "log.csv");
+  const std::size_t column = columnOf(log, "probe.force.x");
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  double most = 0, step = 0;
+  for (const std::vector<double>& row : log.value) {
+    const Eigen::Vector3d force(row[column], row[column + 1], row[column + 2]);
+    most = std::max(most, force.norm());
+    step = std::max(step, (force - last).norm());
+    last = force;
+  }
+  EXPECT_GT(most, 0.1);
+  EXPECT_LT(most, 0.25);
+  EXPECT_LT(step, 0.05);
 }
 
 }  // namespace medulla

@@ -62,7 +62,7 @@ struct Crossing {
 
 struct Rim {
   std::vector<Vector3d> nodes;
-  std::vector<double> length;  // m, per node
+  std::vector<double> length;  // m, per node; 1 of parts, which are no outline with a mean of its own
   bool isShared = false;       // by several links
 };
 
@@ -91,7 +91,7 @@ Rim rimAround(const SoftBodyModel& m, const Rims& rims, const std::vector<Crossi
     for (const RimNode& n : rim) {
       if (isShared && !hangsOn(**own)(n)) continue;
       out.nodes.push_back(m.restNodes[n.node]);
-      out.length.push_back(n.length);
+      out.length.push_back(isShared ? 1 : n.length);
     }
   }
   return out;
