@@ -141,7 +141,8 @@ static void requireHeldSkin(const Scene& scene, const SceneBody& body, const std
     const std::vector<int> held = spheresHeldBy(*body.model, parts[k]);
     if (!held.empty() || spheresHeldBy(*body.model, others) != spheresHeldBy(*body.model, body.fixedNodes)) continue;
     const bool bySurface = overriddenAt(scene, body.line, {"surface"}) != nullptr;
-    throw valueError(scene, bySurface ? body.line : body.fixes[k].line, {"surface", "box", "sphere", "plane"},
+    throw valueError(scene, bySurface ? body.line : body.fixes[k].line,
+                     {"surface", "box", "sphere", "plane", "vertices"},
                      fmt::format("nothing of body \"{}\" is held in here: its surface is a skin, and no filling sphere "
                                  "has half of its surface there; expected more of it, or spheres by number",
                                  body.name));

@@ -15,6 +15,7 @@ void useGlFunctionsOf(GlAddress address) {
   static GlAddress last = nullptr;
   const std::lock_guard lock(mutex);
   if (address == last) return;
+  last = nullptr;  // where one is missing the table is of neither
   const auto find = [address](const char* name) {
     void (*function)() = address(name);
     if (function == nullptr) throw std::runtime_error(std::string("OpenGL has no ") + name);

@@ -81,7 +81,8 @@ MEDULLA_GL_FUNCTIONS(MEDULLA_DECLARE)
 #undef MEDULLA_DECLARE
 
 // From the library that a context came from; each entry leads to the calling thread's current context, so that those of
-// one library serve all its contexts. Called whenever a context becomes current.
+// one library serve all its contexts. Called whenever a context becomes current; contexts of two libraries are not for
+// two threads at once.
 using GlAddress = void (*(*)(const char* name))();  // nullptr: unknown
 void useGlFunctionsOf(GlAddress address);           // throws std::runtime_error
 

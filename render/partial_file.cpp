@@ -71,7 +71,7 @@ static std::string folderOf(const std::string& path) {
 static void takePermissions(const std::string& target, const Descriptor& to) {
   constexpr mode_t readWriteAndRun = 0777;
   struct stat earlier {};
-  if (::stat(target.c_str(), &earlier) == 0) (void)::fchmod(to.value(), earlier.st_mode & readWriteAndRun);
+  if (::stat(target.c_str(), &earlier) == 0) (void)::fchmod(to.value(), (earlier.st_mode & readWriteAndRun) | S_IWUSR);
 }
 
 PartialFile::PartialFile(const std::string& target) : target_(resolveTarget(target)), made_(folderOf(target)) {

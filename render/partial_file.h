@@ -18,8 +18,7 @@ std::string behindLink(const std::string& path);
 // as much of the target's name as a name has room for. That holds against whatever ends a program, not against a power
 // cut, for which every picture of a film would have to wait for the disk.
 // Destroyed before that it is removed, and an earlier file of that name stays as it was. What a symbolic link stands
-// for is replaced, not the link, also where there is nothing yet. Who may read and write a file that is replaced may
-// its successor.
+// for is replaced, not the link, also where there is nothing yet. The mode of a file that is replaced stays.
 class PartialFile {
  public:
   // There at once, and empty; so are folders in the target's path that are missing, which go again with a file that

@@ -38,8 +38,8 @@ VideoFormat checkedFormat(const std::string& path, int width, int height, double
     throw std::runtime_error(path + ": a video of " + std::to_string(width) + "x" + std::to_string(height) +
                              " pixels, expected even numbers");
   if (fps > format->most)
-    throw std::runtime_error(path + ": more than " + std::to_string(std::lround(format->most)) +
-                             " pictures per second, which no player shows of a " + format->extension);
+    throw std::runtime_error(path + ": expected at most " + std::to_string(std::lround(format->most)) +
+                             " pictures per second in a " + format->extension + ", players slow down more");
   return format->format;
 }
 

@@ -263,6 +263,8 @@ TEST_F(BadInput, FoldersMadeForAFailedCommandGoAgain) {
   folder.write("a.obj", "");
   folder.write("b.obj", "");
   expectRefused(run({"build", "a.obj", "b.obj", "-o", "x/y/z"}), "a.obj: is empty");
+  folder.write("empty.csv", "\n");
+  expectRefused(run({"info", "empty.csv"}), "empty.csv: is empty, expected a scene, a model or a table");
   expectRefused(run({"golden", "none.xml", "--dir", "golden", "--failures", "u/v"}), "none.xml");
   expectRefused(run({"render", "own/organ.xml", "-o", "p/q/frames", "--set", "dynamics.substeps=1", "--set",
                      "tissue.t.young=1e9"}),

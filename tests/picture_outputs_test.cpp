@@ -287,6 +287,14 @@ TEST_F(Outputs, WhoMayReadAFileMayReadItsSuccessor) {
   EXPECT_EQ(fs::status(folder / "a.csv").permissions(), fs::perms::owner_read | fs::perms::owner_write);
 }
 
+// What was made to draw with goes in the thread that it belongs to, or EGL ends the program.
+TEST_F(Outputs, WhatIsRefusedWhenAllIsReadyToDrawIsSaidByEitherContext) {
+  for (const char* context : {"osmesa", "egl"})
+    expectRefused(render({"--context", context, "--still", "0.1", "-o", "a.jpg"}),
+                  render({"--context", context, "--still", "0", "-o", "a.png"}).exitCode == 0 ? "expected FILE.png"
+                                                                                              : "no OpenGL context");
+}
+
 TEST_F(Outputs, AFullDiskStopsTheRunAndLeavesNothing) {
   ProgramOptions full;
   full.fileSizeLimit = 1000;

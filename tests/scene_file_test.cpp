@@ -412,7 +412,7 @@ TEST_F(SceneFile, FilesThatAreNoScenes) {
   EXPECT_EQ(complaint("\n<scene name='a'>\n<clock duration=1/></scene>"),
             "x.xml:3: broken XML: an attribute is not of the form name=\"value\", or stands twice");
   EXPECT_EQ(complaint("<!DOCTYPE scene [ <!ENTITY e '0.2'> ]>\n<scene name='a'/>").substr(5),
-            ":1: declarations within a DOCTYPE are not understood");
+            ":1: declarations within a DOCTYPE are not understood, expected none");
   EXPECT_EQ(complaint(std::string("<scene\0/>", 9)), "x.xml: holds a zero byte, expected XML text");
   EXPECT_EQ(complaint("<scene>\n<!-- gr\xf6\xdf -->"), "x.xml:2: holds the byte 0xF6, expected UTF-8 or ASCII");
   EXPECT_EQ(complaint("<scene/>\n<!--\xc3"), "x.xml:2: ends within a letter, expected UTF-8 or ASCII");

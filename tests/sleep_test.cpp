@@ -166,6 +166,27 @@ TEST(Sleep, WhatFallsOnASleeperWakesIt) {
   }
 }
 
+// Struck in mid-frame, it has felt its weight for a part of it: its nodes hang under all of it, not under that part.
+TEST(Sleep, WhatWakesInMidFrameHangsUnderItsWeight) {
+  BodyDescription lying = rod("lying", {0, 0.0125, 0});
+  lying.surface = SurfaceMode::contact;
+  World world(settings(0.3), {lying, synthetic::ball("ball", 0.01, {0.03, 2.03, 0})}, floorAtZero());
+  bool slept = false;
+  while (!slept || world.data().rest[0].asleep) {
+    slept = slept || world.data().rest[0].asleep;
+    world.advance({});
+    ASSERT_LT(world.time(), 2);
+  }
+  EXPECT_LT(vectorOf(world.data().surface.hanging[0]).y(), -0.8 * 9.81);
+}
+
+// In the first frame there is nothing yet to compare it with.
+TEST(Sleep, NothingFallsAsleepAtOnce) {
+  World world(settings(0.001), {synthetic::ball("ball", 0.01, {0, 1, 0})}, floorAtZero());
+  world.advance({});
+  EXPECT_FALSE(world.data().rest[0].asleep);
+}
+
 TEST(Sleep, WhatMovesOrIsDrivenStaysAwake) {
   BodyDescription pendulum = rod("pendulum", {0, 1, 0}), led = rod("led", {0, 2, 0}), loaded = rod("loaded", {0, 3, 0});
   pendulum.fixed = {{0, FixedFreedom::all}};

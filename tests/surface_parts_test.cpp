@@ -340,7 +340,6 @@ TEST(SurfaceParts, AFallingBodyKeepsItsSpin) {
   EXPECT_LT((spin() - before).norm(), 1e-6 * before.norm());
 }
 
-// Where the drag bears it, weight is felt no more than in free fall: carried nodes' weight alone would turn it.
 // Its nodes hang under what it feels, which is nothing.
 TEST(SurfaceParts, AFallingBodyHasTheShapeOfAFullSurface) {
   World part = worldOf(tube(SurfaceMode::contact, false), {0, -9.81, 0}),
@@ -351,6 +350,7 @@ TEST(SurfaceParts, AFallingBodyHasTheShapeOfAFullSurface) {
   EXPECT_LT(farthestApart(part, full, rest), 1e-9);
 }
 
+// Where the drag bears it, weight is felt no more than in free fall: carried nodes' weight alone would turn it.
 TEST(SurfaceParts, ABodyThatSinksDoesNotTurn) {
   World world({.gravity = {0, -9.81, 0}, .ambientDrag = 2}, {lopsided(SurfaceMode::contact, {})});
   for (int k = 0; k < 200; ++k) world.advance({});

@@ -124,6 +124,7 @@ void Artist::work(const DynamicsFrame& rest, std::promise<void> ready) {
     outputs_.emplace(options_->outputs,
                      outputSettings(*loaded_, *options_, first_, count_, desk_->renderer.description()));
   } catch (...) {
+    desk_.reset();  // here, where its context is current
     ready.set_exception(std::current_exception());
     return;
   }

@@ -46,7 +46,9 @@ void requireDistinctOutputs(const LoadedScene& loaded, const RunOptions& options
 // The scene counts by what it says, the files that it names by their bytes: where they lie does not matter. Meshes
 // count by what was read, too: those of glTF have their vertices in files that only their reader knows of.
 static std::uint64_t runHash(const LoadedScene& loaded, std::uint64_t scene) {
-  std::uint64_t hash = contentHash(fmt::format("{} {} {:016x}", MEDULLA_VERSION, MEDULLA_MOTION_SOURCES, scene));
+  // Until rest nothing sleeps, whatever the scene says.
+  std::uint64_t hash = contentHash(fmt::format("{} {} {:016x} {}", MEDULLA_VERSION, MEDULLA_MOTION_SOURCES, scene,
+                                               loaded.scene.dynamics.sleepAfter));
   for (const std::string& path : inputFiles(loaded.scene))
     if (path != loaded.scene.path && fileExists(path)) hash = contentHash(readBytes(path), hash);
   for (const TriangleMesh& mesh : loaded.statics) hash = contentHash(fmt::format("{:016x}", hashMesh(mesh)), hash);

@@ -120,11 +120,11 @@ static void printIdleLoads(const Scene& scene, bool isExcerpt) {
     for (const SceneLoad& load : body.loads) {
       const double from = load.whole.from, to = load.whole.to;
       if (load.isIdle) tell("note: a load on body '{}' acts where it is held\n", body.name);
-      if (isShortened(scene, isExcerpt) || to <= scene.duration) continue;
+      if (isShortened(scene, isExcerpt)) continue;
       if (from >= scene.duration)
         tell("note: a load on body '{}' begins at {:.6g} s, and the scene ends at {:.6g} s\n", body.name, from,
              scene.duration);
-      else
+      else if (to > scene.duration)
         tell("note: a load on body '{}' grows until {:.6g} s, and the scene ends at {:.6g} s, at {:.3g} % of it\n",
              body.name, to, scene.duration, 100 * (scene.duration - from) / (to - from));
     }

@@ -195,7 +195,7 @@ void readDrivenSpheres(const XmlElement& body, SceneBody& out) {
     if (std::any_of(out.driven.begin(), out.driven.end(), isThis))
       refuse(*drive, "sphere", "this sphere is driven twice");
     d.axis = readVector(*drive, "axis", d.axis);
-    if (d.axis.isZero(0)) refuse(*drive, "axis", "expected a direction");
+    if (!(d.axis.norm() > 0)) refuse(*drive, "axis", "expected a direction");  // nor one whose squares vanish
     d.amplitude = readNumber(*drive, "amplitude", d.amplitude, {.low = 0, .most = kAnyLength.most});
     d.frequency = readNumber(*drive, "frequency", d.frequency, {.low = 0, .lowExcluded = true, .most = kMostOfSwing});
     d.phase = readNumber(*drive, "phase", d.phase, {.most = kMostOfSwing});
@@ -420,7 +420,8 @@ void readOutput(const XmlElement& output, Scene& scene) {
     refuse(output, "golden", "a time beyond the scene's duration");
   const std::vector<int> pictures = goldenPictures(scene);
   const auto twice = std::adjacent_find(pictures.begin(), pictures.end());
-  if (twice != pictures.end() && !durationOverridden(scene) && !isOverridden(scene, "output.fps"))
+  if (twice != pictures.end() && !durationOverridden(scene) &&
+      (!isOverridden(scene, "output.fps") || isOverridden(scene, "output.golden")))
     refuse(output, "golden", fmt::format("two golden moments are picture {} at {:.6g} Hz", *twice, scene.fps));
   readCaptions(output, scene);
 }

@@ -43,7 +43,8 @@ void placeSkinOnSphere(WorldData& d, const HostRange& range) {
 // To where its nodes hang still from the anchors that place() has left them at, as they hung before.
 void hang(WorldData& d, const HostRange& range) {
   const Lanes3 gravity = hangingGravity(d, range.body);
-  const double pressure = stillPressure(d, gravity, range.firstGroup, range.endGroup, d.surface.parts[range.part].heldBulk);
+  const double pressure =
+      stillPressure(d, gravity, range.firstGroup, range.endGroup, d.surface.parts[range.part].heldBulk);
   const HostRange moving = movingRange(d, range.part);
   if (moving.firstGroup == moving.endGroup) d.nodes.swollen[range.part] = range.bulk > 0 ? pressure / range.bulk : 0;
   for (int g = range.firstGroup; g < range.endGroup; ++g) {

@@ -123,6 +123,7 @@ void layOutCarriedWeight(WorldData& d) {
   if (s.nodes.empty() || vectorOf(d.gravity) == Eigen::Vector3d::Zero()) return;
   s.felt.resize(d.bodies.size());
   s.feltInFrame.resize(d.bodies.size());
+  s.feltSubsteps.resize(d.bodies.size());
   s.hanging.assign(d.bodies.size(), d.gravity);
   s.falling.resize(d.bodies.size());
   s.carriedMass.resize(d.spheres.position.size());
@@ -172,6 +173,7 @@ static Lanes fallingVelocity(const WorldData& d, int body) {
 void rememberFalling(WorldData& d) {
   SurfaceParts& s = d.surface;
   std::fill(s.feltInFrame.begin(), s.feltInFrame.end(), Quad{});
+  std::fill(s.feltSubsteps.begin(), s.feltSubsteps.end(), 0);
   for (std::size_t b = 0; b < s.falling.size(); ++b) store(s.falling[b], fallingVelocity(d, static_cast<int>(b)));
 }
 
@@ -184,6 +186,7 @@ void feelGravity(WorldData& d, const Batch& batch) {
     const Lanes felt = fnma(splat(1 / d.substep), now - load(s.falling[b]), borne);
     store(s.felt[b], felt);
     store(s.feltInFrame[b], load(s.feltInFrame[b]) + felt);
+    ++s.feltSubsteps[b];
     store(s.falling[b], now);
   }
 }
@@ -194,7 +197,8 @@ void hangByFelt(WorldData& d) {
   const double most = vectorOf(d.gravity).norm();
   for (const Batch& batch : d.awake.batches)
     for (const int b : batch.bodies) {
-      const Eigen::Vector3d mean = vectorOf(s.feltInFrame[b]) / d.substeps;
+      if (s.feltSubsteps[b] == 0) continue;
+      const Eigen::Vector3d mean = vectorOf(s.feltInFrame[b]) / s.feltSubsteps[b];
       s.hanging[b] = quadOf(Eigen::Vector3d(mean * (most / std::max(mean.norm(), most))));
     }
 }

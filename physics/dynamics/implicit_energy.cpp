@@ -270,8 +270,8 @@ bool keepEnergy(WorldData& d, ImplicitData& s, bool twoStages) {
   return true;
 }
 
-// Of stiff bodies that strike, Newton's iteration may not settle in any step, without a strain that were to blame: it is
-// enough that they have no more energy than they should.
+// Of stiff bodies that strike, Newton's iteration may not settle in any step, without a strain that were to blame: it
+// is enough that they have no more energy than they should.
 static bool isUnstrained(const EnergyBalance& e) {
   constexpr double kLeast = 1e-3;
   return e.elastic <= kLeast * e.kinetic && allowedOf(e) >= 0;

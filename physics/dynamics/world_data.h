@@ -292,6 +292,7 @@ struct SurfaceParts {
   // how the body fell faster in the last substep; their sum over a frame, and what carried nodes hang under, the mean
   // of the last frame; m/s, how fast it falls as a whole.
   std::vector<Quad> felt, feltInFrame, hanging, falling;
+  std::vector<int> feltSubsteps;             // per body, of the frame: what wakes in it has felt some
   std::vector<CarriedWeight> carriedWeight;  // per group of spheres
   std::vector<double> carriedMass;           // kg, per sphere
   std::vector<double> carriedOf, massOf;     // kg, per body: sums of the above, and of its spheres with it
