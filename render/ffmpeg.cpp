@@ -8,7 +8,7 @@
 
 namespace medulla {
 
-#define MEDULLA_DEFINE(name) decltype(&::name) name = nullptr;
+#define MEDULLA_DEFINE(name) decltype(&::name) name = nullptr;  // NOLINT(bugprone-macro-parentheses)
 MEDULLA_AVUTIL_FUNCTIONS(MEDULLA_DEFINE)
 MEDULLA_AVCODEC_FUNCTIONS(MEDULLA_DEFINE)
 MEDULLA_AVFORMAT_FUNCTIONS(MEDULLA_DEFINE)

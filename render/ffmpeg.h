@@ -62,7 +62,7 @@ extern "C" {
 namespace medulla {
 
 // Within medulla these pointers are found before the functions that the headers declare, which nothing links.
-#define MEDULLA_DECLARE(name) extern decltype(&::name) name;
+#define MEDULLA_DECLARE(name) extern decltype(&::name) name;  // NOLINT(bugprone-macro-parentheses)
 MEDULLA_AVUTIL_FUNCTIONS(MEDULLA_DECLARE)
 MEDULLA_AVCODEC_FUNCTIONS(MEDULLA_DECLARE)
 MEDULLA_AVFORMAT_FUNCTIONS(MEDULLA_DECLARE)

@@ -6,7 +6,7 @@
 
 namespace medulla {
 
-#define MEDULLA_DEFINE(name) decltype(&::name) name = nullptr;
+#define MEDULLA_DEFINE(name) decltype(&::name) name = nullptr;  // NOLINT(bugprone-macro-parentheses)
 MEDULLA_GL_FUNCTIONS(MEDULLA_DEFINE)
 #undef MEDULLA_DEFINE
 

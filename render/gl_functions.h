@@ -76,7 +76,7 @@
 namespace medulla {
 
 // Within medulla these pointers are found before the functions that the headers declare, which nothing links.
-#define MEDULLA_DECLARE(name) extern decltype(&::name) name;
+#define MEDULLA_DECLARE(name) extern decltype(&::name) name;  // NOLINT(bugprone-macro-parentheses)
 MEDULLA_GL_FUNCTIONS(MEDULLA_DECLARE)
 #undef MEDULLA_DECLARE
 
