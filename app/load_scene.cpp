@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <initializer_list>
+#include <set>
 #include <string_view>
 
 #include "app/files/fix_text.h"
@@ -200,15 +201,15 @@ static void requireSteeredLinks(const Scene& scene, const SceneBody& body) {
 
 static void resolveLoads(const Scene& scene, SceneBody& body) {
   const SoftBodyModel& model = *body.model;
+  const std::set<int> held(body.fixedNodes.begin(), body.fixedNodes.end());  // patches stand one after the other
   for (SceneLoad& load : body.loads) {
     if (!load.forcesPath.empty()) requireFile(scene, load.line, "file", "file of forces", load.forcesPath);
     const std::vector<DeadLoad> loads =
         load.forcesPath.empty() ? spreadLoad(model, findNodes(scene, load.line, load.nodes, body), load.whole)
                                 : readVertexForces(load.forcesPath, model, load.whole);
     body.deadLoads.insert(body.deadLoads.end(), loads.begin(), loads.end());
-    load.isIdle = holdsByNodes(body) && std::all_of(loads.begin(), loads.end(), [&](const DeadLoad& l) {
-                    return std::binary_search(body.fixedNodes.begin(), body.fixedNodes.end(), l.node);
-                  });
+    load.isIdle = holdsByNodes(body) &&
+                  std::all_of(loads.begin(), loads.end(), [&](const DeadLoad& l) { return held.count(l.node) > 0; });
   }
 }
 
