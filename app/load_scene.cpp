@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <initializer_list>
 #include <set>
 #include <string_view>
+#include <vector>
 
 #include "app/files/fix_text.h"
-#include "app/files/input_error.h"
 #include "app/files/mesh_file.h"
 #include "app/files/model_file.h"
 #include "app/files/recording_file.h"
@@ -19,6 +18,7 @@
 #include "app/files/xml_element.h"
 #include "app/shape_mesh.h"
 #include "app/simulation.h"
+#include "app/value_error.h"
 #include "physics/dynamics/fixation.h"
 #include "physics/dynamics/link_mechanics.h"
 #include "physics/dynamics/rigid_support.h"
@@ -28,25 +28,8 @@
 
 namespace medulla {
 
-using Attributes = std::initializer_list<std::string_view>;
-
 // What says where nodes or links are looked for.
-static const Attributes kRegions{"box", "sphere", "plane"};
-
-// nullptr where the line's values are the file's.
-static const OverriddenAttribute* overriddenAt(const Scene& scene, int line, Attributes attributes) {
-  for (const OverriddenAttribute& o : scene.overridden)
-    if (o.line == line && isOneOf(o.attribute, attributes)) return &o;
-  return nullptr;
-}
-
-// Of values that turn out to be wrong only now: said where they stand, in the file or, if one of them does, on the
-// command line.
-static std::runtime_error valueError(const Scene& scene, int line, Attributes attributes, const std::string& message) {
-  if (const OverriddenAttribute* o = overriddenAt(scene, line, attributes))
-    return inputError("--set " + o->path, 0, message);
-  return inputError(scene.path, line, message);
-}
+static const std::vector<std::string_view> kRegions{"box", "sphere", "plane"};
 
 // A missing file is the scene's mistake.
 static void requireFile(const Scene& scene, int line, const std::string& attribute, const std::string& what,

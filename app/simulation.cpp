@@ -6,6 +6,7 @@
 #include "app/files/input_error.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
+#include "app/value_error.h"
 #include "render/stage_times.h"
 
 namespace medulla {
@@ -20,8 +21,10 @@ World makeWorld(const LoadedScene& loaded) {
   }
   try {
     return World(scene.dynamics, {scene.bodies.begin(), scene.bodies.end()}, statics);
-  } catch (const std::runtime_error& error) {
-    throw inputError(scene.path, 0, error.what());
+  } catch (const TissueRefused& e) {
+    throw valueError(scene, scene.bodies[e.body].tissueLine, {"young", "poisson", "density", "damping"}, e.what());
+  } catch (const std::runtime_error& e) {
+    throw inputError(scene.path, 0, e.what());
   }
 }
 

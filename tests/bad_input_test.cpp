@@ -106,9 +106,12 @@ TEST_F(BadInput, WhatAnOverrideMakesImpossibleIsSaidOfIt) {
   }
 }
 
-TEST_F(BadInput, ATissueTooStiffForAnyStepIsRefusedWithItsScene) {
+TEST_F(BadInput, ATissueTooStiffForAnyStepIsRefusedWhereItStands) {
+  const std::string message = "body 'organ' cannot be simulated: its stable substep is ";
+  expectRefused(run({"check", "own/organ.xml", "--set", "tissue.t.young=1e20"}), "--set tissue.t.young: " + message);
+  expectRefused(run({"check", "own/organ.xml", "--set", "tissue.t.young=1e30"}), "--set tissue.t.young: " + message);
   write({.young = "1e20"});
-  expectRefused(run({"check", "own/organ.xml"}), "own/organ.xml: the stable substep is ");
+  expectRefused(run({"check", "own/organ.xml"}), "own/organ.xml:2: " + message);
 }
 
 TEST_F(BadInput, ResultsThatCannotBeWrittenFailTheRun) {

@@ -174,9 +174,23 @@ struct StepLimits {
   double stable = std::numeric_limits<double>::infinity(), safe = stable;
 };
 
+// Substeps that its tissue allows.
+StepLimits stepLimits(const BodyDescription& body, BodyMechanics& mechanics, const WorldSettings& settings) {
+  // Below this a second of simulation takes over an hour: a wrong unit rather than a stiff tissue.
+  constexpr double kLeastSubstep = 1e-8;
+  const double stable = dampBody(body, mechanics, settings.integrator);
+  const double safe = (body.tissue.damping < kLeastDamping ? kUndampedSafety : kStepSafety) * stable;
+  if (settings.integrator == Integrator::explicitEuler && settings.substeps == 0 && safe < kLeastSubstep)
+    throw std::runtime_error(
+        fmt::format("its stable substep is {:.3g} s: expected at least {:.0e} s; lower Young's modulus or raise the "
+                    "density",
+                    safe, kLeastSubstep));
+  return {stable, safe};
+}
+
 // Per body, and of all together. The modes at rest cost more than a hundred
 // substeps: a heap of like bodies has them once.
-std::vector<BodyMechanics> mechanicsOf(const std::vector<BodyDescription>& bodies, Integrator integrator,
+std::vector<BodyMechanics> mechanicsOf(const std::vector<BodyDescription>& bodies, const WorldSettings& settings,
                                        StepLimits& limits) {
   std::vector<BodyMechanics> mechanics;
   for (const BodyDescription& body : bodies) {
@@ -187,15 +201,20 @@ std::vector<BodyMechanics> mechanicsOf(const std::vector<BodyDescription>& bodie
       mechanics.push_back(BodyMechanics(mechanics[found]));
       continue;
     }
+    const auto refusal = [&body](const std::runtime_error& e) {
+      return fmt::format("body '{}' cannot be simulated: {}", body.name, e.what());
+    };
     try {
       mechanics.push_back(bodyMechanics(body));
-      mechanics.back().firstLike = static_cast<int>(found);
-      const double stable = dampBody(body, mechanics.back(), integrator);
-      limits.stable = std::min(limits.stable, stable);
-      limits.safe =
-          std::min(limits.safe, (body.tissue.damping < kLeastDamping ? kUndampedSafety : kStepSafety) * stable);
     } catch (const std::runtime_error& e) {
-      throw std::runtime_error(fmt::format("body '{}' cannot be simulated: {}", body.name, e.what()));
+      throw std::runtime_error(refusal(e));
+    }
+    mechanics.back().firstLike = static_cast<int>(found);
+    try {
+      const StepLimits own = stepLimits(body, mechanics.back(), settings);
+      limits = {std::min(limits.stable, own.stable), std::min(limits.safe, own.safe)};
+    } catch (const std::runtime_error& e) {
+      throw TissueRefused(static_cast<int>(found), refusal(e));
     }
   }
   return mechanics;
@@ -217,16 +236,9 @@ World::World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
              const std::vector<StaticShape>& statics) {
   checkSettings(settings);
   StepLimits limits;
-  std::vector<BodyMechanics> mechanics = mechanicsOf(bodies, settings.integrator, limits);
+  std::vector<BodyMechanics> mechanics = mechanicsOf(bodies, settings, limits);
   data_ = layOut(settings, std::move(bodies), mechanics);
   data_->stableSubstep = limits.stable;
-  // Below this a second of simulation takes over an hour: a wrong unit rather than a stiff tissue.
-  constexpr double kLeastSubstep = 1e-8;
-  if (settings.integrator == Integrator::explicitEuler && settings.substeps == 0 && limits.safe < kLeastSubstep)
-    throw std::runtime_error(
-        fmt::format("the stable substep is {:.3g} s: expected at least {:.0e} s; lower Young's "
-                    "modulus or raise the density",
-                    limits.safe, kLeastSubstep));
   data_->substeps = settings.substeps > 0 ? settings.substeps : chosenSubsteps(settings, data_->bodies, limits.safe);
   data_->substep = settings.frameDuration / data_->substeps;
   for (BodyRange& r : data_->ranges) r.settlingDamping = std::min(r.settlingDamping, 1 / data_->substep);

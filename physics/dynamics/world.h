@@ -121,12 +121,19 @@ struct CreepReport {
   std::vector<bool> bodies;  // which ones, in any of them
 };
 
+// A body whose tissue allows no substep; what() names it.
+struct TissueRefused : std::runtime_error {
+  int body;
+  TissueRefused(int which, const std::string& why) : std::runtime_error(why), body(which) {}
+};
+
 struct WorldData;  // arrays laid out for the step; physics/dynamics/world_data.h
 
 class World {
  public:
   // Throws std::runtime_error naming the body where a description cannot be simulated (range of a tissue value, a fixed
-  // sphere that does not exist, a body without spheres), or where settings or a static shape are out of range.
+  // sphere that does not exist, a body without spheres), or where settings or a static shape are out of range; of a
+  // body too stiff for any substep TissueRefused.
   World(const WorldSettings& settings, std::vector<BodyDescription> bodies,
         const std::vector<StaticShape>& statics = {});
   ~World();
