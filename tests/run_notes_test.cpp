@@ -58,6 +58,19 @@ TEST_F(RunNotes, CaptionsThatNobodySees) {
       << notes[0];
 }
 
+TEST_F(RunNotes, ACameraThatNobodySeesArrive) {
+  const auto notesOf = [&](const char* time) {
+    OwnScene::write({});
+    std::string text = read("own/organ.xml");
+    const std::size_t end = text.find("/>", text.find("<camera"));
+    text.replace(end, 2, fmt::format("><key t=\"{}\" fov=\"40\"/></camera>", time));
+    folder.write("own/organ.xml", text);
+    return complaints(run({"check", "own/organ.xml"}));
+  };
+  EXPECT_EQ(notesOf("2"), Notes{"note: the camera moves until 2 s, and the scene ends at 0.48 s"});
+  EXPECT_EQ(notesOf("0.48"), Notes{});
+}
+
 TEST_F(RunNotes, JawsThatComeToWhereTheyCloseAndNoFurther) {
   EXPECT_EQ(notesOfGrips({0, 0.2, 0.5, 0}, 0.6),
             Notes{"note: the jaws of tool 'probe' come to where they close and no further: it grips nothing"});

@@ -37,9 +37,12 @@ static void printUnplayed(const LoadedScene& loaded, bool isExcerpt) {
   }
 }
 
-static void printUnseenCaptions(const Scene& scene, bool isExcerpt) {
+static void printUnseen(const Scene& scene, bool isExcerpt) {
+  if (isShortened(scene, isExcerpt)) return;
+  if (const double last = scene.camera.back().time; last > scene.duration)
+    tell("note: the camera moves until {:.6g} s, and the scene ends at {:.6g} s\n", last, scene.duration);
   for (const SceneCaption& caption : scene.captions)
-    if (caption.from >= scene.duration && !isShortened(scene, isExcerpt))
+    if (caption.from >= scene.duration)
       tell("note: the caption {} begins at {:.6g} s, and the scene ends at {:.6g} s\n", inQuotes(caption.text, '"'),
            caption.from, scene.duration);
 }
@@ -200,7 +203,7 @@ void printWarnings(const LoadedScene& loaded, const RunOptions& options, const W
   printUnits(loaded);
   printPassedThrough(scene);
   printUnplayed(loaded, options.isExcerpt);
-  printUnseenCaptions(scene, options.isExcerpt);
+  printUnseen(scene, options.isExcerpt);
   printJumps(loaded);
   printAlmostClosed(loaded);
   for (const BodyOverlap& o : world.startOverlaps()) {
