@@ -105,6 +105,8 @@ TEST(TrajectoryFile, EveryMistakeIsNamedWithItsLine) {
                   "file.csv:1: ", "columns are separated by semicolons, expected commas");
   expectComplaint("t[s]\tx[m]\ty[m]\tz[m]\tqw\tqx\tqy\tqz\tgrip\n", "file.csv:1: ", "separated by tabs");
   expectComplaint("0,0,0,0,1,0,0,0,0\n" + good, "file.csv:1: ", "column t[s] is missing");
+  expectComplaint("stamp,px,py\n" + good,
+                  "file.csv:1: ", "expected t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip: a <recording>");
   expectComplaint("t[s],x[mm],y[mm],z[mm],qw,qx,qy,qz,grip\n" + good,
                   "file.csv:1: ", "column x[m] is missing, found 'x[mm]': a <recording>");
   expectComplaint("t[ms],x[m],y[m],z[m],qw,qx,qy,qz,grip\n" + good, "file.csv:1: ", "found 't[ms]': a <recording>");
@@ -125,6 +127,18 @@ TEST(TrajectoryFile, EveryMistakeIsNamedWithItsLine) {
   expectComplaint(header + "0,0,0,0,0.9,0,0,0,0\n", "file.csv:2: ", "length 0.9");
   expectComplaint(header + "0,0,0,0,0,0,0,0,0\n", "file.csv:2: ", "length 0");
   expectComplaint(header + "0,0,0,0,1,0,0,0,1.5\n", "file.csv:2: ", "column grip is 1.5");
+}
+
+TEST(TrajectoryFile, LinesEndAsAnyComputerWritesThem) {
+  const std::string rows = "\n0,0,0,0,1,0,0,0,0\n\n# a tool\n1,2,0,0,1,0,0,0,0\n";
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    std::string text = header.substr(0, header.size() - 1);
+    for (const char c : rows) text += c == '\n' ? end : std::string(1, c);
+    const Trajectory read = parseTrajectory(text, "file.csv");
+    ASSERT_EQ(read.samples.size(), 2u);
+    EXPECT_EQ(read.samples[1].position.x(), 2);
+    expectComplaint(text + "1,0,0,0,1,0,0,0,0" + end, "file.csv:6: ", "strictly increasing");
+  }
 }
 
 TEST(TrajectoryFile, MissingFilesAndFoldersAreRefused) {

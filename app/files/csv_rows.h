@@ -8,7 +8,7 @@ namespace medulla {
 
 // Walks a table in text row by row, for formats whose errors must name the line. Cells come without the white space
 // and the double quotes around them (which do not keep a separator from being one); # starts a comment; rows without
-// content are skipped; lines end in LF or CRLF.
+// content are skipped.
 class CsvRows {
  public:
   // `text` must outlive this object; `name` is the path that errors begin with. A blank as separator stands for any run

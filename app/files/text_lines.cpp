@@ -1,5 +1,6 @@
 #include "app/files/text_lines.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "app/files/input_error.h"
@@ -9,9 +10,11 @@
 namespace medulla {
 
 std::string_view takeLine(std::string_view& rest) {
-  const std::size_t end = rest.find('\n');
-  const std::string_view line = rest.substr(0, end);
-  rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+  const auto endsLine = [](char c) { return c == '\n' || c == '\r'; };
+  const auto length = static_cast<std::size_t>(std::find_if(rest.begin(), rest.end(), endsLine) - rest.begin());
+  const std::string_view line = rest.substr(0, length);
+  rest.remove_prefix(length);
+  rest.remove_prefix(rest.starts_with("\r\n") ? 2 : std::min<std::size_t>(rest.size(), 1));
   return line;
 }
 

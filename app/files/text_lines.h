@@ -6,11 +6,11 @@
 
 namespace medulla {
 
-// The next line, without what ends it (LF); `rest` loses it.
+// The next line, without what ends it (LF, CRLF, or CR alone, as spreadsheets on a Macintosh write); `rest` loses both.
 std::string_view takeLine(std::string_view& rest);
 
-// Walks a text line by line and splits it into words, for formats whose errors must name the line. Lines end in LF or
-// CRLF; # starts a comment.
+// Walks a text line by line and splits it into words, for formats whose errors must name the line. # starts a
+// comment.
 class TextLines {
  public:
   // `text` must outlive this object; `name` is the path that errors begin with. `joined`: a backslash at the end of a

@@ -40,11 +40,9 @@ static void requireColumn(const CsvRows& header, std::string_view column) {
   if (isOneOf(column, cells)) return;
   const std::string_view found = inAnotherUnit(cells, column);
   header.fail(
-      found.empty()
-          ? fmt::format("column {} is missing, expected {}", column, requiredHeader())
-          : fmt::format("column {} is missing, found {}: a <recording> that names this file reads other units, by its "
-                        "<units> (scenes/recording.xsd)",
-                        column, inQuotes(found)));
+      fmt::format("column {} is missing, {}: a <recording> that names this file reads others, by its <columns> "
+                  "and <units> (scenes/recording.xsd)",
+                  column, found.empty() ? "expected " + requiredHeader() : "found " + inQuotes(found)));
 }
 
 static void checkHeader(const CsvRows& header) {
