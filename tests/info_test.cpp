@@ -82,6 +82,17 @@ TEST(Info, TheSpeedOfAMotionIsItsWayOverItsTime) {
   EXPECT_EQ(valueOf(r.out, "gap_max"), "0.25 s");
 }
 
+TEST(Info, AGripThatIsClosedFromTheStartHasClosedOnce) {
+  const TemporaryFolder folder;
+  const std::string header = "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n";
+  const auto closings = [&](const std::string& rows) {
+    folder.write("a.csv", header + rows);
+    return valueOf(runProgram({"info", folder / "a.csv"}).out, "grip_closings");
+  };
+  EXPECT_EQ(closings("0,0,0,0,1,0,0,0,1\n1,0,0,0,1,0,0,0,1\n"), "1");
+  EXPECT_EQ(closings("0,0,0,0,1,0,0,0,1\n1,0,0,0,1,0,0,0,0\n2,0,0,0,1,0,0,0,1\n"), "2");
+}
+
 TEST(Info, MassAndFrequenciesOfABodyAreThoseOfItsTissue) {
   const std::string scene = kSource + "scenes/gallbladder.xml";
   const ProgramResult r = runProgram({"info", scene});
@@ -104,14 +115,18 @@ TEST(Info, MassAndFrequenciesOfABodyAreThoseOfItsTissue) {
 
 TEST(Info, TellsOfWhatRunsLeave) {
   const TemporaryFolder folder;
-  const ProgramResult run = runProgram({"replay", kSource + "scenes/gallbladder.xml", "--set", "clock.duration=0.2",
-                                        "--log", folder / "run.csv", "--cache", folder / "run.cache"});
+  const ProgramResult run =
+      runProgram({"replay", kSource + "scenes/gallbladder.xml", "--set", "clock.duration=0.2", "--log",
+                  folder / "run.csv", "--frame-times", folder / "times.csv", "--cache", folder / "run.cache"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const ProgramResult log = runProgram({"info", folder / "run.csv"}),
                       cache = runProgram({"info", folder / "run.cache"});
   EXPECT_EQ(valueOf(log.out, "kind"), "log") << log.err;
   EXPECT_EQ(valueOf(log.out, "rows"), "10");
   EXPECT_EQ(valueOf(log.out, "to"), "0.2 s");
+  const ProgramResult times = runProgram({"info", folder / "times.csv"});
+  EXPECT_EQ(valueOf(times.out, "kind"), "frame_times") << times.err;
+  EXPECT_EQ(valueOf(times.out, "rows"), "10");
   EXPECT_EQ(valueOf(cache.out, "kind"), "cache") << cache.err;
   EXPECT_EQ(valueOf(cache.out, "pictures"), "6");
   EXPECT_EQ(valueOf(cache.out, "tools"), "grasper");

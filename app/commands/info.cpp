@@ -206,8 +206,9 @@ std::vector<Result> cacheResults(const std::string& path) {
 std::vector<Result> logResults(const std::string& path) {
   const LogTable log = readLog(path);
   if (log.isCut) tell("{}: note: ends in the midst of a row\n", path);
+  const std::string kind = isOneOf("servo", log.columns) ? "frame_times" : "log";
   std::vector<Result> results = {
-      {"kind", "log", ""}, {"rows", numberText(log.value.size()), ""}, {"columns", numberText(log.columns.size()), ""}};
+      {"kind", kind, ""}, {"rows", numberText(log.value.size()), ""}, {"columns", numberText(log.columns.size()), ""}};
   if (log.value.empty()) return results;
   results.push_back({"from", numberText(log.value.front()[0]), "s"});
   results.push_back({"to", numberText(log.value.back()[0]), "s"});
@@ -221,7 +222,7 @@ std::vector<Result> tableResults(const std::string& path, const std::string& tab
         "is of no kind that is known here, expected a mesh, a model, a scene, a trajectory, a recording, a "
         "log or a state cache");
   CsvRows rows(table, path);
-  const bool isLog = rows.next() && isOneOf("energy.kinetic", rows.cells());
+  const bool isLog = rows.next() && (isOneOf("energy.kinetic", rows.cells()) || isOneOf("servo", rows.cells()));
   return isLog ? logResults(path) : trajectoryResults(readTrajectory(path));
 }
 
