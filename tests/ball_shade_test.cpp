@@ -65,6 +65,20 @@ TEST(BallShade, WhatIsBakedIsNotCountedTwice) {
   EXPECT_LT(openness(near, near, true), 0.4f);
 }
 
+// What stays is baked without what travels, wherever that is at rest.
+TEST(BallShade, WhatTravelsIsNoPartOfWhatIsBaked) {
+  const Balls none, near{{{0, 0, 0.15f}, 0.1f}};
+  SceneMesh mesh = patches(false), alone = mesh;
+  mesh.parts[1].travels = alone.parts[1].travels = true;
+  BallShade shade;
+  shade.bake(mesh, {&none, &near});
+  shade.apply({&none, &near}, kEye, mesh);
+  shade.bake(alone, {&none, &none});
+  shade.apply({&none, &near}, kEye, alone);
+  EXPECT_EQ(mesh.openness[0], alone.openness[0]);
+  EXPECT_LT(mesh.openness[0], 0.4f);
+}
+
 TEST(BallShade, BallsOfOneSurfaceThatOverlapHideHardlyMoreThanOne) {
   SceneMesh mesh = patches(true);
   const Balls none, one{{{0, 0, 0.15f}, 0.1f}}, three{one[0], one[0], one[0]};

@@ -261,6 +261,33 @@ TEST_F(ChartCommand, ReferenceOfTheSceneIsWhatErrorsAreAgainst) {
       chart({"--steps", "0.5", "--methods", "full", "--set", "body.pear.reference=" + (folder / "twice.txt")}).exitCode,
       0);
   EXPECT_NEAR(std::stod(rowsOf(folder / "out/chart.csv")[1][4]), 50, 1.5);
+  // Accuracy is that of the node that is off the most: 0.15 / 1.15 of its way, of all by less than a tenth.
+  folder.write("more.txt", "# unit 1.15e-3 m\n" + rows.substr(rows.find("m\n") + 2));
+  const ProgramResult off =
+      chart({"--steps", "0.5", "--methods", "full", "--set", "body.pear.reference=" + (folder / "more.txt")});
+  EXPECT_NEAR(std::stod(rowsOf(folder / "out/chart.csv")[1][4]), 13, 1);
+  EXPECT_LT(std::stod(rowsOf(folder / "out/chart.csv")[1][5]), 9);
+  EXPECT_EQ(valueOf(off.out, "full.cpu_at_10%"), "");
+}
+
+// Of a body that shrinks, too.
+TEST_F(ChartCommand, TheVolumeIsThatOfTheRunsEnd) {
+  const std::string pressed = "body.pear.load.force=0 5e-2 0";
+  const ProgramResult r = chart({"--steps", "auto", "--methods", "full", "--set", pressed});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  const std::string log = folder / "log.csv";
+  ASSERT_EQ(
+      runProgram({"replay", folder / "case.xml", "--set", "body.pear.surface=full", "--set", pressed, "--log", log})
+          .exitCode,
+      0);
+  const auto chartRows = rowsOf(folder / "out/chart.csv"), logRows = rowsOf(log);
+  const auto valueIn = [](const auto& rows, const std::string& name) {
+    const auto column = std::find(rows[0].begin(), rows[0].end(), name) - rows[0].begin();
+    return std::stod(rows.back().at(static_cast<std::size_t>(column)));
+  };
+  const double ratio = valueIn(logRows, "pear.volume_ratio");
+  EXPECT_LT(ratio, 0.999);
+  EXPECT_NEAR(valueIn(chartRows, "volume_ratio"), ratio, 1e-4);
 }
 
 // gnuplot ends with 0 though its output had no room, and no picture of an earlier run stands for this one's.

@@ -290,6 +290,23 @@ TEST(StaticShapes, AFastBallIsNotTurnedAsideByWhatItMisses) {
   }
 }
 
+// Nor what is below a sheet, which is beyond it, by being taken for what has sunk into it.
+TEST(StaticShapes, WhatFliesBelowASheetStaysThere) {
+  StaticShape sheet;
+  sheet.kind = StaticShape::Kind::mesh;
+  sheet.mesh.vertices = {{-2, 0, -1}, {-2, 0, 1}, {2, 0, 1}, {2, 0, -1}};
+  sheet.mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  WorldSettings s;
+  s.contact = ContactMode::balls;
+  s.gravity.setZero();
+  s.frameDuration = 0.02;
+  s.substeps = 1;
+  World world(s, {synthetic::ball("thrown", 0.02, {-1, -0.06, 0})}, {sheet});
+  synthetic::throwBody(world, 0, {10, 0, 0});
+  for (int k = 0; k < 10; ++k) world.advance({});
+  EXPECT_LT((vectorOf(world.data().spheres.position[0]) - Vector3d(-1 + 10 * world.time(), -0.06, 0)).norm(), 1e-9);
+}
+
 // A wall that is wound inside out keeps what is in it, at 1 m/s and from any side.
 TEST(StaticShapes, AnInsideOutWallKeepsABallIn) {
   StaticShape wall;

@@ -74,6 +74,23 @@ TEST(StripChart, StaysInItsCornerAndShowsWhatItIsGiven) {
   EXPECT_NEAR((lowest - highest) / double(lowest - (top + 0.06 * 360)), 0.5, 0.1);
 }
 
+// A line per whole second, as far from the end as that second is ago.
+TEST(StripChart, HasALinePerSecond) {
+  Image image = greyImage(640, 360);
+  StripChart chart = ramp();
+  chart.curves[0].values.assign(601, 0.f);
+  drawStripChart(chart, image);
+  const auto [left, right, top, bottom] = drawnIn(image);
+  const int row = top + (bottom - top) * 6 / 10, paper = *pixelAt(image, left + 2, top + 2);
+  std::vector<int> lines;
+  for (int x = left; x <= right; ++x)
+    if (*pixelAt(image, x, row) > paper + 3) lines.push_back(x);
+  ASSERT_EQ(lines.size(), 5u);
+  const double second = (lines[4] - lines[0]) / 4.0, margin = 0.016 * 360;
+  EXPECT_NEAR(5 * second, right + 1 - left - 2 * margin, 2);
+  EXPECT_NEAR(right + 1 - margin - lines[4], 0.5 * second, 2);  // it is 7.5 s
+}
+
 TEST(StripChart, OfManyToolsStaysInItsCorner) {
   for (const int width : {1280, 640, 240}) {
     Image one = greyImage(width, 9 * width / 16), many = one;
@@ -151,6 +168,13 @@ TEST(ForceView, ArrowAndChartShareARange) {
     lastRange = chart.range;
     ASSERT_EQ(chart.curves.size(), 1u);
     ASSERT_EQ(chart.curves[0].values.back(), float(state.tools[0].force.norm()));
+    for (std::size_t back = 0; back < record.tools.size(); ++back)
+      ASSERT_EQ(chart.curves[0].values.rbegin()[std::ptrdiff_t(back)],
+                float(record.tools.rbegin()[std::ptrdiff_t(back)][0].force.norm()))
+          << back << " ticks ago";
+    if (state.tools[0].force.isZero(0)) {
+      ASSERT_TRUE(picture.overlay.arrows.empty());
+    }
     if (picture.overlay.arrows.empty()) continue;
     const Arrow& arrow = picture.overlay.arrows[0];
     const glm::vec3 along = arrow.to - arrow.from;

@@ -143,6 +143,19 @@ TEST_F(OwnGolden, AChangeOfTheHandAloneIsNoDriftOfThePixels) {
   EXPECT_NE(r.out.find("; state of the tools differs, renderer as stored"), std::string::npos) << r.out;
 }
 
+TEST_F(OwnGolden, WhereNothingElseDiffersOneLevelOfOnePixelFails) {
+  const std::string path = folder / "pictures/organ_8.png";
+  std::vector<PngText> texts;
+  Image image = readPng(path, &texts);
+  image.pixels[0] ^= 1;
+  writePng(path, image, texts);
+  const ProgramResult r = golden({"--dir", "pictures"});
+  EXPECT_EQ(r.exitCode, 3) << r.out;
+  EXPECT_NE(r.out.find("organ_8 failed: 0.0000 % of pixels over 4, 0 over 16"), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("; state as stored, renderer as stored"), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("organ_10 ok: equal"), std::string::npos) << r.out;
+}
+
 TEST_F(OwnGolden, AFolderThatCannotBeMadeIsSaidBeforeAnyPicture) {
   const ProgramResult r = golden({"--dir", "pictures", "--failures", "own/organ.xml/in_a_file"});
   EXPECT_EQ(r.exitCode, 1);

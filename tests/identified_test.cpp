@@ -209,6 +209,28 @@ TEST(IdentifiedSurface, ForcesOnNodesAndSpheresAreMinusTheEnergyGradient) {
   }
 }
 
+// Each node's attachment is damped by the relaxation time times what it resists with, along its normal and across.
+TEST(IdentifiedSurface, DampersAreTheAttachmentsStiffnessTimesTheirRelaxation) {
+  World world(weightless(), {chain(SurfaceMode::full, false, 0.2)});
+  WorldData& d = world.data();
+  ASSERT_FALSE(d.nodes.onSpheres.empty());
+  const double relaxation = d.nodes.onSpheres[0].relaxation, far = 1e-4;
+  ASSERT_GT(relaxation, 0);
+  for (const int node : {d.ranges[0].node[30], d.ranges[0].node[47]}) {
+    const Vector3d at = vectorAt(d.nodes.position, node), normal = vectorAt(d.nodes.area, node).normalized();
+    for (const Vector3d& along : {normal, Vector3d(normal.unitOrthogonal())}) {
+      setVector(d.nodes.position, node, at + far * along);
+      runStage(d, evaluateForces);
+      const double stiffness = d.nodes.groups[node / 4].stiffness[node % 4] + 2 * normalEnergy(d, node) / (far * far);
+      setVector(d.nodes.position, node, at);
+      setVector(d.nodes.velocity, node, along);  // 1 m/s
+      runStage(d, evaluateForces);
+      EXPECT_NEAR(vectorAt(d.nodes.force, node).dot(along), -relaxation * stiffness, 1e-6 * relaxation * stiffness);
+      setVector(d.nodes.velocity, node, Vector3d::Zero());
+    }
+  }
+}
+
 // Where the definition (identified_network.h) puts a node.
 static Vector3d defined(const WorldData& d, int node) {
   const SoftBodyModel& m = *d.bodies[0].model;

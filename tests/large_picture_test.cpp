@@ -53,6 +53,31 @@ double strayFromLine(const std::vector<double>& x) {
   return std::sqrt(stray);
 }
 
+// Means of coded values would darken edges.
+TEST(LargePicture, PixelsThatBecomeOneAreAveragedInLight) {
+  RendererSettings settings;
+  settings.width = settings.height = 64;
+  settings.antialias = settings.shadows = false;
+  settings.supersample = 2;
+  Renderer renderer(settings);
+  const float distance = 0.3f, pixel = 2 * distance * std::tan(glm::radians(20.f)) / 64;
+  renderer.addSurface(sheet(1, 40, -1 + 0.5f * pixel, 0, 0));  // up to the middle of the pixel beside the centre
+  Picture picture;
+  picture.endoscopeMask = false;
+  picture.camera.position = {0, 0, distance};
+  picture.camera.target = {0, 0, 0};
+  picture.camera.fovDegrees = 40;
+  picture.light.intensity = 0.3f;
+  Image image;
+  renderer.render(picture, image);
+  const auto at = [&](int x) { return double(image.pixels[4ul * (32ul * 64 + std::size_t(x))]); };
+  ASSERT_GT(at(31), 60);
+  ASSERT_LT(at(31), 200);  // no glare
+  ASSERT_LT(at(33), 0.3 * at(31));
+  const double light = 0.5 * (lightFromSrgb(at(31) / 255) + lightFromSrgb(at(33) / 255));
+  EXPECT_NEAR(at(32), 255 * srgbFromLight(light), 3);
+}
+
 // A narrow strip of a high picture, along the edge of the shadow that a sheet throws beside itself.
 TEST(LargePicture, StraightEdgeOfAShadowIsStraight) {
   RendererSettings settings;

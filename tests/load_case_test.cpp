@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <sstream>
 
 #include "app/files/fix_text.h"
@@ -369,6 +370,36 @@ TEST_F(LoadCase, ADrivenBodyIsNeverAtRest) {
   EXPECT_EQ(until("amplitude='0'").exitCode, 0);
 }
 
+// Of several that hold a sphere the one that lets it turn least counts.
+TEST_F(LoadCase, APartThatHoldsAllHoldsItsSpheresFromTurning) {
+  const auto freedoms = [&](const std::string& fixes) {
+    std::map<int, FixedFreedom> out;
+    const LoadedScene loaded = loadScene(readScene(scene(fixes)));
+    for (const FixedSphere& fixed : loaded.scene.bodies[0].fixed) out[fixed.sphere] = fixed.freedom;
+    return out;
+  };
+  const std::string turning = "<fix plane='0 -1 0 0.02' dof='translation'/>";
+  const auto held = freedoms(kHeld), loose = freedoms(turning);
+  ASSERT_FALSE(held.empty());
+  for (const auto& [sphere, freedom] : held) EXPECT_EQ(freedom, FixedFreedom::all) << sphere;
+  for (const auto& [sphere, freedom] : loose) EXPECT_EQ(freedom, FixedFreedom::translation) << sphere;
+  EXPECT_EQ(freedoms(turning + kHeld), held);
+  const std::string byNumber = fmt::format("<fix spheres='{}' dof='translation'/>", held.begin()->first);
+  EXPECT_EQ(freedoms(byNumber + kHeld), held);
+}
+
+// A tool that comes late is waited for, where nothing moves before.
+TEST_F(LoadCase, ARunUntilRestWaitsForItsTools) {
+  std::string text = readFile(scene(kHeld, "2"));
+  folder.write("case.xml", text.insert(text.find("<camera"), "<tool name='probe' trajectory='motion.csv'/>"));
+  folder.write("motion.csv",
+               "t[s],x[m],y[m],z[m],qw,qx,qy,qz,grip\n0,0.5,0.5,0.5,1,0,0,0,0\n0.9,0.5,0.5,0.5,1,0,0,0,0\n"
+               "1.2,0.6,0.5,0.5,1,0,0,0,0\n");
+  const ProgramResult run = runProgram({"replay", folder / "case.xml", "--until-rest"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_GT(std::stod(run.out.substr(run.out.find("rest_at ") + 8)), 1.199);
+}
+
 // Of ticks of 1/1200 s the one at 0.58 s is recorded at 0.5800000000000001 s, past the end of its frame.
 TEST_F(LoadCase, ARecordRestsWhenItsRunDid) {
   std::string text = readFile(scene(kHeld, "2"));
@@ -378,6 +409,7 @@ TEST_F(LoadCase, ARecordRestsWhenItsRunDid) {
   const std::string path = folder / "case.xml", record = folder / "record.csv";
   const ProgramResult run = runProgram({"replay", path, "--until-rest", "--record", record});
   ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_NE(readFile(record).find("\n0,0.5,"), std::string::npos) << "where it began";
   EXPECT_NE(readFile(record).find("\n0.5800000000000001,"), std::string::npos);
   const ProgramResult again = runProgram({"replay", path, "--until-rest", "--trajectory", record});
   for (const char* result : {"rest_at", "hash"})

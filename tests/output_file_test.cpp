@@ -46,6 +46,20 @@ TEST(OutputFile, AbandonedItLeavesNothingAndTheEarlierFileStays) {
   EXPECT_EQ(folder.contents().size(), 1u);
 }
 
+TEST(OutputFile, WhatIsReplacedKeepsItsPermissions) {
+  const TemporaryFolder folder;
+  using std::filesystem::perms;
+  for (const perms mode : {perms(0600), perms(0664), perms(0755)}) {
+    folder.write("a.csv", "earlier");
+    std::filesystem::permissions(folder / "a.csv", mode);
+    OutputFile file(folder / "a.csv");
+    file.write("later");
+    file.commit();
+    EXPECT_EQ(readTextFile(folder / "a.csv"), "later");
+    EXPECT_EQ(std::filesystem::status(folder / "a.csv").permissions(), mode);
+  }
+}
+
 TEST(OutputFile, ReplacesTheEarlierFileAtOnce) {
   const TemporaryFolder folder;
   folder.write("a.csv", "earlier and longer");

@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+extern "C" {
+#include <libavutil/version.h>
+}
+
 #include "render/image.h"
 #include "tests/own_scene.h"
 
@@ -331,6 +335,18 @@ TEST_F(Outputs, OfARunThatOneFileHasNoRoomForNoneAppears) {
   EXPECT_TRUE(contents().empty()) << contents()[0];
 }
 
+TEST_F(Outputs, AStillBesideATableWithoutRoomDoesNotAppear) {
+  const std::vector<std::string> words{"--size", "16x16", "--still", "0.1", "-o", "a.png", "--record", "b.csv"};
+  ASSERT_EQ(render(words).exitCode, 0);
+  ProgramOptions full;
+  full.fileSizeLimit = static_cast<long>(fs::file_size(folder / "b.csv")) - 1;
+  ASSERT_LT(fs::file_size(folder / "a.png"), full.fileSizeLimit);
+  for (const char* name : {"a.png", "b.csv"}) folder.write(name, "earlier");
+  expectRefused(render(words, full), "b.csv: cannot be written: File too large");
+  for (const char* name : {"a.png", "b.csv"}) EXPECT_EQ(read(name), "earlier") << name;
+  EXPECT_EQ(contents().size(), 2u);
+}
+
 TEST_F(Outputs, OfSeveralFilmsThatOneHasNoRoomForEarlierOnesStay) {
   const std::vector<std::string> words{"--size", "96x64", "-o", "a.mp4", "-o", "frames", "-o", "a.webm"};
   ASSERT_EQ(render(words).exitCode, 0);
@@ -357,6 +373,21 @@ TEST_F(Outputs, WithoutAnyContextTheReasonsAreSaid) {
                   fmt::format("the environment has {}={}, expected ", variable, value));
   }
   EXPECT_TRUE(contents().empty());
+}
+
+// They are loaded where a run needs them; the loader finds what is no library first.
+TEST_F(Outputs, LibrariesThatCannotBeLoadedAreSaid) {
+  ProgramOptions none;
+  none.environment = {{"LD_LIBRARY_PATH", (folder / "own").c_str()}};
+  const std::string utilities = fmt::format("libavutil.so.{}", LIBAVUTIL_VERSION_MAJOR), mesa = "libOSMesa.so.8";
+  folder.write("own/" + mesa, "");
+  expectRefused(render({"-o", "frames", "--context", "osmesa"}, none), mesa + ": ");
+  fs::remove(folder / ("own/" + mesa));
+  folder.write("own/" + utilities, "");
+  expectRefused(render({"--size", "16x16", "-o", "a.mp4"}, none), "a.mp4: cannot be written: ");
+  expectRefused(render({"--size", "16x16", "-o", "a.mp4"}, none), utilities + ": ");
+  EXPECT_TRUE(contents().empty());
+  EXPECT_EQ(render({"--size", "16x16", "--still", "0", "-o", "a.png"}, none).exitCode, 0);
 }
 
 TEST_F(Outputs, TimingsGoToStandardError) {

@@ -286,6 +286,16 @@ TEST_F(Recording, EveryMistakeInTheDescriptionIsNamedWithTheNearestName) {
   EXPECT_TRUE(message.starts_with("lone.xml:1: recording \"")) << message;
 }
 
+// Rows that lie ten times as close in one half of the window do not draw the mean there.
+TEST_F(Recording, SmoothingWeighsRowsByTheTimeThatTheyStandFor) {
+  std::string text;
+  for (int k = 0; k <= 1000; ++k)
+    if (k % 10 == 0 || (k > 500 && k < 600)) text += fmt::format("{} {} 0 0\n", 1e-3 * k, 1e-3 * k);
+  const Trajectory t = read("", "<columns time=\"1\" position=\"2 3 4\"/><span smooth=\"0.2\"/>", text);
+  ASSERT_EQ(t.samples.size(), 191u);
+  for (const ToolSample& sample : t.samples) EXPECT_NEAR(sample.position.x(), sample.time, 5e-4);
+}
+
 // The shipped recording undoes its tracker's frame: the hand rests where its maker's first pose is, turned as there.
 TEST(RecordingFile, TheShippedOneLiesWhereItsMakerPutIt) {
   const Trajectory t = readRecording(readRecordingMap(std::string(MEDULLA_SOURCE_DIR) + "/scenes/recorded/hand.xml"));

@@ -75,6 +75,27 @@ TEST(Simulation, PicturesOnTicksShowTheTickAndOthersLieBetween) {
   EXPECT_EQ(at.frame.bodies[0].nodes[0], record.to.bodies[0].nodes[0]);
 }
 
+// Off a tick by rounding alone a picture shows that tick; what is yes or no is that of the nearest.
+TEST(Simulation, PicturesTakeFlagsFromTheNearestTick) {
+  const LoadedScene loaded = shortScene(1);
+  ServoRecord record = Simulation(loaded).record();
+  ASSERT_GE(record.tools.size(), 4u);
+  record.tools[1][0].proxy = {0.1, 0.2, 0.3};
+  record.tools[2][0].proxy = {0.4, -0.2, 0.5};
+  record.tools[1][0].slipped = record.tools[2][0].inContact = true;
+  const double tick = record.duration / double(record.tools.size() - 1);
+  PictureState state;
+  for (const double rounding : {-1e-14, 0.0, 1e-14}) {
+    stateAt(record, record.start + 2 * tick + rounding, state);
+    EXPECT_EQ(state.tools[0].proxy, record.tools[2][0].proxy) << rounding;
+  }
+  for (const double share : {0.25, 0.75}) {
+    stateAt(record, record.start + (1 + share) * tick, state);
+    EXPECT_EQ(state.tools[0].slipped, share < 0.5);
+    EXPECT_EQ(state.tools[0].inContact, share > 0.5);
+  }
+}
+
 // A wedge of open air between closed jaws would look as if they held nothing.
 TEST(SceneView, JawsOfAFirmGripMeet) {
   const LoadedScene loaded = shortScene(1);

@@ -119,6 +119,28 @@ TEST(Sleep, AToolFeelsNothingOfIt) {
   EXPECT_LT(farthestApart(world, sleepless), 0.03 * kBallRadius);
 }
 
+// What it lay on is pulled away at once: no contact presses on it any more that would wake it.
+TEST(Sleep, WhatLiesOnASleeperThatIsPulledAwayFalls) {
+  BodyDescription beam = rod("beam", Vector3d::Zero());
+  beam.surface = SurfaceMode::skin;
+  beam.tissue.young = 5e4;
+  beam.fixed = {{0}, {3}};
+  BodyDescription load = rod("load", {0.03, 0.0255, -0.03});
+  load.worldFromModel.linear() = Eigen::AngleAxisd(-std::numbers::pi / 2, Vector3d::UnitY()).toRotationMatrix();
+  World world(settings(0.3), {load, beam});
+  run(world, 2);
+  ASSERT_TRUE(world.data().rest[0].asleep && world.data().rest[1].asleep);
+  const auto heightOf = [&](int sphere) { return vectorOf(world.data().spheres.position[sphere]).y(); };
+  const double before = heightOf(1);
+  const SoftBodyModel& model = *beam.model;
+  int middle = 0;
+  for (int i = 0; i < static_cast<int>(model.restNodes.size()); ++i)
+    if (std::abs(model.restNodes[i].x() - 0.03) < std::abs(model.restNodes[middle].x() - 0.03)) middle = i;
+  const Loads loads = holding(world, 1, middle, {0, -0.03, 0});
+  for (int k = 0; k < 5; ++k) world.advance(loads);
+  EXPECT_LT(heightOf(1), before - 0.002);
+}
+
 // Nodes that were about to be carried again stay as they are.
 TEST(Sleep, NodesOfASleeperStayWhereTheyAre) {
   BodyDescription held = rod("held", Vector3d::Zero());

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "app/commands/commands.h"
+#include "app/commands/run.h"
 #include "app/interrupt.h"
 #include "tests/complaint.h"
 #include "tests/own_scene.h"
@@ -249,12 +250,24 @@ TEST_F(CacheOfScene, CompareNamesTheFirstPictureAndFieldThatDiffer) {
   expectRefused(run({"compare", "organ.cache", "log.csv"}), "organ.cache is a state cache, log.csv is none");
 }
 
+// Until rest nothing sleeps: of bodies that would, that is another motion.
+TEST_F(CacheOfScene, UntilRestAMotionWithoutSleepIsMeant) {
+  RunOptions options, untilRest;
+  options.scene = untilRest.scene = folder / "own/organ.xml";
+  untilRest.untilRest = true;
+  const auto areOneMotion = [&] { return motionHash(loadRun(options)) == motionHash(loadRun(untilRest)); };
+  EXPECT_TRUE(areOneMotion());
+  options.overrides = untilRest.overrides = {{"dynamics.sleep_after", "1"}};
+  EXPECT_FALSE(areOneMotion());
+}
+
 // Large ones take minutes.
 TEST_F(CacheOfScene, ComparingEndsAtAnInterrupt) {
   const std::string cache = folder / "organ.cache";
   for (const double tolerance : {0., 1e-6}) {
     const pid_t child = fork();
     if (child == 0) {
+      std::signal(SIGINT, SIG_DFL);  // nohup would have it ignored
       watchInterrupts();
       std::raise(SIGINT);
       try {
