@@ -123,7 +123,8 @@ struct Renderer::Data {
   BallShade ballShade;
   std::vector<std::vector<ShadeBall>> restBalls;  // per surface
   SceneMesh toolsAlone;                           // of the model view, which has no surfaces
-  SceneMesh* shown = &mesh;                       // or toolsAlone
+  SceneMesh refined;                              // `mesh` where a tool holds some of it
+  SceneMesh* shown = &mesh;                       // or toolsAlone, or refined
   SceneMesh finer;                                // `shown` for a picture that is too large or too near for it
   bool isFiner = false;
   bool baked = true;
@@ -217,6 +218,10 @@ void Renderer::Data::placeSurfaces(const Picture& picture) {
 }
 
 void Renderer::Data::placeInstruments(const Picture& picture, const Viewpoint& view) {
+  std::vector<FineSpot> spots;
+  for (const Instrument& i : picture.instruments)
+    if (const std::optional<FineSpot> spot = spotBetweenJaws(i, *shown)) spots.push_back(*spot);
+  if (refine(*shown, spots, refined)) shown = &refined;
   for (const Instrument& i : picture.instruments)
     if (i.touching) applyTouch(i, *shown);
   for (const Instrument& i : picture.instruments) shadeAround(i, *shown);

@@ -143,7 +143,7 @@ float turnedBy(float r) { return r; }
 
 // Taps on turned squares and in the middle, evenly spread over the disc: on a ring, the shadows of shafts as thick as it
 // is wide have a dark line along their middle. A rotation per pixel would hide their steps better but leaves a pattern.
-// Most pixels agree on the widest squares and are done (of three, on two: on one, the shadows of thin tools fell to
+// Most pixels agree on the widest squares and are done (of four, on two: on one, the shadows of thin tools fell to
 // pieces): llvmpipe runs both sides of a branch but leaves a loop when all its pixels do, so the squares are a loop
 // whose length the compiler cannot know. SQUARE: a corner of the k-th, in a disc of radius 1; WIDEST: the last without
 // which no pixel is done.

@@ -50,14 +50,24 @@ vec2 rangeCorner(const Layout& layout) {
   return layout.at(0, 1) + vec2(0.5f, 0.6f) * layout.small;
 }
 
+// Is there room for that label above the lower line, where the curves of no force lie?
+bool hasRange(const Layout& layout) {
+  return layout.text > 0 && rangeCorner(layout).y + 1.3f * layout.small < layout.at(0, 0).y;
+}
+
 void drawGrid(const StripChart& chart, const Layout& layout, Ink& ink) {
   // No line goes through the label.
   const vec2 label = rangeCorner(layout) + vec2(textWidth(chart.rangeLabel, layout.small) + 1, 1.6f * layout.small);
-  for (const float v : {0.f, 0.5f, 1.f}) ink.stroke(onPixel(layout.at(0, v)), onPixel(layout.at(1, v)), layout.thin);
+  const bool labelled = hasRange(layout);
+  for (const float v : {0.f, 0.5f, 1.f}) {
+    vec2 left = layout.at(0, v);
+    if (labelled && v == 0.5f && left.y < label.y) left.x = label.x;
+    ink.stroke(onPixel(left), onPixel(layout.at(1, v)), layout.thin);
+  }
   for (int t = int(chart.now); float(t) > chart.now - chart.seconds; --t) {
     const float u = 1 - (chart.now - float(t)) / chart.seconds;
     vec2 top = layout.at(u, 1);
-    if (layout.text > 0 && top.x < label.x) top.y = std::max(top.y, label.y);
+    if (labelled && top.x < label.x) top.y = std::clamp(label.y, top.y, layout.at(u, 0).y);
     ink.stroke(onPixel(layout.at(u, 0)), onPixel(top), layout.thin);
   }
   ink.apply(kGrid, 1);
@@ -110,7 +120,7 @@ void writeLabels(const StripChart& chart, const Layout& layout, Ink& ink) {
     corner.x += textWidth(curve->label + "   ", text);
   }
   if (corner.x <= windowAt) writeText(chart.windowLabel, {windowAt, header + layout.text - small}, small, ink);
-  writeText(chart.rangeLabel, rangeCorner(layout), small, ink);
+  if (hasRange(layout)) writeText(chart.rangeLabel, rangeCorner(layout), small, ink);
   ink.apply(kGrey, 1);
 }
 

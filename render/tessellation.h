@@ -24,4 +24,16 @@ enum class Halved { outlines, largest };
 // leaves `out` alone, where no edge can be so long.
 bool tessellate(const SceneMesh& mesh, const Viewpoint& view, int pictureHeight, Halved halved, SceneMesh& out);
 
+// Where a part is bent more sharply than it is made for. m.
+struct FineSpot {
+  std::size_t part = 0;
+  glm::vec3 centre{0};
+  float longestEdge = 0;
+};
+
+// `out` is `mesh` with the spots' parts cut finer there: edges are halved until none is longer than a spot's
+// longestEdge and than a third of its middle's distance from the centre. The surface keeps its place. Returns false,
+// and leaves `out` alone, without spots.
+bool refine(const SceneMesh& mesh, const std::vector<FineSpot>& spots, SceneMesh& out);
+
 }  // namespace medulla

@@ -52,12 +52,12 @@ unsigned makeShadowTexture(int side) {
   return texture;
 }
 
-// A corner of each square of taps, widest first, for a soft edge of radius 1. In a finer map an edge is more texels
-// wide, and three squares would show as steps: more of them, each with the same share of the disc, turned on by the
-// golden section of a quarter.
-std::vector<glm::vec2> shadowSquares(int shadowSide) {
-  const int n = (3 * shadowSide + kShadowSide / 2) / kShadowSide;
-  if (n == 3) return {{.82f, .22f}, {.52f, .34f}, {.31f, .10f}};
+// A corner of each square of taps, widest first, for a soft edge of radius 1: each with the same share of the disc,
+// turned on by the golden section of a quarter. Squares that stand alike put their taps' steps one upon the other, as
+// teeth along the edge. In a finer map an edge is more texels wide, and takes more squares; where four pixels become
+// one, fewer.
+std::vector<glm::vec2> shadowSquares(int shadowSide, bool supersampled) {
+  const int n = ((supersampled ? 3 : 4) * shadowSide + kShadowSide / 2) / kShadowSide;
   std::vector<glm::vec2> squares;
   for (int k = 0; k < n; ++k) {
     const float angle = 0.618f * 0.5f * std::numbers::pi_v<float> * float(k);
@@ -67,8 +67,7 @@ std::vector<glm::vec2> shadowSquares(int shadowSide) {
 }
 
 // Of the map's size, and the squares as a choice by k.
-std::string shadowDefines(int shadowSide) {
-  const std::vector<glm::vec2> squares = shadowSquares(shadowSide);
+std::string shadowDefines(int shadowSide, const std::vector<glm::vec2>& squares) {
   std::string square;
   for (std::size_t k = 0; k < squares.size(); ++k)
     square += fmt::format("{}vec2({:.4f}, {:.4f})", k ? fmt::format(" : k == {} ? ", k) : "k == 0 ? ", squares[k].x,
@@ -82,10 +81,11 @@ std::string shadowDefines(int shadowSide) {
 TissuePass::Program TissuePass::makeProgram(Variant v, int shadowSide, bool supersampled) {
   const bool dull = v == Variant::litDull || v == Variant::edgeDull;
   const int shade = v == Variant::dark ? 2 : v == Variant::edge || v == Variant::edgeDull ? 1 : 0;
+  const std::vector<glm::vec2> squares = shadowSquares(shadowSide, supersampled);
   Program p;
   p.id = buildProgram("#define SHADE " + std::to_string(shade) + "\n" + (dull ? "#define DULL\n" : "") +
                           (supersampled ? "#define SUPERSAMPLED\n" : "") + "#define FILM_PEAK " +
-                          std::to_string(kFilmPeak) + "\n" + shadowDefines(shadowSide),
+                          std::to_string(kFilmPeak) + "\n" + shadowDefines(shadowSide, squares),
                       kTissueVertexShader, kTissueFragmentShader);
   const auto uniform = [&p](const char* name) { return glGetUniformLocation(p.id, name); };
   p.clipFromWorld = uniform("clipFromWorld");
@@ -97,7 +97,7 @@ TissuePass::Program TissuePass::makeProgram(Variant v, int shadowSide, bool supe
   glUseProgram(p.id);
   glUniform1i(uniform("detail"), 0);
   glUniform1i(uniform("shadowMap"), 1);
-  glUniform1i(uniform("squares"), int(shadowSquares(shadowSide).size()));
+  glUniform1i(uniform("squares"), int(squares.size()));
   return p;
 }
 

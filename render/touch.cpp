@@ -52,7 +52,6 @@ void displace(const MeshPart& part, const Bump& bump, SceneMesh& mesh) {
 struct Nearest {
   const MeshPart* part = nullptr;
   glm::vec3 position{0}, normal{0};
-  float spacing = 0;  // m, to the next vertices
 };
 Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
   Nearest nearest;
@@ -63,40 +62,58 @@ Nearest nearestMoving(const SceneMesh& mesh, glm::vec3 p, float reach) {
       const glm::vec3 d = mesh.position[i] - p;
       if (const float q = glm::dot(d, d); q < best) {
         best = q;
-        nearest = {&part, mesh.position[i], mesh.normal[i], spacingOf(mesh, i)};
+        nearest = {&part, mesh.position[i], mesh.normal[i]};
       }
     }
   }
   return nearest;
 }
 
+// What an instrument holds: of a smooth surface, which stays behind the held nodes that it hangs on, up to kReach, the
+// nearest place.
+struct Held : Nearest {
+  glm::vec3 bite{0};  // m: into the jaws, as deep as they bite, comes that place
+  float around = 0;   // m: what it takes along
+};
+constexpr float kFoldThickness = 0.0013f;  // m, at scale 1
+Held heldBy(const Instrument& instrument, const SceneMesh& mesh) {
+  constexpr float kWidth = 0.0055f, kReach = 0.014f, kBite = 0.0035f;  // m, at scale 1
+  if (!instrument.touching || instrument.grasp <= 0) return {};
+  Held held{nearestMoving(mesh, instrument.tip, instrument.scale * kReach)};
+  held.bite = instrument.tip + instrument.worldFromTool * glm::vec3(0, 0, instrument.scale * kBite);
+  held.around = std::max(instrument.scale * kWidth, 1.3f * glm::length(held.bite - held.position));
+  return held;
+}
+
 }  // namespace
 
-// A smooth surface stays behind the held nodes that it hangs on, up to kReach; the jaws bite kBite of it, and between
-// them stands a fold, as thick as they are apart there and wider than they are: so far beyond the tip of a tool that
-// stands upright. Jaws that lie along the surface have it stand up beside them, as far as they close across it, not
-// from above and below. It loses its blood with the grasp, not as it rises: jaws that open let it down before the tool
-// lets go, and it blinked red between the one and the dent that is left.
+std::optional<FineSpot> spotBetweenJaws(const Instrument& instrument, const SceneMesh& mesh) {
+  const Held held = heldBy(instrument, mesh);
+  if (!held.part) return {};
+  return FineSpot{std::size_t(held.part - mesh.parts.data()), held.position, 2 * instrument.scale * kFoldThickness};
+}
+
+// The jaws bite some of it, and between them stands a fold, as thick as they are apart there and wider than they are:
+// so far beyond the tip of a tool that stands upright. Jaws that lie along the surface have it stand up beside them, as
+// far as they close across it, not from above and below. It loses its blood with the grasp, not as it rises: jaws that
+// open let it down before the tool lets go, and it blinked red between the one and the dent that is left.
 static void riseBetweenJaws(const Instrument& instrument, float blanched, SceneMesh& mesh) {
-  constexpr float kWidth = 0.0055f, kReach = 0.014f, kBite = 0.0035f;  // m, at scale 1, as all here
-  constexpr float kFold = 0.0090f, kRidge = 0.0062f, kFoldThickness = 0.0013f, kFoldWidth = 0.0040f;
+  constexpr float kFold = 0.0090f, kRidge = 0.0062f, kFoldWidth = 0.0040f;  // m, at scale 1
   const glm::vec3 axis = instrument.worldFromTool * glm::vec3(0, 0, instrument.scale);
-  const Nearest held = nearestMoving(mesh, instrument.tip, instrument.scale * kReach);
+  const Held held = heldBy(instrument, mesh);
   if (!held.part) return;
-  const glm::vec3 offset = instrument.tip + kBite * axis - held.position;
-  const float around = std::max(instrument.scale * kWidth, 1.3f * glm::length(offset));
-  displace(*held.part, {held.position, instrument.hold * offset, glm::mat3(1 / around), blanched, instrument.grasp},
+  displace(*held.part,
+           {held.position, instrument.hold * (held.bite - held.position), glm::mat3(1 / held.around), blanched,
+            instrument.grasp},
            mesh);
-  const float thickness = std::max(kFoldThickness, 0.8f * held.spacing / instrument.scale);  // else facets stand out
-  const float wide = std::max(kFoldWidth, thickness);
-  const glm::vec3 narrow(1 / wide, 1 / thickness, 1 / wide);
+  const glm::vec3 narrow(1 / kFoldWidth, 1 / kFoldThickness, 1 / kFoldWidth);
   glm::mat3 across = glm::mat3_cast(instrument.worldFromTool);  // a column per axis of the tool
   for (int k = 0; k < 3; ++k) across[k] *= narrow[k] / instrument.scale;
   const glm::vec3 aside = instrument.worldFromTool * glm::vec3(instrument.scale, 0, 0);
   const float upright = std::max(glm::dot(held.normal, axis) / instrument.scale, 0.f),
               flat = (1 - upright) * glm::dot(held.normal, aside) / instrument.scale;
   const glm::vec3 fold = instrument.hold * (kFold * upright * axis + kRidge * flat * aside);
-  displace(*held.part, {instrument.tip + kBite * axis, fold, glm::transpose(across), blanched, 0}, mesh);
+  displace(*held.part, {held.bite, fold, glm::transpose(across), blanched, 0}, mesh);
 }
 
 // The simulation moves nodes a centimetre apart; this is what happens between them.
@@ -111,7 +128,7 @@ void applyTouch(const Instrument& instrument, SceneMesh& mesh) {
   if (pressed > 0)
     for (const MeshPart& part : mesh.parts)
       if (!part.instrument) displace(part, dent, mesh);
-  if (instrument.grasp > 0) riseBetweenJaws(instrument, blanched, mesh);
+  riseBetweenJaws(instrument, blanched, mesh);
 }
 
 void shadeAround(const Instrument& instrument, SceneMesh& mesh) {

@@ -1,13 +1,20 @@
 #pragma once
 
+#include <optional>
+
 #include "render/renderer.h"
 #include "render/scene_mesh.h"
+#include "render/tessellation.h"
 
 namespace medulla {
 
 // What the part's deformation since `rest` does to its colour: stretched tissue pales, compressed tissue reddens, and
 // less of the cavity's light reaches into a fold. Changes blanch and openness.
 void applyStrain(const SceneMesh& rest, SceneMesh& mesh, const MeshPart& part);
+
+// Where what the instrument holds comes up between its jaws, in a fold that meshes are too coarse for: none where it
+// holds nothing.
+std::optional<FineSpot> spotBetweenJaws(const Instrument& instrument, const SceneMesh& mesh);
 
 // Where an instrument touches: the tissue around its tip is pressed in softly along the instrument and loses its blood.
 // What a closed grip holds comes up between its jaws instead. Changes positions, normals, openness and blanch of the

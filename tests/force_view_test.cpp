@@ -103,6 +103,27 @@ TEST(StripChart, OfManyToolsStaysInItsCorner) {
   }
 }
 
+// In low pictures the middle line would, and in the lowest the lower one.
+TEST(StripChart, NoLineGoesThroughTheRange) {
+  for (int height = 90; height <= 360; height += 6) {
+    Image without = greyImage(16 * height / 9, height), with = without;
+    StripChart chart = ramp();
+    drawStripChart(chart, without);
+    chart.rangeLabel = "1";
+    drawStripChart(chart, with);
+    const Box paper = drawnIn(with);
+    Box label{with.width, 0, height, 0};
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < with.width; ++x) {
+        if (*pixelAt(with, x, y) <= *pixelAt(without, x, y) + 40) continue;
+        label = {std::min(label.left, x), std::max(label.right, x), std::min(label.top, y), std::max(label.bottom, y)};
+      }
+    EXPECT_TRUE(label.left < label.right || height < 132) << height;
+    for (int y = label.top; y <= label.bottom; ++y)
+      EXPECT_LE(*pixelAt(with, label.left - 2, y), *pixelAt(with, paper.left, paper.top)) << height << " " << y;
+  }
+}
+
 TEST(StripChart, IsDrawnIntoPicturesOfAnySize) {
   for (const auto& [width, height] : {std::pair(16, 16), std::pair(64, 48), std::pair(320, 240), std::pair(18, 400)}) {
     Image image = greyImage(width, height);

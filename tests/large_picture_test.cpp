@@ -101,6 +101,37 @@ TEST(LargePicture, StraightEdgeOfAShadowIsStraight) {
   EXPECT_LT(strayFromLine(edge), 0.4);
 }
 
+// By how much an edge, nine pixels wide, bends at most from one pixel to the next, as a share of what it falls.
+TEST(Renderer, SoftEdgesOfShadowsHaveNoSteps) {
+  RendererSettings settings;
+  settings.width = 320;
+  settings.height = 720;
+  settings.antialias = false;
+  Renderer renderer(settings);
+  renderer.addSurface(sheet(0.3f, 80, 0, 0, 0));
+  renderer.addSurface(sheet(0.15f, 60, 0.18f, 0, 0.07f));
+  Picture p;
+  p.camera.position = {0, 0, 0.25f};
+  p.camera.fovDegrees = 40;
+  p.light.offset = {0.1f, 0, 0};
+  p.endoscopeMask = false;
+  p.surfaces.resize(2);
+  for (const float slant : {0.05f, 0.1f, 0.2f, 0.3f, 0.4f, 0.6f, 0.8f}) {
+    p.surfaces[1].positions = sheet(0.15f, 60, 0.18f, slant, 0.07f).restPositions;
+    Image image;
+    renderer.render(p, image);
+    constexpr int kTop = 300, kBottom = 420, kBright = 100, kDark = 260;  // px, around the edge
+    double mean = 0;
+    for (int y = kTop; y < kBottom; ++y) {
+      const auto at = [&](int x) { return double(image.pixels[4ul * (std::size_t(y) * image.width + x)]); };
+      double most = 0;
+      for (int x = kBright; x < kDark; ++x) most = std::max(most, std::abs(at(x + 1) - 2 * at(x) + at(x - 1)));
+      mean += most / (at(kBright) - at(kDark)) / (kBottom - kTop);
+    }
+    EXPECT_LT(mean, 0.18) << slant;
+  }
+}
+
 TEST(ShadowMap, IsAsFineAsThePicture) {
   EXPECT_EQ(shadowSideFor(480), kShadowSide);
   EXPECT_EQ(shadowSideFor(720), kShadowSide);

@@ -71,16 +71,50 @@ TEST(Tessellation, OutlinesAreRoundInLargePictures) {
   }
 }
 
-TEST(Tessellation, LeavesNoCracks) {
-  SceneMesh finer;
-  tessellate(torus(48, 24), fromAbove(), 2160, Halved::outlines, finer);
+void expectNoCracks(const SceneMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
-  for (std::size_t k = 0; k < finer.index.size(); ++k)
-    ++edges[{finer.index[k], finer.index[k % 3 == 2 ? k - 2 : k + 1]}];
+  for (std::size_t k = 0; k < mesh.index.size(); ++k) ++edges[{mesh.index[k], mesh.index[k % 3 == 2 ? k - 2 : k + 1]}];
   for (const auto& [edge, count] : edges) {
     EXPECT_EQ(count, 1);
     EXPECT_TRUE(edges.contains({edge.second, edge.first}));
   }
+}
+
+TEST(Tessellation, LeavesNoCracks) {
+  SceneMesh finer;
+  tessellate(torus(48, 24), fromAbove(), 2160, Halved::outlines, finer);
+  expectNoCracks(finer);
+}
+
+float areaOf(const SceneMesh& mesh) {
+  float area = 0;
+  for (std::size_t k = 0; k < mesh.index.size(); k += 3) {
+    const vec3 a = mesh.position[mesh.index[k]];
+    area += 0.5f * glm::length(glm::cross(mesh.position[mesh.index[k + 1]] - a, mesh.position[mesh.index[k + 2]] - a));
+  }
+  return area;
+}
+
+TEST(Tessellation, ASpotIsCutFinelyInItsPlaceAndNothingElse) {
+  const FineSpot spot{1, {kRing + kTube, 0, 0}, 0.002f};
+  SceneMesh mesh = torus(32, 16), finer;
+  EXPECT_FALSE(refine(mesh, {}, finer));
+  const MeshPart whole = mesh.parts[0];
+  mesh.parts = {whole, whole};
+  mesh.parts[0].indexCount = 0;  // the other part: the same vertices alone
+  ASSERT_TRUE(refine(mesh, {spot}, finer));
+  expectNoCracks(finer);
+  EXPECT_NEAR(areaOf(finer) / areaOf(mesh), 1, 1e-4f);
+  EXPECT_EQ(finer.parts[0].vertexCount, whole.vertexCount);
+  std::size_t cut = 0;
+  for (std::size_t k = 0; k < finer.index.size(); ++k) {
+    const vec3 a = finer.position[finer.index[k]], b = finer.position[finer.index[k % 3 == 2 ? k - 2 : k + 1]];
+    const float away = glm::distance(0.5f * (a + b), spot.centre);
+    EXPECT_LE(glm::distance(a, b), std::max(spot.longestEdge, away / 2.99f));
+    cut += away < 0.02f;
+  }
+  EXPECT_GT(cut, 100u);
+  EXPECT_LT(finer.index.size(), mesh.index.size() + 3 * cut);
 }
 
 TEST(Tessellation, WhatASmallPictureShowsStaysAsItIs) {

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numbers>
+#include <vector>
 
+#include "render/depth_map.h"
 #include "render/instrument_mesh.h"
 
 namespace medulla {
@@ -147,6 +150,46 @@ TEST(Touch, PressedTissueGivesWayAndHeldTissueComesBetweenTheJaws) {
   SceneMesh check = pressed;
   computeNormals(check, check.parts[0]);
   for (std::size_t i = 0; i < check.normal.size(); ++i) EXPECT_GT(glm::dot(check.normal[i], pressed.normal[i]), 0.98f);
+}
+
+// m: height above z = 0, over a square of 40 mm about the middle, seen along -z.
+std::vector<float> heightsOf(const SceneMesh& mesh) {
+  constexpr int kSide = 80;
+  constexpr float kTexelsPerMetre = 2000, kDeepest = 0.1f;  // m
+  DepthMap map(kSide, kSide);
+  const auto texel = [](vec3 p) {
+    return vec3(p.x * kTexelsPerMetre + 0.5f * kSide, p.y * kTexelsPerMetre + 0.5f * kSide, 0.5f - p.z / kDeepest);
+  };
+  for (std::size_t k = 0; k < mesh.index.size(); k += 3)
+    map.rasterize(texel(mesh.position[mesh.index[k]]), texel(mesh.position[mesh.index[k + 1]]),
+                  texel(mesh.position[mesh.index[k + 2]]));
+  std::vector<float> heights;
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x) heights.push_back((0.5f - map.at(x, y)) * kDeepest);
+  return heights;
+}
+
+TEST(Touch, WhatIsHeldHasItsShapeOnACoarseMesh) {
+  const SceneMesh coarse = sheet(20, 0.006f);
+  SceneMesh fine = sheet(240, 0.0005f), without = coarse, held;
+  Instrument tool;
+  tool.tip = {0, 0, 0.006f};
+  EXPECT_FALSE(spotBetweenJaws(tool, coarse));
+  tool.touching = true;
+  tool.grasp = tool.hold = 1;
+  const std::optional<FineSpot> spot = spotBetweenJaws(tool, coarse);
+  ASSERT_TRUE(spot);
+  ASSERT_TRUE(refine(coarse, {*spot}, held));
+  for (SceneMesh* mesh : {&fine, &without, &held}) applyTouch(tool, *mesh);
+  const std::vector<float> heights = heightsOf(fine);
+  const auto meanError = [&](const SceneMesh& mesh) {
+    const std::vector<float> drawn = heightsOf(mesh);
+    float sum = 0;
+    for (std::size_t k = 0; k < drawn.size(); ++k) sum += std::abs(drawn[k] - heights[k]) / float(drawn.size());
+    return sum;
+  };
+  EXPECT_GT(meanError(without), 1e-4f);
+  EXPECT_LT(meanError(held), 5e-5f);
 }
 
 }  // namespace
