@@ -104,8 +104,8 @@ Look gut() {
 Look colon() {
   Look l = gut();
   l.name = "colon";
-  l.albedoLow = {0.34f, 0.172f, 0.130f};
-  l.albedoHigh = {0.52f, 0.315f, 0.245f};
+  l.albedoLow = {0.34f, 0.150f, 0.110f};
+  l.albedoHigh = {0.51f, 0.262f, 0.192f};
   l.patches[0] = {{0.64f, 0.33f, 0.105f}, 38, 8, 1, {}, 0.54f, 0.72f, 0.7f};
   l.glow = {0.42f, 0.17f, 0.10f};
   l.glowDepth = 0.005f;
