@@ -32,10 +32,10 @@ namespace medulla {
 static const std::vector<std::string_view> kRegions{"box", "sphere", "plane"};
 
 // A missing file is the scene's mistake.
-static void requireFile(const Scene& scene, int line, const std::string& attribute, const std::string& what,
-                        const std::string& path) {
+static void requireFile(const Scene& scene, const ElementPlace& at, const std::string& attribute,
+                        const std::string& what, const std::string& path) {
   if (!fileExists(path))
-    throw valueError(scene, line, {attribute}, fmt::format("{} {} does not exist", what, inQuotes(path, '"')));
+    throw valueError(scene, at, {attribute}, fmt::format("{} {} does not exist", what, inQuotes(path, '"')));
 }
 
 // As the build's command line says it.
@@ -57,14 +57,15 @@ static std::string identifyingCommand(const SceneBody& body) {
   return out + " -o " + shellWord(std::filesystem::absolute(body.modelPath).string());
 }
 
-static std::vector<int> findNodes(const Scene& scene, int line, const NodeChoice& choice, const SceneBody& body) {
+static std::vector<int> findNodes(const Scene& scene, const ElementPlace& at, const NodeChoice& choice,
+                                  const SceneBody& body) {
   if (!choice.verticesPath.empty()) {
-    requireFile(scene, line, "vertices", "list of vertices", choice.verticesPath);
+    requireFile(scene, at, "vertices", "list of vertices", choice.verticesPath);
     return readVertices(choice.verticesPath, *body.model);
   }
   std::vector<int> nodes = nodesInRegion(*body.model, choice.region);
   if (nodes.empty())
-    throw valueError(scene, line, kRegions, fmt::format("no surface node of body \"{}\" lies in here", body.name));
+    throw valueError(scene, at, kRegions, fmt::format("no surface node of body \"{}\" lies in here", body.name));
   return nodes;
 }
 
@@ -74,16 +75,16 @@ static void resolvePatches(const Scene& scene, SceneBody& body) {
   std::vector<std::vector<int>> asked, known;
   for (const SceneFix& fix : body.fixes) {
     if (fix.freedom != FixedFreedom::all)
-      throw valueError(scene, fix.line, {"dof"},
+      throw valueError(scene, fix.place, {"dof"},
                        fmt::format("body \"{}\" has identified links, which its patches hold wholly: expected "
                                    "dof=\"all\"",
                                    body.name));
-    asked.push_back(findNodes(scene, fix.line, fix.nodes, body));
+    asked.push_back(findNodes(scene, fix.place, fix.nodes, body));
     std::sort(asked.back().begin(), asked.back().end());
     body.fixedNodes.insert(body.fixedNodes.end(), asked.back().begin(), asked.back().end());
   }
   if (!body.fixed.empty())
-    throw valueError(scene, body.line, {"links"},
+    throw valueError(scene, body.place, {"links"},
                      fmt::format("body \"{}\" has identified links and fixes spheres by number: expected parts of its "
                                  "surface",
                                  body.name));
@@ -92,9 +93,9 @@ static void resolvePatches(const Scene& scene, SceneBody& body) {
   std::sort(asked.begin(), asked.end());
   std::sort(known.begin(), known.end());
   if (model.identified && asked == known && std::abs(model.identified->poisson - body.tissue.poisson) < 1e-9) return;
-  const bool byTissue = overriddenAt(scene, body.tissueLine, {"poisson"}) != nullptr;
+  const bool byTissue = overriddenAt(scene, body.tissuePlace, {"poisson"}) != nullptr;
   throw valueError(
-      scene, byTissue ? body.tissueLine : body.line, {"links", "model", "tissue", "poisson"},
+      scene, byTissue ? body.tissuePlace : body.place, {"links", "model", "tissue", "poisson"},
       fmt::format("body \"{}\" has identified links, and its model {}; run where its mesh lies, this would make it: {}",
                   body.name,
                   !model.identified ? "has none"
@@ -124,8 +125,8 @@ static void requireHeldSkin(const Scene& scene, const SceneBody& body, const std
     sortUnique(others);
     const std::vector<int> held = spheresHeldBy(*body.model, parts[k]);
     if (!held.empty() || spheresHeldBy(*body.model, others) != spheresHeldBy(*body.model, body.fixedNodes)) continue;
-    const bool bySurface = overriddenAt(scene, body.line, {"surface"}) != nullptr;
-    throw valueError(scene, bySurface ? body.line : body.fixes[k].line,
+    const bool bySurface = overriddenAt(scene, body.place, {"surface"}) != nullptr;
+    throw valueError(scene, bySurface ? body.place : body.fixes[k].place,
                      {"surface", "box", "sphere", "plane", "vertices"},
                      fmt::format("nothing of body \"{}\" is held in here: its surface is a skin, and no filling sphere "
                                  "has half of its surface there; expected more of it, or spheres by number",
@@ -149,7 +150,7 @@ static void resolveFixes(const Scene& scene, SceneBody& body) {
   std::vector<int> whollyHeld;
   std::vector<std::vector<int>> parts;
   for (const SceneFix& fix : body.fixes) {
-    const std::vector<int>& nodes = parts.emplace_back(findNodes(scene, fix.line, fix.nodes, body));
+    const std::vector<int>& nodes = parts.emplace_back(findNodes(scene, fix.place, fix.nodes, body));
     body.fixedNodes.insert(body.fixedNodes.end(), nodes.begin(), nodes.end());
     if (fix.freedom == FixedFreedom::all) whollyHeld.insert(whollyHeld.end(), nodes.begin(), nodes.end());
   }
@@ -186,9 +187,9 @@ static void resolveLoads(const Scene& scene, SceneBody& body) {
   const SoftBodyModel& model = *body.model;
   const std::set<int> held(body.fixedNodes.begin(), body.fixedNodes.end());  // patches stand one after the other
   for (SceneLoad& load : body.loads) {
-    if (!load.forcesPath.empty()) requireFile(scene, load.line, "file", "file of forces", load.forcesPath);
+    if (!load.forcesPath.empty()) requireFile(scene, load.place, "file", "file of forces", load.forcesPath);
     const std::vector<DeadLoad> loads =
-        load.forcesPath.empty() ? spreadLoad(model, findNodes(scene, load.line, load.nodes, body), load.whole)
+        load.forcesPath.empty() ? spreadLoad(model, findNodes(scene, load.place, load.nodes, body), load.whole)
                                 : readVertexForces(load.forcesPath, model, load.whole);
     body.deadLoads.insert(body.deadLoads.end(), loads.begin(), loads.end());
     load.isIdle = holdsByNodes(body) &&
@@ -198,16 +199,16 @@ static void resolveLoads(const Scene& scene, SceneBody& body) {
 
 static Reference loadReference(const Scene& scene, const SceneBody& body) {
   if (body.referencePath.empty()) return {};
-  requireFile(scene, body.line, "reference", "reference", body.referencePath);
+  requireFile(scene, body.place, "reference", "reference", body.referencePath);
   return readReference(body.referencePath, *body.model);
 }
 
-static void requireSphere(const Scene& scene, const SceneBody& body, int line, const std::string& attribute,
-                          const char* verb, int sphere) {
+static void requireSphere(const Scene& scene, const SceneBody& body, const ElementPlace& at,
+                          const std::string& attribute, const char* verb, int sphere) {
   const int spheres = static_cast<int>(body.model->spheres.size());
   if (sphere >= spheres)
     throw valueError(
-        scene, line, {attribute},
+        scene, at, {attribute},
         fmt::format("body \"{}\" {} sphere {}, its model has spheres 0 to {}", body.name, verb, sphere, spheres - 1));
 }
 
@@ -219,7 +220,7 @@ static void loadModels(Scene& scene) {
       if (scene.bodies[e].modelPath == body.modelPath && (scene.bodies[e].surface == SurfaceMode::skin) == isSkin)
         body.model = scene.bodies[e].model;
     if (!body.model) {
-      requireFile(scene, body.line, "model", fmt::format("model of body \"{}\"", body.name), body.modelPath);
+      requireFile(scene, body.place, "model", fmt::format("model of body \"{}\"", body.name), body.modelPath);
       SoftBodyModel model = readModel(body.modelPath);
       if (isSkin) model = withoutNodeVolumes(model);
       body.model = std::make_shared<const SoftBodyModel>(std::move(model));
@@ -232,16 +233,16 @@ static void loadModels(Scene& scene) {
 }
 
 // Known looks are the renderer's, but a run without pictures should not accept what a run with pictures refuses.
-static void requireLook(const Scene& scene, int line, const std::string& look) {
+static void requireLook(const Scene& scene, const ElementPlace& at, const std::string& look) {
   const std::vector<std::string> known = lookNames();
   if (isOneOf(look, known)) return;
-  throw valueError(scene, line, {"look"},
+  throw valueError(scene, at, {"look"},
                    fmt::format("unknown look {}: {}", inQuotes(look, '"'), hintOfNames(look, known)));
 }
 
 static Trajectory loadTrajectory(const Scene& scene, SceneTool& tool) {
-  if (tool.line > 0)
-    requireFile(scene, tool.line, "trajectory", fmt::format("trajectory of tool \"{}\"", tool.name),
+  if (tool.place.line > 0)
+    requireFile(scene, tool.place, "trajectory", fmt::format("trajectory of tool \"{}\"", tool.name),
                 tool.trajectoryPath);
   if (!isRecording(tool.trajectoryPath)) return readTrajectory(tool.trajectoryPath);
   const RecordingMap map = readRecordingMap(tool.trajectoryPath);
@@ -254,7 +255,7 @@ static void requireNearby(const Scene& scene, const SceneStatic& item, const Tri
   double most = 0;
   for (const Eigen::Vector3d& x : mesh.vertices) most = std::max(most, x.lpNorm<Eigen::Infinity>());
   if (most <= kAnyPlace.most) return;
-  throw valueError(scene, item.line, {"mesh", "unit"},
+  throw valueError(scene, item.place, {"mesh", "unit"},
                    fmt::format("{} reaches {:.3g} m from its origin, expected at most {} m; is its unit right?",
                                item.meshPath, most, kAnyPlace.most));
 }
@@ -272,9 +273,9 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
     const auto other = trajectories.find(tool.name);
     if (other == trajectories.end()) continue;
     tool.trajectoryPath = other->second;
-    tool.line = 0;
+    tool.place = {};
   }
-  for (const SceneBody& body : scene.bodies) requireLook(scene, body.line, body.look);
+  for (const SceneBody& body : scene.bodies) requireLook(scene, body.place, body.look);
   loadModels(scene);
   for (SceneBody& body : scene.bodies) {
     resolveFixes(scene, body);
@@ -285,8 +286,8 @@ LoadedScene loadScene(Scene scene, const std::map<std::string, std::string>& tra
   }
   const double size = sizeOfBodies(scene);
   for (const SceneStatic& item : scene.statics) {
-    if (!item.look.empty()) requireLook(scene, item.line, item.look);
-    if (!item.meshPath.empty()) requireFile(scene, item.line, "mesh", "mesh", item.meshPath);
+    if (!item.look.empty()) requireLook(scene, item.place, item.look);
+    if (!item.meshPath.empty()) requireFile(scene, item.place, "mesh", "mesh", item.meshPath);
     loaded.statics.push_back(item.meshPath.empty() ? shapeMesh(item.shape, size)
                                                    : readMesh(item.meshPath, metresPerUnit(item.unit)));
     if (!item.meshPath.empty()) requireNearby(scene, item, loaded.statics.back());

@@ -7,12 +7,13 @@
 #include <string_view>
 #include <vector>
 
+#include "app/files/input_error.h"
 #include "haptics/tool_input.h"
 #include "physics/dynamics/region.h"
 #include "physics/dynamics/world.h"
 
 // A scene file as read: plain values with defaults, nothing loaded yet. Paths are already resolved against the scene
-// file's folder. `line` is where the element stands, for errors found later.
+// file's folder. `place` is the element's, for errors found later.
 namespace medulla {
 
 // Surface nodes: those in a part of space, or those that the listed vertices of the mesh file became.
@@ -22,13 +23,13 @@ struct NodeChoice {
 };
 
 struct SceneFix {
-  int line = 0;
+  ElementPlace place;
   NodeChoice nodes;
   FixedFreedom freedom = FixedFreedom::all;  // of the spheres that the fixed nodes hold
 };
 
 struct SceneLoad {
-  int line = 0;
+  ElementPlace place;
   NodeChoice nodes;
   std::string forcesPath;  // a force per vertex, instead of nodes and force; empty: those
   DeadLoad whole;          // force on all chosen nodes together, N, world; its node is of no account
@@ -38,19 +39,19 @@ struct SceneLoad {
 // loadScene() finds the model, fixed nodes and dead loads, and adds to the spheres fixed by number those that fixed
 // nodes hold.
 struct SceneBody : BodyDescription {
-  int line = 0, tissueLine = 0;
+  ElementPlace place, tissuePlace;
   std::string modelPath, look;
   bool choosesLinks = false;  // says which, rather than leaving it to the default
   std::string referencePath;  // where another program puts its vertices at the end; empty: none
   std::vector<SceneFix> fixes;
   std::vector<SceneLoad> loads;
-  // Lines, of each sphere fixed by number, each driven one, and each element that steers links.
-  std::vector<int> fixedAt, drivenAt, steeredAt;
+  // Of each sphere fixed by number, each driven one, and each element that steers links.
+  std::vector<ElementPlace> fixedAt, drivenAt, steeredAt;
 };
 
 // What does not move: drawn if it has a look, holding bodies if it says so.
 struct SceneStatic {
-  int line = 0;
+  ElementPlace place;
   StaticShape shape;           // without its mesh
   bool contact = false;        // by default meshes are scenery, and simple shapes are there to be lain on
   std::string meshPath, look;  // empty: no mesh, not drawn
@@ -58,7 +59,7 @@ struct SceneStatic {
 };
 
 struct SceneTool {
-  int line = 0;
+  ElementPlace place;  // line 0: the command line names its motion
   std::string name, trajectoryPath;
   std::string recordingPath;  // where trajectoryPath describes one: found by loadScene()
   ToolSettings settings;
@@ -79,7 +80,7 @@ struct SceneCaption {
 
 // What an override put into the place of what the file says, for errors found later.
 struct OverriddenAttribute {
-  int line = 0;  // of its element
+  ElementPlace place;  // of its element
   std::string attribute, path;
 };
 

@@ -22,7 +22,7 @@ World makeWorld(const LoadedScene& loaded) {
   try {
     return World(scene.dynamics, {scene.bodies.begin(), scene.bodies.end()}, statics);
   } catch (const TissueRefused& e) {
-    throw valueError(scene, scene.bodies[e.body].tissueLine, {"young", "poisson", "density", "damping"}, e.what());
+    throw valueError(scene, scene.bodies[e.body].tissuePlace, {"young", "poisson", "density", "damping"}, e.what());
   } catch (const std::runtime_error& e) {
     throw inputError(scene.path, 0, e.what());
   }

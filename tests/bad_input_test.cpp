@@ -106,6 +106,25 @@ TEST_F(BadInput, WhatAnOverrideMakesImpossibleIsSaidOfIt) {
   }
 }
 
+// Programs write a scene in one line.
+TEST_F(BadInput, AnOverrideIsNotBlamedForWhatStandsInTheSameLine) {
+  add("<body name='twin' tissue='t' look='liver' model='none.xml'/>");
+  std::string text = read("own/organ.xml");
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  folder.write("own/organ.xml", text);
+  const std::string model = MEDULLA_SOURCE_DIR "/assets/gallbladder/gallbladder.model.xml";
+  const auto refusal = [&](const std::string& setting) {
+    return complaints(run({"check", "own/organ.xml", "--set", setting}));
+  };
+  const std::vector<std::string> expected{
+      "medulla: own/organ.xml:1: model of body \"twin\" \"own/none.xml\" does not exist"};
+  EXPECT_EQ(refusal("body.organ.model=" + model), expected);
+  EXPECT_EQ(refusal("tissue.t.young=6e3"), expected);
+  EXPECT_EQ(refusal("body.twin.model=nothing.xml"),
+            std::vector<std::string>{
+                "medulla: --set body.twin.model: model of body \"twin\" \"own/nothing.xml\" does not exist"});
+}
+
 TEST_F(BadInput, ATissueTooStiffForAnyStepIsRefusedWhereItStands) {
   const std::string message = "body 'organ' cannot be simulated: its stable substep is ";
   expectRefused(run({"check", "own/organ.xml", "--set", "tissue.t.young=1e20"}), "--set tissue.t.young: " + message);

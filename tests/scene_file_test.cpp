@@ -29,7 +29,7 @@ TEST_F(SceneFile, EveryValueArrives) {
   EXPECT_EQ(s.dynamics.sleepAfter, 0.5);
   ASSERT_EQ(s.bodies.size(), 2u);
   const SceneBody& body = s.bodies[0];
-  EXPECT_EQ(body.line, 9);
+  EXPECT_EQ(body.place.line, 9);
   EXPECT_EQ(body.name, "gallbladder");
   EXPECT_EQ(body.modelPath, std::filesystem::path(folder).parent_path().string() + "/assets/gallbladder.model.xml");
   EXPECT_EQ(body.look, "gallbladder");
@@ -82,7 +82,7 @@ TEST_F(SceneFile, EveryValueOfFixesAndLoadsArrives) {
   EXPECT_EQ(fixes[3].nodes.verticesPath, folder + "/held.csv");
   const std::vector<SceneLoad>& loads = s.bodies[1].loads;
   ASSERT_EQ(loads.size(), 5u);
-  EXPECT_EQ(loads[0].line, 16);
+  EXPECT_EQ(loads[0].place.line, 16);
   EXPECT_EQ(loads[0].nodes.region.box.max(), Eigen::Vector3d(4, 5, 6));
   EXPECT_EQ(loads[0].whole.force, Eigen::Vector3d(0, 0, 1.5));
   EXPECT_EQ(loads[0].whole.from, 0.5);

@@ -55,7 +55,7 @@ class Rows {
   Rows(const std::string& path, const XmlElement& root, const std::string& name) : Rows(path, onlyChild(root, name)) {}
   Rows(const std::string& path, const XmlElement& element) : path_(path), element_(element) {
     rest_ = element_.text;
-    line_ = std::max(element_.textLine, element_.line);
+    line_ = std::max(element_.textLine, element_.place.line);
     rows_ = readInteger(element_, "rows", 0, kNotNegative);
   }
 

@@ -168,7 +168,7 @@ RecordingMap readRecordingMap(const std::string& path) {
   const XmlElement root = readXml(path, recordingRules());
   RecordingMap map;
   map.path = path;
-  map.line = root.line;
+  map.line = root.place.line;
   map.recordingPath = readPath(root, "file", path);
   useMap(root, map);
   for (RecordingColumns& layout : map.layouts) readLayout(onlyChild(root, "columns"), layout);

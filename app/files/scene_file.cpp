@@ -91,7 +91,7 @@ constexpr Range kDensity{1e-6};  // kg/m3: air has 1.2, and masses that vanish d
 struct NamedTissue {
   std::string name;
   Tissue tissue;
-  int line;
+  ElementPlace place;
 };
 
 std::vector<NamedTissue> readTissues(const XmlElement& root) {
@@ -104,7 +104,7 @@ std::vector<NamedTissue> readTissues(const XmlElement& root) {
     t.density = readNumber(*e, "density", t.density, kDensity);
     t.damping = readNumber(*e, "damping", t.damping, kNotNegative);
     t.friction = readNumber(*e, "friction", t.friction, kNotNegative);
-    out.push_back({readUniqueName(*e, taken), t, e->line});
+    out.push_back({readUniqueName(*e, taken), t, e->place});
   }
   return out;
 }
@@ -152,13 +152,13 @@ void readFixations(const XmlElement& body, const std::string& scenePath, SceneBo
     const FixedFreedom freedom = readEnum(*fix, "dof", FixedFreedom::all);
     const NodeChoice nodes = readNodeChoice(*fix, {"spheres"}, scenePath);
     if (!fix->find("spheres")) {
-      out.fixes.push_back({fix->line, nodes, freedom});
+      out.fixes.push_back({fix->place, nodes, freedom});
       continue;
     }
     for (const int sphere : readIntegers(*fix, "spheres", 0, kNotNegative)) {
       if (!taken.insert(sphere).second) refuse(*fix, "spheres", "sphere " + std::to_string(sphere) + " is fixed twice");
       out.fixed.push_back({sphere, freedom});
-      out.fixedAt.push_back(fix->line);
+      out.fixedAt.push_back(fix->place);
     }
   }
 }
@@ -167,7 +167,7 @@ std::vector<SceneLoad> readLoads(const XmlElement& body, const std::string& scen
   std::vector<SceneLoad> out;
   for (const XmlElement* e : childrenOf(body, "load")) {
     SceneLoad load;
-    load.line = e->line;
+    load.place = e->place;
     load.nodes = readNodeChoice(*e, {"file"}, scenePath);
     const bool fromFile = e->find("file") != nullptr;
     if (fromFile) load.forcesPath = readPath(*e, "file", scenePath);
@@ -202,7 +202,7 @@ void readDrivenSpheres(const XmlElement& body, SceneBody& out) {
     d.velocity = readVector(*drive, "velocity", d.velocity);
     d.freedom = readEnum(*drive, "dof", d.freedom);
     out.driven.push_back(d);
-    out.drivenAt.push_back(drive->line);
+    out.drivenAt.push_back(drive->place);
   }
 }
 
@@ -220,7 +220,7 @@ void readSteeredLinks(const XmlElement& body, SceneBody& out) {
     links.factors.flexion = readNumber(*e, "flexion", links.factors.flexion, kPositive);
     links.factors.torsion = readNumber(*e, "torsion", links.factors.torsion, kPositive);
     out.steered.push_back(links);
-    out.steeredAt.push_back(e->line);
+    out.steeredAt.push_back(e->place);
   }
 }
 
@@ -250,13 +250,13 @@ void readBodies(const XmlElement& root, Scene& scene) {
   std::set<std::string> taken;
   for (const XmlElement* e : childrenOf(root, "body")) {
     SceneBody body;
-    body.line = e->line;
+    body.place = e->place;
     body.name = readUniqueName(*e, taken);
     body.modelPath = readPath(*e, "model", scene.path);
     body.look = readText(*e, "look");
     const NamedTissue& tissue = findTissue(*e, tissues);
     body.tissue = tissue.tissue;
-    body.tissueLine = tissue.line;
+    body.tissuePlace = tissue.place;
     body.links = readEnum(*e, "links", body.links);
     body.choosesLinks = e->find("links") != nullptr;
     body.surface = readEnum(*e, "surface", body.surface);
@@ -304,7 +304,7 @@ void readShape(const XmlElement& e, StaticShape& shape) {
 void readStatics(const XmlElement& root, Scene& scene) {
   for (const XmlElement* e : childrenOf(root, "static")) {
     SceneStatic out;
-    out.line = e->line;
+    out.place = e->place;
     readShape(*e, out.shape);
     const bool mesh = out.shape.kind == StaticShape::Kind::mesh;
     if (mesh) out.meshPath = readPath(*e, "mesh", scene.path);
@@ -324,7 +324,7 @@ void readTools(const XmlElement& root, Scene& scene) {
   for (const XmlElement* e : childrenOf(root, "tool")) {
     SceneTool tool;
     ToolSettings& s = tool.settings;
-    tool.line = e->line;
+    tool.place = e->place;
     tool.name = readUniqueName(*e, taken);
     if (std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const SceneBody& b) { return b.name == tool.name; }))
       refuse(*e, "name", "a <body> has this name, and columns of logs are named after both");
@@ -347,7 +347,7 @@ void readTools(const XmlElement& root, Scene& scene) {
 
 // A key says what changes; what it leaves out is the camera's own.
 CameraKey readCameraKey(const XmlElement& e, CameraKey key) {
-  key.line = e.line;
+  key.line = e.place.line;
   key.time = readNumber(e, "t", 0, kNotNegative);
   key.position = readVector(e, "position", key.position, kAnyPlace);
   key.target = readVector(e, "target", key.target, kAnyPlace);

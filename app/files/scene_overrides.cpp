@@ -42,7 +42,7 @@ void addOptionalElements(XmlElement& element) {
     XmlElement added;
     added.name = child.name;
     added.where = element.where;
-    added.line = element.line;
+    added.place = element.place;
     element.children.push_back(added);
   }
   for (XmlElement& child : element.children)
@@ -92,7 +92,7 @@ OverriddenAttribute applyOverride(XmlElement& root, const SceneOverride& overrid
   XmlElement& element = *found->element;
   std::erase_if(element.attributes, [&](const XmlAttribute& a) { return a.name == found->attribute; });
   element.attributes.push_back({found->attribute, override.value, where});
-  return {element.line, found->attribute, override.path};
+  return {element.place, found->attribute, override.path};
 }
 
 }  // namespace

@@ -67,11 +67,12 @@ void copyText(const std::string& path, const tinyxml2::XMLText& text, XmlElement
   out.textWhere = place(path, out.textLine);
 }
 
-XmlElement copyElement(const std::string& path, const tinyxml2::XMLElement& element) {
+// `count`: elements of the file so far.
+XmlElement copyElement(const std::string& path, const tinyxml2::XMLElement& element, int& count) {
   XmlElement out;
   out.name = element.Name();
-  out.line = element.GetLineNum();
-  out.where = place(path, out.line);
+  out.place = {element.GetLineNum(), count++};
+  out.where = place(path, out.place.line);
   for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a; a = a->Next()) {
     out.attributes.push_back({a->Name(), a->Value(), place(path, a->GetLineNum())});
     // As XML has it (3.3.3), if not of &#10;, which the XML library does not tell apart: a value that goes on in the
@@ -80,7 +81,7 @@ XmlElement copyElement(const std::string& path, const tinyxml2::XMLElement& elem
       if (c == '\n' || c == '\t' || c == '\r') c = ' ';
   }
   for (const tinyxml2::XMLNode* n = element.FirstChild(); n; n = n->NextSibling()) {
-    if (const tinyxml2::XMLElement* child = n->ToElement()) out.children.push_back(copyElement(path, *child));
+    if (const tinyxml2::XMLElement* child = n->ToElement()) out.children.push_back(copyElement(path, *child, count));
     if (const tinyxml2::XMLText* text = n->ToText()) copyText(path, *text, out);
     if (n->ToUnknown()) throw inputError(path, n->GetLineNum(), "<!...> inside an element is not understood");
   }
@@ -130,7 +131,8 @@ XmlElement parseXml(const std::string& path) {
       throw inputError(path, n->GetLineNum(),
                        hasDeclarations(document) ? "declarations within a DOCTYPE are not understood, expected none"
                                                  : "broken XML: more than one element or text at the top");
-  return copyElement(path, *root);
+  int count = 0;
+  return copyElement(path, *root, count);
 }
 
 std::string suggestion(const std::string& name, const std::vector<std::string>& known) {

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "app/files/input_error.h"
+
 // Strict reading of XML, shared by scene and model: a tree of plain values, a table of what may stand where, and
 // attribute readers that complain with the place. Nothing of the XML library shows here.
 namespace medulla {
@@ -17,7 +19,7 @@ struct XmlAttribute {
 struct XmlElement {
   std::string name;
   std::string where;  // "FILE:LINE"
-  int line = 0;
+  ElementPlace place;
   std::vector<XmlAttribute> attributes;
   std::vector<XmlElement> children;
   std::string text;  // from its first character that is not white space
