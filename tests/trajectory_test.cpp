@@ -133,7 +133,12 @@ TEST(TrajectoryFile, LinesEndAsAnyComputerWritesThem) {
   const std::string rows = "\n0,0,0,0,1,0,0,0,0\n\n# a tool\n1,2,0,0,1,0,0,0,0\n";
   for (const std::string end : {"\n", "\r\n", "\r"}) {
     std::string text = header.substr(0, header.size() - 1);
-    for (const char c : rows) text += c == '\n' ? end : std::string(1, c);
+    for (const char c : rows) {
+      if (c == '\n')
+        text += end;
+      else
+        text += c;
+    }
     const Trajectory read = parseTrajectory(text, "file.csv");
     ASSERT_EQ(read.samples.size(), 2u);
     EXPECT_EQ(read.samples[1].position.x(), 2);
