@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 namespace medulla {
 
@@ -78,25 +80,31 @@ Vector3d justOutside(const Triangle& t, const Vector3d& weights, double standOff
   return pointAt(t, 0.99 * weights + Vector3d::Constant(0.01 / 3)) + standOff * doubleArea(t).normalized();
 }
 
-// Just outside of the nearest of the triangles that the point is behind.
-static Vector3d exitOf(const BlendedSurface& surface, double alpha, double standOff, const Vector3d& p) {
-  Vector3d exit = p;
-  double nearest = std::numeric_limits<double>::infinity();
-  for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
-    const Triangle triangle = surface.triangle(static_cast<int>(t), alpha);
-    const TrianglePoint q = closestPoint(triangle, p);
-    const double distance = (q.point - p).norm();
-    if (distance >= nearest || doubleArea(triangle).dot(p - q.point) > 0) continue;
-    nearest = distance;
-    exit = justOutside(triangle, q.weights, standOff);
+// Just outside of the nearest of the triangles that the point is behind, or, where that lies in another body, from
+// which the way might lead back, of one farther off that leads out of all. Each look takes the whole surface: so the
+// nearest are looked at, and ever fewer behind them.
+static Vector3d exitOf(const Buckets& buckets, double alpha, double standOff, const Vector3d& p) {
+  const BlendedSurface& surface = buckets.surface();
+  std::vector<std::pair<double, int>> behind;  // distance, triangle
+  for (int t = 0; t < static_cast<int>(surface.triangles.size()); ++t) {
+    const Triangle triangle = surface.triangle(t, alpha);
+    const Vector3d nearest = closestPoint(triangle, p).point;
+    if (doubleArea(triangle).dot(p - nearest) <= 0) behind.emplace_back((nearest - p).norm(), t);
   }
-  return exit;
+  std::sort(behind.begin(), behind.end());
+  const auto exitBy = [&](int t) {
+    const Triangle triangle = surface.triangle(t, alpha);
+    return justOutside(triangle, closestPoint(triangle, p).weights, standOff);
+  };
+  for (std::size_t k = 0; k < behind.size(); k += 1 + k / 4)
+    if (const Vector3d exit = exitBy(behind[k].second); windingNumber(buckets, alpha, exit) <= 0) return exit;
+  return behind.empty() ? p : exitBy(behind.front().second);
 }
 
 Vector3d outOfBodies(const Buckets& buckets, double alpha, double standOff, Vector3d p) {
   const std::size_t passes = buckets.surface().firstNode.size() + 4;
   for (std::size_t pass = 0; pass < passes && windingNumber(buckets, alpha, p) > 0; ++pass)
-    p = exitOf(buckets.surface(), alpha, standOff, p);
+    p = exitOf(buckets, alpha, standOff, p);
   return p;
 }
 

@@ -21,8 +21,8 @@ double distanceToSurface(const BlendedSurface& surface, double alpha, const Eige
 // that has folded in, it could be below the other triangle.
 Eigen::Vector3d justOutside(const Triangle& triangle, const Eigen::Vector3d& weights, double standOff);
 
-// Out through the nearest triangle that it is behind, as often as needed: bodies may overlap, and parts of a surface
-// that trembles be turned inside out.
+// Out through the nearest triangle that it is behind, or a near one that leads out of all bodies where they overlap; as
+// often as needed, since parts of a surface that trembles may be turned inside out.
 Eigen::Vector3d outOfBodies(const Buckets& buckets, double alpha, double standOff, Eigen::Vector3d p);
 
 }  // namespace medulla

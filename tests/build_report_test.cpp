@@ -162,4 +162,14 @@ TEST(RenderSurface, FineMeshesAreNotDividedByThemselves) {
   EXPECT_EQ(renderLevelsFor(327680), 0);
 }
 
+TEST(BuildReport, CountsSpheresOfWhichBallOrFrameLiesOutside) {
+  BuildReport report;
+  SoftBodyModel model = buildModel(asRepaired(boxMesh({0.03, 0.04, 0.12})), nullptr, {}, report);
+  EXPECT_EQ(report.centresOutside, 0);
+  model.spheres[0].restFrame = {0.5, 0, 0};
+  EXPECT_EQ(measureModel(model).centresOutside, 1);
+  model.spheres[1].restBallCentre = {0.5, 0, 0};
+  EXPECT_EQ(measureModel(model).centresOutside, 2);
+}
+
 }  // namespace medulla

@@ -82,4 +82,49 @@ TEST(Inside, RaysThroughCornersAndAlongEdgesCrossOnce) {
   EXPECT_GT(inside, 1000);
 }
 
+// Two plates that overlap: out of the one through its top is still in the other.
+TEST(Inside, TheWayOutLeadsOutOfBothBodies) {
+  const TouchShape body = plate(4, 0.1, 0.02, 1);
+  const std::vector<Vector3d> places = {Vector3d::Zero(), {0, 0.005, 0}};
+  const Buckets buckets = bucketsOf({body, body}, places, places);
+  const Vector3d p(0.001, 0.008, 0.003);
+  EXPECT_EQ(windingNumber(buckets, 1, p), 2);
+  const Vector3d out = outOfBodies(buckets, 1, 1e-6, p);
+  EXPECT_EQ(windingNumber(buckets, 1, out), 0);
+  EXPECT_NEAR(out.y(), 0.015 + 1e-6, 1e-9);
+}
+
+// Where two surfaces cross, the nearest of either leads into the other body.
+TEST(Inside, TheWayOutOfBodiesThatCrossIsFound) {
+  const TouchShape body = ellipsoid(18, 14, 12);
+  const std::vector<Vector3d> places = {Vector3d::Zero(), {0.03, 0.01, 0}};
+  const Buckets buckets = bucketsOf({body, body}, places, places);
+  TestRandom random;
+  int inside = 0;
+  for (int k = 0; k < 300; ++k) {
+    const Vector3d p = random.vector(0.06);
+    inside += windingNumber(buckets, 1, p) > 0;
+    EXPECT_EQ(windingNumber(buckets, 1, outOfBodies(buckets, 1, 1e-6, p)), 0) << p.transpose();
+  }
+  EXPECT_GT(inside, 20);
+}
+
+// A blade's tip: what lies just below is outside, though ten slivers of its upper side meet there and one triangle of
+// its lower.
+TEST(Inside, ATipHasTwoSidesHoweverTheyAreDivided) {
+  constexpr int kSlivers = 10;
+  constexpr double kLength = 0.05, kHalfHeight = 0.018, kHalfWidth = 0.02;
+  std::vector<Vector3d> nodes = {
+      {0, 0, 0}, {-kLength, -kHalfHeight, -kHalfWidth}, {-kLength, -kHalfHeight, kHalfWidth}};
+  for (int k = 0; k <= kSlivers; ++k) nodes.emplace_back(-kLength, kHalfHeight, kHalfWidth * (2.0 * k / kSlivers - 1));
+  const int first = 3, last = 3 + kSlivers;
+  std::vector<std::array<int, 3>> triangles = {{0, 2, 1}, {0, 1, first}, {0, last, 2}, {1, 2, last}};
+  for (int k = first; k < last; ++k) triangles.insert(triangles.end(), {{0, k, k + 1}, {1, k + 1, k}});
+  const Buckets buckets = bucketsOf({shapeOf(nodes, triangles)}, {Vector3d::Zero()}, {Vector3d::Zero()});
+  EXPECT_EQ(windingNumber(buckets, 1, {-0.04, 0, 0}), 1);
+  const Vector3d below = Vector3d(kHalfHeight, -kLength, 0).normalized();  // across the lower side
+  EXPECT_FALSE(liesBehind(buckets, 1, 1e-3 * (below + Vector3d(0.1, 0, 0))));
+  EXPECT_TRUE(liesBehind(buckets, 1, {-1e-3, 0, 0}));
+}
+
 }  // namespace medulla

@@ -189,6 +189,14 @@ TEST(MeshRepair, FinsAreDropped) {
   EXPECT_EQ(out.notes, (std::vector<std::string>{"dropped 2 fin triangles", "dropped 2 unused vertices"}));
 }
 
+TEST(MeshRepair, AFlapAsLargeAsABodyIsNoFin) {
+  TriangleMesh mesh = box({0, 0, 0}, {1, 1, 1});
+  const int n = static_cast<int>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), {{0, 0, 0}, {0, 0, 1}, {-2, -2, 1}, {-2, -2, 0}});
+  mesh.triangles.insert(mesh.triangles.end(), {{n, n + 1, n + 2}, {n, n + 2, n + 3}});
+  EXPECT_CONTAINS(refusal(mesh), "non-manifold: 1 edge");
+}
+
 TEST(MeshRepair, TriangleWithoutAreaIsFlippedNotDropped) {
   // A corner in the middle of a box's edge, used on one side only; on the other a triangle without area closes the gap.
   TriangleMesh mesh = box({0, 0, 0}, {1, 1, 1});

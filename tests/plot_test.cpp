@@ -52,6 +52,7 @@ TEST(Plot, DrawsMagnitudesDepthsAndShades) {
   for (const char* title : {"hook: force on the hand, N", "hook: device to proxy, mm", "volume, % of rest",
                             "energy, mJ", "surface nodes modelled"})
     EXPECT_TRUE(has(script, title)) << title;
+  EXPECT_TRUE(has(script, "set xrange [0:0.2]\n"));                             // rows tell how frames ended
   EXPECT_TRUE(has(blockOf(script, "p0_0"), "0.06 5\n"));                        // |(0, 3, 4)|
   EXPECT_TRUE(has(blockOf(script, "p1_0"), "0.06 3\n"));                        // mm, in contact
   EXPECT_TRUE(has(blockOf(script, "p1_0"), "0.12 0\n"));                        // while held nothing is penetrated

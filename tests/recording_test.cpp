@@ -56,6 +56,16 @@ TEST_F(Recording, JigsawsHasNinetenColumnsPerArmAndNoTime) {
             1.0 / 60);
 }
 
+TEST_F(Recording, TimesAreInAnyUnit) {
+  for (const auto& [unit, seconds] : {std::pair("s", 1.0), {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}}) {
+    const std::string inside = fmt::format("<columns time=\"1\" position=\"2 3 4\"/><units time=\"{}\"/>", unit);
+    const std::string text = fmt::format("{} 0 0 0\n{} 1 0 0\n", std::lround(2 / seconds), std::lround(5 / seconds));
+    const Trajectory t = read("", inside, text);
+    ASSERT_EQ(t.samples.size(), 2u);
+    EXPECT_NEAR(t.samples[1].time - t.samples[0].time, 3, 1e-9) << unit;
+  }
+}
+
 TEST_F(Recording, SofaWritesStatesOfOneRigid) {
   const std::string text =
       "# written by WriteState\nT= 0.5\n  X0= 1 2 3 0 0 0 1 \n  X= 10 20 30 0 0 0 1 \n  V= 0 0 0 0 0 0\n"
