@@ -251,6 +251,28 @@ TEST(MeshFile, StlHasItsCornersJoined) {
   EXPECT_NEAR(stl.vertices[1].norm(), 0.01, 1e-9);
 }
 
+// A triangle at z = 0, and one with texture coordinates at z = 1.
+TEST(MeshFile, EachMeshOfAFileHasVerticesOfItsOwn) {
+  const TemporaryFolder folder;
+  const TriangleMesh mesh =
+      readMesh(written(folder, "two.gltf",
+                       R"({"asset": {"version": "2.0"}, "scene": 0,
+"scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "meshes": [{"primitives": [
+  {"attributes": {"POSITION": 0}}, {"attributes": {"POSITION": 1, "TEXCOORD_0": 2}}]}],
+"buffers": [{"byteLength": 96, "uri": "data:application/octet-stream;base64,)"
+                       R"(AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAA)"
+                       R"(gD8AAAAAAAAAAAAAAAAAAIA/AACAPwAAAAAAAIA/AAAAAAAAgD8AAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/"}],
+"bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 36},
+  {"buffer": 0, "byteOffset": 72, "byteLength": 24}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+  {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 1], "max": [1, 1, 1]},
+  {"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC2"}]})"),
+               1);
+  ASSERT_EQ(mesh.triangles.size(), 2u);
+  for (int t = 0; t < 2; ++t)
+    for (const int corner : mesh.triangles[t]) EXPECT_EQ(mesh.vertices[corner].z(), t);
+}
+
 TEST(MeshFile, BadFilesOfOtherFormatsAreRefusedInOneLine) {
   const TemporaryFolder folder;
   for (const std::string name : {"a.stl", "a.ply", "a.gltf", "a.3ds", "a.dae", "a.x"}) {
