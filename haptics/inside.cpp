@@ -97,7 +97,7 @@ static Vector3d exitOf(const Buckets& buckets, double alpha, double standOff, co
     return justOutside(triangle, closestPoint(triangle, p).weights, standOff);
   };
   for (std::size_t k = 0; k < behind.size(); k += 1 + k / 4)
-    if (const Vector3d exit = exitBy(behind[k].second); windingNumber(buckets, alpha, exit) <= 0) return exit;
+    if (Vector3d exit = exitBy(behind[k].second); windingNumber(buckets, alpha, exit) <= 0) return exit;
   return behind.empty() ? p : exitBy(behind.front().second);
 }
 
