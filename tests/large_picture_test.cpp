@@ -78,6 +78,16 @@ TEST(LargePicture, PixelsThatBecomeOneAreAveragedInLight) {
   EXPECT_NEAR(at(32), 255 * srgbFromLight(light), 3);
 }
 
+// So that a sheet throws a shadow beside itself.
+Picture litFromAside() {
+  Picture p;
+  p.camera.position = {0, 0, 0.25f};
+  p.camera.fovDegrees = 40;
+  p.light.offset = {0.1f, 0, 0};
+  p.endoscopeMask = false;
+  return p;
+}
+
 // A narrow strip of a high picture, along the edge of the shadow that a sheet throws beside itself.
 TEST(LargePicture, StraightEdgeOfAShadowIsStraight) {
   RendererSettings settings;
@@ -87,11 +97,7 @@ TEST(LargePicture, StraightEdgeOfAShadowIsStraight) {
   Renderer renderer(settings);
   renderer.addSurface(sheet(0.2f, 80, 0, 0, 0));
   renderer.addSurface(sheet(0.15f, 60, 0.15f, 0.01f, 0.01f));
-  Picture p;
-  p.camera.position = {0, 0, 0.25f};
-  p.camera.fovDegrees = 40;
-  p.light.offset = {0.1f, 0, 0};
-  p.endoscopeMask = false;
+  Picture p = litFromAside();
   Image image;
   renderer.render(p, image);
   // The lamp's ray past the sheet's edge ends 4.2 mm, 50 pixels, left of the middle.
@@ -110,11 +116,7 @@ TEST(Renderer, SoftEdgesOfShadowsHaveNoSteps) {
   Renderer renderer(settings);
   renderer.addSurface(sheet(0.3f, 80, 0, 0, 0));
   renderer.addSurface(sheet(0.15f, 60, 0.18f, 0, 0.07f));
-  Picture p;
-  p.camera.position = {0, 0, 0.25f};
-  p.camera.fovDegrees = 40;
-  p.light.offset = {0.1f, 0, 0};
-  p.endoscopeMask = false;
+  Picture p = litFromAside();
   p.surfaces.resize(2);
   for (const float slant : {0.05f, 0.1f, 0.2f, 0.3f, 0.4f, 0.6f, 0.8f}) {
     p.surfaces[1].positions = sheet(0.15f, 60, 0.18f, slant, 0.07f).restPositions;
